@@ -1,0 +1,323 @@
+// Python's arguments as the core's structs. All functions return false with an exception set.
+#include "module.h"
+
+#include <math.h>
+#include <string.h>
+
+// The attribute, or NULL: without an exception where the object lacks it.
+static PyObject *optional_attribute(PyObject *object, const char *name)
+{
+    PyObject *value = PyObject_GetAttrString(object, name);
+
+    if (!value && PyErr_ExceptionMatches(PyExc_AttributeError))
+        PyErr_Clear();
+    return value;
+}
+
+static void store_value(struct vkb_values *values, const struct vkb_value_row *row, double number)
+{
+    char *place = (char *)values + row->offset;
+
+    switch (row->type) {
+    case VKB_VALUE_FLOAT:
+        *(float *)place = (float)number;
+        break;
+    case VKB_VALUE_INT:
+        *(int *)place = (int)number;
+        break;
+    case VKB_VALUE_DOUBLE:
+        *(double *)place = number;
+        break;
+    }
+}
+
+static bool out_of_range(const char *name, PyObject *value, double low, double high)
+{
+    PyObject *from = PyFloat_FromDouble(low), *to = PyFloat_FromDouble(high);
+
+    if (from && to)
+        PyErr_Format(PyExc_ValueError, "%s: %R is out of range, %R to %R", name, value, from, to);
+    Py_XDECREF(from);
+    Py_XDECREF(to);
+    return false;
+}
+
+// None keeps the default.
+static bool read_value(PyObject *object, const struct vkb_value_row *row, struct vkb_values *values)
+{
+    PyObject *value = optional_attribute(object, row->name);
+    bool done = true;
+
+    store_value(values, row, row->initial);
+    if (!value)
+        return !PyErr_Occurred();
+    if (value != Py_None) {
+        double number = PyFloat_AsDouble(value);
+        done = !PyErr_Occurred();
+        if (done && !(number >= row->low && number <= row->high))
+            done = out_of_range(row->name, value, row->low, row->high);
+        if (done)
+            store_value(values, row, number);
+    }
+    Py_DECREF(value);
+    return done;
+}
+
+static bool read_choice(PyObject *object, const struct vkb_choice_row *row, int *choice)
+{
+    PyObject *value = optional_attribute(object, row->name);
+
+    *choice = 0;
+    if (!value)
+        return !PyErr_Occurred();
+    for (int i = 0; PyUnicode_Check(value) && i < row->count; ++i)
+        if (PyUnicode_CompareWithASCIIString(value, row->spellings[i]) == 0) {
+            *choice = i;
+            Py_DECREF(value);
+            return true;
+        }
+    PyErr_Format(PyExc_ValueError, "%s: there is no %R", row->name, value);
+    Py_DECREF(value);
+    return false;
+}
+
+static bool read_format(PyObject *object, enum vkb_format *format)
+{
+    PyObject *value = optional_attribute(object, "format");
+
+    *format = VKB_FORMAT_NONE;
+    if (!value)
+        return !PyErr_Occurred();
+    if (value != Py_None) {
+        PyObject *text = PyUnicode_Check(value) ? PyUnicode_AsUTF8String(value) : NULL;
+        if (text)
+            *format = vkb_format_by_name(PyBytes_AsString(text));
+        Py_XDECREF(text);
+        if (!PyErr_Occurred()
+            && (*format == VKB_FORMAT_NONE || *format == VKB_FORMAT_DEPTH32_FLOAT))
+            PyErr_Format(PyExc_ValueError, "format: %R is no format of bloom buffers", value);
+    }
+    Py_DECREF(value);
+    return !PyErr_Occurred();
+}
+
+static bool read_size(PyObject *object, struct vkb_settings *settings)
+{
+    PyObject *value = optional_attribute(object, "bloom_size");
+    bool done = true;
+
+    if (!value)
+        return !PyErr_Occurred();
+    if (value != Py_None) {
+        done = PyArg_ParseTuple(value, "II;bloom_size must be (width, height)",
+                                &settings->bloom_width, &settings->bloom_height);
+        if (done && (settings->bloom_width == 0 || settings->bloom_height == 0)) {
+            PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, 1 a side at least",
+                         value);
+            done = false;
+        }
+    }
+    Py_DECREF(value);
+    return done;
+}
+
+static bool read_method(PyObject *object, enum vkb_method *method)
+{
+    static const char *const names[VKB_METHOD_COUNT] = {
+        [VKB_METHOD_SEPARABLE] = "separable",
+    };
+    PyObject *value = PyObject_GetAttrString(object, "method");
+
+    if (!value)
+        return false;
+    for (int i = 0; PyUnicode_Check(value) && i < VKB_METHOD_COUNT; ++i)
+        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0) {
+            *method = (enum vkb_method)i;
+            Py_DECREF(value);
+            return true;
+        }
+    PyErr_Format(PyExc_ValueError, "method: there is no %R", value);
+    Py_DECREF(value);
+    return false;
+}
+
+static bool read_weights(PyObject *object, struct vkb_settings *settings)
+{
+    PyObject *value = optional_attribute(object, "weights");
+
+    if (!value)
+        return !PyErr_Occurred();
+    Py_ssize_t count = PySequence_Size(value);
+    if (count < 1 || count > MAX_WEIGHTS) {
+        if (!PyErr_Occurred())
+            PyErr_Format(PyExc_ValueError, "weights: %zd weights are out of range, 1 to %d", count,
+                         MAX_WEIGHTS);
+        Py_DECREF(value);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
+        PyObject *item = PySequence_GetItem(value, i);
+        if (item)
+            settings->weights[i] = (float)PyFloat_AsDouble(item);
+        Py_XDECREF(item);
+    }
+    settings->weight_count = (uint32_t)count;
+    Py_DECREF(value);
+    return !PyErr_Occurred();
+}
+
+static bool read_layers(PyObject *object, struct vkb_settings *settings)
+{
+    PyObject *value = optional_attribute(object, "layers");
+
+    if (!value)
+        return !PyErr_Occurred();
+    Py_ssize_t count = PySequence_Size(value);
+    if (count < 1 || count > MAX_LAYERS) {
+        if (!PyErr_Occurred())
+            PyErr_Format(PyExc_ValueError, "layers: %zd layers are out of range, 1 to %d", count,
+                         MAX_LAYERS);
+        Py_DECREF(value);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
+        PyObject *item = PySequence_GetItem(value, i);
+        struct vkb_layer *layer = &settings->layers[i];
+        if (item
+            && PyArg_ParseTuple(item, "ff;layers must hold (scale, strength)", &layer->scale,
+                                &layer->strength)
+            && !(isfinite(layer->scale) && isfinite(layer->strength)))
+            PyErr_Format(PyExc_ValueError, "layers: %R is not finite", item);
+        Py_XDECREF(item);
+    }
+    settings->layer_count = (uint32_t)count;
+    Py_DECREF(value);
+    return !PyErr_Occurred();
+}
+
+bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)
+{
+    memset(settings, 0, sizeof *settings);
+    for (size_t i = 0; i < vkb_value_row_count; ++i)
+        if (!read_value(object, &vkb_value_rows[i], &settings->values))
+            return false;
+    for (int i = 0; i < VKB_CHOICE_COUNT; ++i)
+        if (!read_choice(object, &vkb_choice_rows[i], &settings->choices[i]))
+            return false;
+
+    PyObject *threshold = optional_attribute(object, "threshold");
+    settings->thresholded = threshold && threshold != Py_None;
+    Py_XDECREF(threshold);
+    return !PyErr_Occurred() && read_method(object, &settings->method)
+        && read_format(object, &settings->format) && read_size(object, settings)
+        && read_weights(object, settings) && read_layers(object, settings);
+}
+
+bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)
+{
+    double *p = camera->position, *r = camera->rotation;
+
+    return PyArg_ParseTuple(tuple, "(ddd)(ddd)ddd", &p[0], &p[1], &p[2], &r[0], &r[1], &r[2],
+                            &camera->fov, &camera->near, &camera->far);
+}
+
+// A contiguous array of at least one element, held in the scene; NULL with an exception set.
+static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, const char *what,
+                             const char *formats)
+{
+    Py_buffer *view = &scene->views[scene->view_count];
+
+    if (PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0)
+        return NULL;
+    ++scene->view_count;
+    if (view->len > 0 && view->format && strlen(view->format) == 1
+        && strchr(formats, view->format[0]))
+        return view;
+    PyErr_Format(PyExc_TypeError, "scene: %s is an array of the wrong type", what);
+    return NULL;
+}
+
+static bool read_mesh(struct vkb_held_scene *scene, PyObject *vertices, PyObject *indices,
+                      struct vkb_mesh_data *mesh)
+{
+    if (vertices == Py_None)
+        return true;
+    const Py_buffer *vertex_view = hold(scene, vertices, "vertices", "f");
+    const Py_buffer *index_view = vertex_view ? hold(scene, indices, "indices", "I") : NULL;
+    if (!index_view)
+        return false;
+
+    *mesh = (struct vkb_mesh_data){
+        .vertices = vertex_view->buf,
+        .indices = index_view->buf,
+        .vertex_count = (uint32_t)((size_t)vertex_view->len / sizeof *mesh->vertices),
+        .index_count = (uint32_t)((size_t)index_view->len / sizeof *mesh->indices),
+    };
+    for (uint32_t i = 0; i < mesh->index_count; ++i)
+        if (mesh->indices[i] >= mesh->vertex_count) {
+            PyErr_Format(PyExc_ValueError, "scene: index %u is beyond the mesh's %u vertices",
+                         mesh->indices[i], mesh->vertex_count);
+            return false;
+        }
+    return true;
+}
+
+static enum vkb_format pixel_format(char code)
+{
+    return code == 'B' ? VKB_FORMAT_RGBA8_UNORM
+         : code == 'e' ? VKB_FORMAT_RGBA16_FLOAT
+                       : VKB_FORMAT_RGBA32_FLOAT;
+}
+
+static bool read_sky(struct vkb_held_scene *scene, PyObject *levels)
+{
+    struct vkb_sky_data *sky = &scene->data.sky;
+    Py_ssize_t count = PyTuple_Size(levels);
+
+    if (count < 0 || count > VKB_MAX_MIP_LEVELS) {
+        if (!PyErr_Occurred())
+            PyErr_Format(PyExc_ValueError, "skybox: %zd mip levels are out of range, 0 to %d",
+                         count, VKB_MAX_MIP_LEVELS);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i) {
+        const Py_buffer *view = hold(scene, PyTuple_GetItem(levels, i), "a skybox level", "Bef");
+        if (!view)
+            return false;
+        if (i == 0) {
+            sky->format = pixel_format(view->format[0]);
+            sky->size = view->ndim == 4 ? (uint32_t)view->shape[1] : 0;
+        }
+        uint32_t size = sky->size >> i ? sky->size >> i : 1;
+        size_t expected = 6 * (size_t)size * size * vkb_pixel_size(sky->format);
+        if (sky->size == 0 || (size_t)view->len != expected
+            || pixel_format(view->format[0]) != sky->format) {
+            PyErr_Format(PyExc_ValueError, "skybox: level %zd is not six faces of %u x %u", i, size,
+                         size);
+            return false;
+        }
+        sky->levels[i] = view->buf;
+        sky->level_count = (uint32_t)i + 1;
+    }
+    return true;
+}
+
+bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene)
+{
+    unsigned long long serial;
+    PyObject *body_vertices, *body_indices, *glow_vertices, *glow_indices, *sky;
+
+    if (!PyArg_ParseTuple(tuple, "KOOOOO!", &serial, &body_vertices, &body_indices, &glow_vertices,
+                          &glow_indices, &PyTuple_Type, &sky))
+        return false;
+    scene->data.serial = serial;
+    return read_mesh(scene, body_vertices, body_indices, &scene->data.body)
+        && read_mesh(scene, glow_vertices, glow_indices, &scene->data.glow)
+        && read_sky(scene, sky);
+}
+
+void vkb_release_scene(struct vkb_held_scene *scene)
+{
+    while (scene->view_count > 0)
+        PyBuffer_Release(&scene->views[--scene->view_count]);
+}

@@ -1,0 +1,86 @@
+#include "device.h"
+
+static bool create_logical(struct vkb_device *device, struct vkb_error *error)
+{
+    return VK(error,
+              vkCreateDevice(device->adapter.physical,
+                             &(VkDeviceCreateInfo){
+                                 .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                 .queueCreateInfoCount = 1,
+                                 .pQueueCreateInfos =
+                                     &(VkDeviceQueueCreateInfo){
+                                         .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                         .queueFamilyIndex = device->adapter.queue_family,
+                                         .queueCount = 1,
+                                         .pQueuePriorities = &(float){1.0f},
+                                     },
+                             },
+                             NULL, &device->handle));
+}
+
+static uint64_t timestamp_mask(const struct vkb_device *device)
+{
+    VkQueueFamilyProperties families[16];
+    uint32_t count = sizeof families / sizeof families[0];
+
+    vkGetPhysicalDeviceQueueFamilyProperties(device->adapter.physical, &count, families);
+    uint32_t bits = families[device->adapter.queue_family].timestampValidBits;
+    return bits >= 64 ? UINT64_MAX : (UINT64_C(1) << bits) - 1;
+}
+
+bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bool validation,
+                       struct vkb_error *error)
+{
+    VkPhysicalDeviceProperties properties;
+
+    *device = (struct vkb_device){0};
+    if (!vkb_instance_create(&device->instance, validation, error))
+        return false;
+    if (!vkb_adapter_choose(&device->instance, adapter_choice, &device->adapter, error)
+        || !create_logical(device, error)) {
+        vkb_device_destroy(device);
+        return false;
+    }
+    volkLoadDeviceTable(&device->vk, device->handle);
+    device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
+    vkGetPhysicalDeviceMemoryProperties(device->adapter.physical, &device->memory);
+    vkGetPhysicalDeviceProperties(device->adapter.physical, &properties);
+    device->limits = properties.limits;
+    device->timestamp_mask = timestamp_mask(device);
+    return true;
+}
+
+void vkb_device_destroy(struct vkb_device *device)
+{
+    if (device->handle)
+        device->vk.vkDestroyDevice(device->handle, NULL);
+    device->handle = VK_NULL_HANDLE;
+    vkb_instance_destroy(&device->instance);
+}
+
+bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
+                         VkFormatFeatureFlags features)
+{
+    VkFormatProperties properties;
+
+    vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
+    return (properties.optimalTilingFeatures & features) == features;
+}
+
+bool vkb_device_run(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
+                    struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    VkSubmitInfo submit = {
+        .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
+        .commandBufferCount = 1,
+        .pCommandBuffers = &commands,
+    };
+    bool done = VK(error, vk->vkQueueSubmit(device->queue, 1, &submit, fence))
+             && VK(error, vk->vkWaitForFences(device->handle, 1, &fence, VK_TRUE, UINT64_MAX))
+             && VK(error, vk->vkResetFences(device->handle, 1, &fence));
+
+    if (!done && error->kind == VKB_ERROR_DEVICE_LOST)
+        device->lost = true;
+    return done;
+}

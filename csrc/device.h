@@ -1,0 +1,35 @@
+// A logical device with one queue, and how work is handed to it.
+#ifndef VKB_DEVICE_H
+#define VKB_DEVICE_H
+
+#include "adapter.h"
+
+#include <volk.h>
+
+struct vkb_device {
+    struct vkb_instance instance;
+    struct vkb_adapter_info adapter;
+    VkDevice handle;
+    struct VolkDeviceTable vk;
+    VkQueue queue;
+    VkPhysicalDeviceMemoryProperties memory;
+    VkPhysicalDeviceLimits limits;
+    uint64_t timestamp_mask;  // 0: the queue has no timestamps
+    bool lost;
+};
+
+// `device` must not move in memory while it lives, as the instance in it.
+bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bool validation,
+                       struct vkb_error *error);
+void vkb_device_destroy(struct vkb_device *device);
+
+// Whether images of `format` can be used in all the ways of `features` with optimal tiling.
+bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
+                         VkFormatFeatureFlags features);
+
+// Submits the recorded commands and waits until the device has run them; `fence` is unsignalled
+// before and after. A lost device is remembered.
+bool vkb_device_run(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
+                    struct vkb_error *error);
+
+#endif

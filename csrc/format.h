@@ -1,0 +1,36 @@
+// The image formats of the package: WebGPU names, Vulkan formats, bytes and NumPy dtypes.
+#ifndef VKB_FORMAT_H
+#define VKB_FORMAT_H
+
+#include <stdint.h>
+#include <vulkan/vulkan_core.h>
+
+enum vkb_format {
+    VKB_FORMAT_NONE,  // also: "choose for me"
+    VKB_FORMAT_RGBA8_UNORM,
+    VKB_FORMAT_RGBA16_FLOAT,
+    VKB_FORMAT_RGBA32_FLOAT,
+    VKB_FORMAT_DEPTH32_FLOAT,
+    VKB_FORMAT_COUNT,
+};
+
+struct vkb_format_info {
+    const char *name;       // "rgba8unorm"
+    const char *dtype;      // "uint8"
+    VkFormat vk;
+    uint32_t channels;
+    uint32_t channel_size;  // bytes
+    VkImageAspectFlags aspect;
+};
+
+extern const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT];
+
+static inline uint32_t vkb_pixel_size(enum vkb_format format)
+{
+    return vkb_formats[format].channels * vkb_formats[format].channel_size;
+}
+
+// The format of that name, VKB_FORMAT_NONE where there is none.
+enum vkb_format vkb_format_by_name(const char *name);
+
+#endif

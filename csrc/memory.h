@@ -1,0 +1,63 @@
+// Buffers and images with memory of their own.
+#ifndef VKB_MEMORY_H
+#define VKB_MEMORY_H
+
+#include "barrier.h"
+#include "format.h"
+
+enum vkb_memory_kind {
+    VKB_MEMORY_DEVICE,  // fast for the device
+    VKB_MEMORY_UPLOAD,  // mapped; the host writes
+    VKB_MEMORY_READBACK,  // mapped and cached; the host reads
+};
+
+struct vkb_buffer {
+    VkBuffer handle;
+    VkDeviceMemory memory;
+    VkDeviceSize size;
+    void *mapped;  // NULL for VKB_MEMORY_DEVICE
+    bool coherent;
+};
+
+struct vkb_image {
+    VkImage handle;
+    VkDeviceMemory memory;
+    VkImageView view;
+    enum vkb_format format;
+    uint32_t width, height, layers, levels;
+    enum vkb_access access;  // what was last recorded for it
+};
+
+// Six layers make a cubemap.
+struct vkb_image_spec {
+    enum vkb_format format;
+    uint32_t width, height, layers, levels;
+    VkImageUsageFlags usage;
+};
+
+// On failure nothing is left behind; destroying a zeroed or half-built object is fine.
+bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
+                       VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
+                       struct vkb_error *error);
+void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer);
+
+// Makes the buffer at least `size` bytes large; what it held is lost where it grows.
+bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind kind,
+                        VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
+                        struct vkb_error *error);
+
+// Around host access to mapped memory that is not coherent.
+bool vkb_buffer_flush(const struct vkb_device *device, const struct vkb_buffer *buffer,
+                      struct vkb_error *error);
+bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buffer *buffer,
+                           struct vkb_error *error);
+
+bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
+                      struct vkb_image *image, struct vkb_error *error);
+void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
+
+// Records what must stand between the image's last access and `access`.
+void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer commands,
+                          struct vkb_image *image, enum vkb_access access);
+
+#endif

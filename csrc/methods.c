@@ -1,0 +1,85 @@
+#include "methods.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
+{
+    if (!settings->thresholded)
+        return THRESHOLD_NONE;
+    return settings->values.mesh.knee > 0.0f ? THRESHOLD_KNEE : THRESHOLD_HARD;
+}
+
+static uint32_t scaled(double scale, uint32_t side)
+{
+    double size = floor(scale * side);
+    return size < 1.0 ? 1 : (uint32_t)size;
+}
+
+struct vkb_size vkb_bloom_size(const struct vkb_settings *settings, struct vkb_size frame)
+{
+    if (settings->bloom_width)
+        return (struct vkb_size){settings->bloom_width, settings->bloom_height};
+    return (struct vkb_size){
+        .width = scaled(settings->values.bloom_scale, frame.width),
+        .height = scaled(settings->values.bloom_scale, frame.height),
+    };
+}
+
+struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target)
+{
+    struct vkb_pass_row row;
+
+    // From zero, padding included: rows are compared byte by byte.
+    memset(&row, 0, sizeof row);
+    snprintf(row.name, sizeof row.name, "%s", name);
+    row.geometry = VKB_GEOMETRY_FULLSCREEN;
+    row.vertex = VKB_SHADER_fullscreen_vert;
+    row.fragment = fragment;
+    row.targets[0] = target;
+    row.target_count = 1;
+    row.depth = VKB_NO_IMAGE;
+    return row;
+}
+
+bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    static bool (*const methods[VKB_METHOD_COUNT])(
+        const struct vkb_settings *, const struct vkb_bloom_source *, struct vkb_graph *,
+        uint32_t *, struct vkb_error *) = {
+        [VKB_METHOD_SEPARABLE] = vkb_add_separable,
+    };
+
+    return methods[settings->method](settings, source, graph, bloom, error);
+}
+
+bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
+                       enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error)
+{
+    uint32_t final;
+    struct vkb_image_row image = {
+        .name = "final",
+        .format = format,
+        .width = graph->images[scene].width,
+        .height = graph->images[scene].height,
+        .framebuffer = true,
+    };
+
+    if (!vkb_graph_add_image(graph, &image, &final, error))
+        return false;
+    struct vkb_pass_row row = vkb_fullscreen_row("final", VKB_SHADER_composite_frag, final);
+    const bool off = bloom == VKB_NO_IMAGE;
+    row.constants[0] = off ? COMPOSITE_OFF : settings->choices[VKB_CHOICE_composite];
+    row.constants[1] = settings->choices[VKB_CHOICE_tonemap];
+    row.constants[2] = settings->choices[VKB_CHOICE_encoding];
+    row.constant_count = 3;
+    row.reads[0] = scene;
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row.reads[1] = off ? scene : bloom;
+    row.read_count = 2;
+    row.block = VKB_BLOCK_composite;
+    row.params.composite = settings->values.composite;
+    return vkb_graph_add_pass(graph, &row, error);
+}

@@ -1,0 +1,47 @@
+// What the files that speak Python share: module.c, renderer.c, arguments.c, describe.c. The only
+// header of the core that includes Python.h.
+#ifndef VKB_MODULE_H
+#define VKB_MODULE_H
+
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
+#include "methods.h"
+
+struct vkb_module_state {
+    PyObject *renderer_type;
+    PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
+};
+
+struct vkb_module_state *vkb_module_state(PyObject *module);
+
+// Raises the exception that fits; returns NULL.
+PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
+
+// (name, type, driver, driver_info, api_version, driver UUID as bytes)
+PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
+
+extern PyType_Spec vkb_renderer_spec;
+
+// A settings object's attributes; one that it lacks keeps its default. False with an exception set.
+bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
+
+// (position, rotation, fov, near, far), the first two of three numbers each.
+bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
+
+// A scene's arrays, held until vkb_release_scene, which may be called on a zeroed or half-read one.
+enum { VKB_SCENE_ARRAYS = 4 + VKB_MAX_MIP_LEVELS };
+struct vkb_held_scene {
+    struct vkb_scene_data data;
+    Py_buffer views[VKB_SCENE_ARRAYS];
+    int view_count;
+};
+
+// (serial, body vertices, body indices, glow vertices or None, glow indices or None, sky levels)
+bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
+void vkb_release_scene(struct vkb_held_scene *scene);
+
+// The graph of a forward frame as Python data: describe(settings, size, has_sky).
+PyObject *vkb_describe(PyObject *module, PyObject *arguments);
+
+#endif

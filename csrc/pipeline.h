@@ -1,0 +1,45 @@
+// From a pass row to Vulkan's objects: shader modules, layouts, render pass, pipeline. Each is made
+// once for its key and kept until the device goes.
+#ifndef VKB_PIPELINE_H
+#define VKB_PIPELINE_H
+
+#include "graph.h"
+
+struct vkb_render_pass_entry;
+struct vkb_pipeline_entry;
+
+struct vkb_pipelines {
+    VkPipelineCache cache;
+    VkSampler sampler;
+    VkShaderModule modules[VKB_SHADER_COUNT];
+    VkDescriptorSetLayout set_layouts[VKB_MAX_READS + 1];  // by the number of images read
+    VkPipelineLayout layouts[VKB_MAX_READS + 1];
+    struct vkb_render_pass_entry *render_passes;
+    struct vkb_pipeline_entry *entries;
+    size_t render_pass_count, render_pass_capacity;
+    size_t entry_count, entry_capacity;
+};
+
+// `cache_data` may be NULL; what the driver does not know it ignores.
+bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_data,
+                          size_t cache_size, struct vkb_pipelines *pipelines,
+                          struct vkb_error *error);
+void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines *pipelines);
+
+// What the driver wants kept for the next time; the caller frees *data with vkb_free.
+bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
+                        void **data, size_t *size, struct vkb_error *error);
+
+// The render pass of the passes first..end-1, with the dependencies that follow from their rows.
+bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                               const struct vkb_graph *graph, uint32_t first, uint32_t end,
+                               VkRenderPass *render_pass, struct vkb_error *error);
+
+bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                       const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                       VkPipeline *pipeline, struct vkb_error *error);
+
+// How many images the pass reads by descriptor, the skybox's cubemap counted in.
+uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
+
+#endif

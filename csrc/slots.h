@@ -1,0 +1,46 @@
+// The images that live from frame to frame, each under its name, with what it was made from. An
+// image is kept until a graph wants another size or format of it.
+#ifndef VKB_SLOTS_H
+#define VKB_SLOTS_H
+
+#include "graph.h"
+#include "memory.h"
+
+struct vkb_slot {
+    char name[VKB_NAME_SIZE];
+    struct vkb_image image;
+    uint64_t image_id;              // given anew each time that the image is created
+    uint64_t version;               // given anew each time that the image is written
+    unsigned char *recipe;          // what it was last made from, byte by byte comparable
+    size_t recipe_size, recipe_capacity;
+    bool valid;                     // what the recipe says has run to its end
+    VkFramebuffer framebuffer;      // of the render pass whose first target this is
+    VkRenderPass framebuffer_pass;
+    uint64_t framebuffer_images[VKB_MAX_TARGETS + 1];
+};
+
+struct vkb_slots {
+    struct vkb_slot **slots;        // pointers, so that they stay where they are
+    size_t count, capacity;
+    uint64_t clock;                 // the last id or version given out
+};
+
+void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots);
+
+// The slot of an image row, with an image of the row's size and format in it.
+bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
+                       const struct vkb_image_row *row, struct vkb_slot **slot,
+                       struct vkb_error *error);
+
+bool vkb_slot_up_to_date(const struct vkb_slot *slot, const void *recipe, size_t size);
+
+// From here until the caller sets `valid`, the image holds nothing that counts.
+bool vkb_slot_begin_writing(struct vkb_slots *slots, struct vkb_slot *slot, const void *recipe,
+                            size_t size, struct vkb_error *error);
+
+// The framebuffer of those targets, kept with the first of them.
+bool vkb_slot_framebuffer(const struct vkb_device *device, struct vkb_slot **targets,
+                          uint32_t target_count, VkRenderPass render_pass,
+                          VkFramebuffer *framebuffer, struct vkb_error *error);
+
+#endif

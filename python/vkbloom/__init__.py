@@ -1,0 +1,48 @@
+"""vkbloom: measure bloom.
+
+A whole Vulkan bloom pipeline, on a GPU or on a CPU with Mesa's lavapipe, that gives back every
+framebuffer as a NumPy array.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+from vkbloom import reference
+from vkbloom._core import (
+    AdapterNotFoundError,
+    DeviceLostError,
+    Error,
+    OutOfMemoryError,
+    ShaderError,
+    ValidationError,
+)
+from vkbloom.adapter import AdapterInfo, adapters
+from vkbloom.frames import Frames
+from vkbloom.presets import presets
+from vkbloom.renderer import Renderer
+from vkbloom.scene import Camera, Scene
+from vkbloom.settings import TUTORIAL, Separable, Settings, gaussian_weights
+
+__version__ = version("vkbloom")
+
+__all__ = [
+    "TUTORIAL",
+    "AdapterInfo",
+    "AdapterNotFoundError",
+    "Camera",
+    "DeviceLostError",
+    "Error",
+    "Frames",
+    "OutOfMemoryError",
+    "Renderer",
+    "Scene",
+    "Separable",
+    "Settings",
+    "ShaderError",
+    "ValidationError",
+    "adapters",
+    "gaussian_weights",
+    "presets",
+    "reference",
+]

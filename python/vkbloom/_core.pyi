@@ -1,0 +1,60 @@
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+VALUES: dict[str, tuple[float, float, float]]
+CHOICES: dict[str, tuple[str, ...]]
+MAX_WEIGHTS: int
+MAX_LAYERS: int
+
+_Adapter = tuple[str, str, str, str, str, bytes]
+_Array = NDArray[Any]
+_Camera = tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]
+_Scene = tuple[
+    int,
+    NDArray[np.float32],
+    NDArray[np.uint32],
+    NDArray[np.float32] | None,
+    NDArray[np.uint32] | None,
+    tuple[_Array, ...],
+]
+_Allocate = Callable[[str, tuple[int, ...], str], _Array]
+
+class Error(Exception):
+    vk_call: str | None
+    vk_result: int | None
+
+class AdapterNotFoundError(Error, RuntimeError): ...
+class DeviceLostError(Error): ...
+class OutOfMemoryError(Error, MemoryError): ...
+class ValidationError(Error): ...
+class ShaderError(Error): ...
+
+def adapters() -> list[_Adapter]: ...
+def describe(settings: object, size: tuple[int, int], has_sky: bool, /) -> dict[str, Any]: ...
+
+class Renderer:
+    def __new__(
+        cls, adapter: str, validation: bool, read_cache: Callable[[bytes], bytes | None], /
+    ) -> Renderer: ...
+    @property
+    def closed(self) -> bool: ...
+    @property
+    def info(self) -> _Adapter: ...
+    @property
+    def pipeline_count(self) -> int: ...
+    def close(self) -> None: ...
+    def pipeline_cache(self) -> bytes: ...
+    def render(
+        self,
+        settings: object,
+        scene: _Scene,
+        camera: _Camera,
+        size: tuple[int, int],
+        time: float,
+        names: tuple[str, ...] | None,
+        allocate: _Allocate,
+        /,
+    ) -> tuple[dict[str, _Array], dict[str, float]]: ...

@@ -1,0 +1,99 @@
+"""The last pass: scene and bloom to the final image."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from .image import as_float
+from .sampling import Array
+from .tone_map import ENCODINGS, TONE_MAPS
+
+__all__ = ["composite"]
+
+
+class CompositeSettings(Protocol):
+    """What the last pass reads of any settings."""
+
+    @property
+    def bloom(self) -> bool: ...
+    @property
+    def composite(self) -> str: ...
+    @property
+    def intensity(self) -> float: ...
+    @property
+    def exposure(self) -> float: ...
+    @property
+    def tonemap(self) -> str: ...
+    @property
+    def encoding(self) -> str: ...
+
+
+def composite(
+    scene: NDArray[Any],
+    bloom: NDArray[Any] | None,
+    settings: CompositeSettings,
+    dtype: DTypeLike | None = None,
+) -> Array:
+    """Return the final image: composite, exposure, tone map and encoding, in this order.
+
+    With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" s + (b - s) i
+    and "screen" 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies
+    by 2^e. All of it works on rgb; alpha is the scene's.
+
+    A component of the scene that is NaN or infinite stays so. To the tone maps that mix the
+    channels it counts as 0.
+
+    Parameters
+    ----------
+    scene : ndarray, shape (H, W, 3) or (H, W, 4)
+        uint8 (read as value / 255), float16, float32 or float64.
+    bloom : ndarray, shape (H, W, 3) or (H, W, 4), or None
+        Of the same types, finite. Not read where ``settings.bloom`` is off.
+    settings : vkbloom.Separable, Pyramid or DualKawase
+    dtype : dtype, optional
+        Of the final image; the scene's by default. For uint8 the result is clamped to 0..1.
+
+    Returns
+    -------
+    ndarray of float64, shape of the scene
+        In real units, not rounded to `dtype`.
+
+    Raises
+    ------
+    TypeError
+        An image of another dtype, or none where the bloom is on.
+    ValueError
+        An image of another shape, or sizes that differ.
+    """
+    image = as_float(scene, "scene", (3, 4))
+    stored = np.asarray(scene).dtype if dtype is None else np.dtype(dtype)
+    original = image[..., :3]
+    rgb = np.where(np.isfinite(original), original, 0.0)
+    if settings.bloom:
+        if bloom is None:
+            raise TypeError("bloom must be an array where settings.bloom is True, not None")
+        glow = as_float(bloom, "bloom", (3, 4))[..., :3]
+        if glow.shape != rgb.shape:
+            raise ValueError(
+                f"bloom must have the scene's height and width {image.shape[:2]}, "
+                f"not {glow.shape[:2]}"
+            )
+        rgb = _blend(rgb, glow, settings.composite, settings.intensity)
+    rgb = ENCODINGS[settings.encoding](TONE_MAPS[settings.tonemap](rgb * 2.0**settings.exposure))
+    rgb = np.where(np.isfinite(original), rgb, original)
+    final = np.concatenate([rgb, image[..., 3:]], axis=-1)
+    return np.clip(final, 0, 1) if stored == np.uint8 else final
+
+
+def _blend(scene: Array, bloom: Array, mode: str, intensity: float) -> Array:
+    """Return scene and bloom as one image."""
+    if mode == "add":
+        return scene + intensity * bloom
+    if mode == "mix":
+        return scene + (bloom - scene) * intensity
+    if mode == "screen":
+        return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(intensity * bloom, 0, 1))
+    raise ValueError(f'composite must be "add", "mix" or "screen", not {mode!r}')

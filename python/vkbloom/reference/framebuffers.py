@@ -1,0 +1,207 @@
+"""The framebuffers of every bloom method, by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import dual_kawase, pyramid, separable
+from .compositing import CompositeSettings, composite
+from .image import as_float, finite, format_of, storage
+from .sampling import Array, sample
+from .threshold import extract
+
+__all__ = ["apply", "blur", "gain", "passes"]
+
+
+class Settings(CompositeSettings, Protocol):
+    """What the reference reads of any settings; each method reads its own fields beside it."""
+
+    @property
+    def method(self) -> str: ...
+    @property
+    def threshold(self) -> float | None: ...
+    @property
+    def knee(self) -> float: ...
+    @property
+    def bloom_size(self) -> tuple[int, int] | None: ...
+    @property
+    def bloom_scale(self) -> float: ...
+    @property
+    def format(self) -> str | None: ...
+
+
+class _Method(NamedTuple):
+    # (glow, settings, size of the bloom, storing) -> framebuffers after the glow
+    passes: Callable[[Array, Any, tuple[int, int], Callable[[Array], Array]], dict[str, Array]]
+    gain: Callable[[Any], float]
+
+
+_METHODS = {
+    "separable": _Method(separable.passes, separable.gain),
+    "pyramid": _Method(pyramid.passes, pyramid.gain),
+    "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
+}
+
+
+def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
+    """Return what `vkbloom.Renderer.apply` returns, computed in float64.
+
+    The image is reduced to the size of the bloom buffers by bilinear sampling at their pixel
+    centres, thresholded, blurred and composited. Components that are NaN or infinite count as
+    0 in the bloom and stay as they are in "final".
+
+    Bloom buffers of the format "rgba8unorm" are clamped to 0..1 wherever they are stored;
+    nothing is rounded to a format's levels, and "rgba16float" does not overflow here.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, 3) or (H, W, 4)
+        uint8 (read as value / 255), float16, float32 or float64. The format of the bloom
+        buffers follows from it unless ``settings.format`` names one; that of float64 is
+        "rgba32float".
+    settings : vkbloom.Separable, Pyramid or DualKawase
+
+    Returns
+    -------
+    dict of str to ndarray of float64
+        In the order of the data flow: "glow", then the blur's (`passes`), then "final". Real
+        units: 0..1 for what a device stores as unorm. Bloom buffers have 4 channels, with
+        alpha 1; "final" has the image's channels and its alpha. With ``settings.bloom`` off,
+        "final" alone.
+
+    Raises
+    ------
+    TypeError
+        An image of another dtype.
+    ValueError
+        An image of another shape.
+    """
+    scene = as_float(image, "image", (3, 4))
+    dtype = np.asarray(image).dtype
+    if not settings.bloom:
+        return {"final": composite(scene, None, settings, dtype)}
+    height, width, _ = scene.shape
+    store = storage(format_of(image, settings.format))
+    reduced = sample(finite(scene[..., :3]), _bloom_size(settings, (width, height)))
+    glow = store(extract(reduced, settings.threshold, settings.knee))
+    blurred = _method(settings).passes(glow, settings, (width, height), store)
+    framebuffers = {name: _with_alpha(rgb) for name, rgb in {"glow": glow, **blurred}.items()}
+    framebuffers["final"] = composite(scene, framebuffers["bloom"], settings, dtype)
+    return framebuffers
+
+
+def passes(
+    glow: NDArray[Any],
+    settings: Settings,
+    size: tuple[int, int] | None = None,
+    format: str | None = None,
+) -> dict[str, Array]:
+    """Return the framebuffers that the blur makes of a glow: no threshold, no composite.
+
+    Parameters
+    ----------
+    glow : ndarray, shape (H, W, C)
+        What the bloom buffers begin with, at their size: uint8 (read as value / 255), float16,
+        float32 or float64. A fourth channel of four is alpha and comes out as 1; otherwise
+        each channel is blurred by itself. NaN and infinity count as 0.
+    settings : vkbloom.Separable, Pyramid or DualKawase
+        Those of the blur are used, and `format`.
+    size : (int, int), optional
+        Width and height of the final image, at whose pixels the last pass is evaluated; by
+        default the glow's own.
+    format : {"rgba8unorm", "rgba16float", "rgba32float"}, optional
+        Of the bloom buffers; by default that of the settings, and where that is None, the one
+        of the glow's dtype.
+
+    Returns
+    -------
+    dict of str to ndarray of float64
+        In the order of the data flow: "blur_vertical" (`Separable` without ``direct``), or
+        "down_0" to "down_N-1" and "up_N-2" to "up_0", then "bloom".
+
+    Raises
+    ------
+    TypeError
+        A glow of another dtype.
+    ValueError
+        A glow of another shape, a size under 1 or an unknown format.
+    """
+    values = finite(as_float(glow, "glow"))
+    height, width, channels = values.shape
+    if size is not None and min(size) < 1:
+        raise ValueError(f"size must be (width, height) of at least 1, not {size}")
+    store = storage(format_of(glow, settings.format if format is None else format))
+    has_alpha = channels == 4
+    colours = store(values[..., :3] if has_alpha else values)
+    framebuffers = _method(settings).passes(colours, settings, size or (width, height), store)
+    if not has_alpha:
+        return framebuffers
+    return {name: _with_alpha(rgb) for name, rgb in framebuffers.items()}
+
+
+def blur(
+    glow: NDArray[Any],
+    settings: Settings,
+    size: tuple[int, int] | None = None,
+    format: str | None = None,
+) -> Array:
+    """Return the bloom that the blur makes of a glow: no threshold, no composite.
+
+    Parameters
+    ----------
+    glow, settings, size, format
+        As for `passes`.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width, C)
+        "bloom" of `passes`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `passes`.
+    """
+    return passes(glow, settings, size, format)["bloom"]
+
+
+def gain(settings: Settings) -> float:
+    """Return the bloom of a flat image of 1, before any clamp and before the intensity.
+
+    Parameters
+    ----------
+    settings : vkbloom.Separable, Pyramid or DualKawase
+        A threshold that they set has its effect: a flat image of 1 passes through it first.
+
+    Returns
+    -------
+    float
+    """
+    glow = float(extract(np.ones((1, 1, 3)), settings.threshold, settings.knee)[0, 0, 0])
+    return glow * _method(settings).gain(settings)
+
+
+def _method(settings: Settings) -> _Method:
+    try:
+        return _METHODS[settings.method]
+    except KeyError:
+        known = ", ".join(map(repr, _METHODS))
+        raise ValueError(f"method must be one of {known}, not {settings.method!r}") from None
+
+
+def _bloom_size(settings: Settings, frame: tuple[int, int]) -> tuple[int, int]:
+    """Return width and height of the bloom buffers of a frame."""
+    if settings.bloom_size is not None:
+        return settings.bloom_size
+    width, height = (max(1, math.floor(side * settings.bloom_scale)) for side in frame)
+    return width, height
+
+
+def _with_alpha(rgb: Array) -> Array:
+    """Return rgb with a fourth channel of 1."""
+    return np.concatenate([rgb, np.ones((*rgb.shape[:2], 1))], axis=-1)

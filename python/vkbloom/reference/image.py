@@ -1,0 +1,103 @@
+"""Images as they come in: real units, formats, and what storing in a format does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .sampling import Array
+
+__all__ = ["as_float", "finite", "format_of", "storage"]
+
+_FORMATS = {
+    "uint8": "rgba8unorm",
+    "float16": "rgba16float",
+    "float32": "rgba32float",
+    # No format has doubles: they are for work in the reference alone, and nothing clamps them.
+    "float64": "rgba32float",
+}
+
+
+def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = None) -> Array:
+    """Return an image in real units.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, C)
+        uint8 (read as value / 255), float16, float32 or float64.
+    name : str
+        Of the argument, for the errors.
+    channels : collection of int, optional
+        The numbers of channels C to accept; any from 1 by default.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, C)
+
+    Raises
+    ------
+    TypeError
+        Another dtype.
+    ValueError
+        Another shape.
+    """
+    array = np.asarray(image)
+    if array.dtype.name not in _FORMATS:
+        raise TypeError(
+            f"{name} must be uint8, float16, float32 or float64, not {array.dtype.name}"
+        )
+    if array.ndim != 3 or 0 in array.shape:
+        raise ValueError(f"{name} must have the shape (H, W, C), not {array.shape}")
+    if channels is not None and array.shape[2] not in channels:
+        wanted = " or ".join(map(str, channels))
+        raise ValueError(f"{name} must have {wanted} channels, not {array.shape[2]}")
+    real = array.astype(np.float64)
+    return real / 255 if array.dtype == np.uint8 else real
+
+
+def finite(image: Array) -> Array:
+    """Return the image with 0 in place of every component that is NaN or infinite."""
+    return np.where(np.isfinite(image), image, 0.0)
+
+
+def format_of(image: NDArray[Any], format: str | None) -> str:
+    """Return the format of the bloom buffers: the one asked for, or that of the image's dtype."""
+    return _FORMATS[np.asarray(image).dtype.name] if format is None else format
+
+
+def storage(format: str) -> Callable[[Array], Array]:
+    """Return what storing in a bloom buffer of a format does to the values.
+
+    "rgba8unorm" clamps to 0..1. Nothing is rounded to a format's levels, which is what the
+    tolerance of a comparison is for. Values beyond 65504 become infinite in "rgba16float" on a
+    device and stay what they are here.
+
+    Parameters
+    ----------
+    format : {"rgba8unorm", "rgba16float", "rgba32float"}
+
+    Returns
+    -------
+    callable
+
+    Raises
+    ------
+    ValueError
+        Another format.
+    """
+    if format == "rgba8unorm":
+        return _clamp
+    if format in ("rgba16float", "rgba32float"):
+        return _keep
+    raise ValueError(f'format must be "rgba8unorm", "rgba16float" or "rgba32float", not {format!r}')
+
+
+def _clamp(image: Array) -> Array:
+    return np.clip(image, 0, 1)
+
+
+def _keep(image: Array) -> Array:
+    return image

@@ -1,0 +1,89 @@
+"""Bilinear sampling of an image at a grid of positions, clamped to the edge.
+
+All passes of the bloom methods read at positions that form a grid: the pixel centres of the
+image they write, moved by the offset of a tap. Bilinear interpolation and clamping work on
+each axis by itself, so that a pass (or a term of it) is one matrix for the rows and one for
+the columns. The matrices are banded; they are built and applied in blocks of output rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CENTRE", "Array", "Taps", "sample"]
+
+Array = NDArray[np.float64]
+
+# (offset in texels of the image that is read, weight) of each tap along one axis.
+Taps = Sequence[tuple[float, float]]
+
+CENTRE: Taps = ((0.0, 1.0),)
+
+# Output rows per block: wide enough for fast products, narrow enough that a block of a large
+# image does not multiply with many zeros beside its band.
+_BLOCK = 32
+
+
+def sample(
+    image: Array, size: tuple[int, int], x_taps: Taps = CENTRE, y_taps: Taps = CENTRE
+) -> Array:
+    """Read an image around the pixel centres of another one, and sum what the taps find.
+
+    The pixel (i, j) of the result has its centre at ((i + 0.5) / width, (j + 0.5) / height)
+    in normalized coordinates, which is ((i + 0.5) / width * w - 0.5) in texels of the image
+    that is read, w texels wide, with texel n at n. Between texels the value is the linear
+    interpolation of the two nearest on each axis (the Vulkan specification, chapter "Image
+    Operations", section "Texel Filtering", of linear filters); beyond the edge it is the
+    edge's.
+
+    Parameters
+    ----------
+    image : ndarray of float64, shape (H, W, C)
+        Finite values. It is not changed.
+    size : (int, int)
+        Width and height of the result, in pixels.
+    x_taps, y_taps : sequence of (float, float)
+        Offset, in texels of `image`, and weight of each tap along the axis. The taps of both
+        axes form a grid, with the products of their weights.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width, C)
+    """
+    width, height = size
+    rows = _filter_rows(image, height, y_taps)
+    columns = _filter_rows(rows.swapaxes(0, 1), width, x_taps)
+    return np.ascontiguousarray(columns.swapaxes(0, 1))
+
+
+def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
+    """Apply the taps along the first axis, for `count` rows of output."""
+    length = image.shape[0]
+    if count == length and tuple(taps) == CENTRE:
+        return image
+    source = image.reshape(length, -1)
+    offsets, tap_weights = np.array(taps, dtype=np.float64).T
+    result = np.empty((count, source.shape[1]))
+    for start in range(0, count, _BLOCK):
+        stop = min(start + _BLOCK, count)
+        centres = (np.arange(start, stop) + 0.5) * length / count - 0.5
+        positions = centres[:, np.newaxis] + offsets
+        lower = np.floor(positions)
+        fraction = positions - lower
+        texels = np.clip(np.stack([lower, lower + 1]), 0, length - 1).astype(np.intp)
+        weights = np.stack([1 - fraction, fraction]) * tap_weights
+
+        first = int(texels.min())
+        band = int(texels.max()) + 1 - first
+        output_rows = np.arange(stop - start)[:, np.newaxis]
+        # Taps that meet in one texel add up there, which bincount does.
+        matrix = np.bincount(
+            (output_rows * band + texels - first).ravel(),
+            weights=weights.ravel(),
+            minlength=(stop - start) * band,
+        ).reshape(stop - start, band)
+        result[start:stop] = matrix @ source[first : first + band]
+    return result.reshape(count, *image.shape[1:])

@@ -1,0 +1,61 @@
+"""Extraction of what glows: by luminance, or by brightness with a soft knee."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .sampling import Array
+
+__all__ = ["extract", "luminance"]
+
+# Rec. 709 luma coefficients of linear rgb.
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def luminance(rgb: Array) -> Array:
+    """Return the Rec. 709 luminance 0.2126 r + 0.7152 g + 0.0722 b.
+
+    Parameters
+    ----------
+    rgb : ndarray of float64, shape (..., 3)
+
+    Returns
+    -------
+    ndarray of float64, shape (..., 1)
+    """
+    weighted: Array = (rgb * _LUMINANCE).sum(axis=-1, keepdims=True)
+    return weighted
+
+
+def extract(rgb: Array, threshold: float | None, knee: float) -> Array:
+    """Keep what is brighter than the threshold.
+
+    Without a knee, a colour stays whole where its luminance is greater than the threshold and
+    is 0 elsewhere. With one, with b = max(r, g, b), k = threshold * knee and
+    q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
+    max(q, b - threshold) / max(b, 1e-5): a quadratic that joins 0 at threshold - k to the line
+    b - threshold at threshold + k. Both formulas are those of the interface's table of
+    settings.
+
+    Parameters
+    ----------
+    rgb : ndarray of float64, shape (..., 3)
+    threshold : float or None
+        In the image's units; None keeps everything.
+    knee : float
+        Half-width of the soft part, as a fraction of the threshold; 0 for the hard one.
+
+    Returns
+    -------
+    ndarray of float64, shape (..., 3)
+    """
+    if threshold is None:
+        return rgb
+    if knee == 0:
+        return np.where(luminance(rgb) > threshold, rgb, 0.0)
+    brightness = rgb.max(axis=-1, keepdims=True)
+    half_width = threshold * knee
+    soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2
+    soft /= 4 * half_width + 1e-5
+    scale: Array = np.maximum(soft, brightness - threshold) / np.maximum(brightness, 1e-5)
+    return rgb * scale

@@ -1,0 +1,127 @@
+"""Tone maps and encodings of rgb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from .sampling import Array
+
+__all__ = ["ENCODINGS", "TONE_MAPS"]
+
+
+def _none(rgb: Array) -> Array:
+    return rgb
+
+
+def _reinhard(rgb: Array) -> Array:
+    """Return c / (c + 1) (Reinhard et al., "Photographic Tone Reproduction", 2002)."""
+    with np.errstate(divide="ignore"):
+        return rgb / (rgb + 1)
+
+
+def _aces(rgb: Array) -> Array:
+    """Return the filmic fit c (2.51 c + 0.03) / (c (2.43 c + 0.59) + 0.14), clamped to 0..1.
+
+    From Narkowicz, "ACES Filmic Tone Mapping Curve", 2015.
+    """
+    return np.clip(rgb * (2.51 * rgb + 0.03) / (rgb * (2.43 * rgb + 0.59) + 0.14), 0, 1)
+
+
+def _exponential(rgb: Array) -> Array:
+    """Return 1 - exp(-c)."""
+    return -np.expm1(-rgb)
+
+
+def _khronos_neutral(rgb: Array) -> Array:
+    """Apply Khronos PBR Neutral, from its specification.
+
+    Source: github.com/KhronosGroup/ToneMapping, PBR_Neutral/README.md, section "PBR Neutral
+    Specification", whose symbols F90, K_s, K_d, f, p, p_n and g these are. Input and output
+    are linear.
+    """
+    fresnel, start, desaturation = 0.04, 0.8 - 0.04, 0.15
+    least = rgb.min(axis=-1, keepdims=True)
+    toe = np.where(least <= 2 * fresnel, least - least**2 / (4 * fresnel), fresnel)
+    colour = rgb - toe
+    peak = colour.max(axis=-1, keepdims=True)
+    # Only pixels beyond the start are compressed; the others take a divisor that is safe.
+    compressed = peak > start
+    peak = np.where(compressed, peak, 1.0)
+    new_peak = 1 - (1 - start) ** 2 / (peak + 1 - 2 * start)
+    kept = 1 / (desaturation * (peak - new_peak) + 1)
+    return np.where(compressed, colour * (new_peak / peak) * kept + new_peak * (1 - kept), colour)
+
+
+# Matrices of three.js, release 185, src/renderers/shaders/ShaderChunk/
+# tonemapping_pars_fragment.glsl.js, here with the rows as rows. Rec. 2020 <-> sRGB from
+# Report ITU-R BT.2407; inset and outset from Blender's AgX.
+_SRGB_TO_REC2020 = np.array(
+    [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]]
+)
+_REC2020_TO_SRGB = np.array(
+    [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]]
+)
+_AGX_INSET = np.array(
+    [
+        [0.856627153315983, 0.0951212405381588, 0.0482516061458583],
+        [0.137318972929847, 0.761241990602591, 0.101439036467562],
+        [0.11189821299995, 0.0767994186031903, 0.811302368396859],
+    ]
+)
+_AGX_OUTSET = np.array(
+    [
+        [1.1271005818144368, -0.11060664309660323, -0.016493938717834573],
+        [-0.1413297634984383, 1.157823702216272, -0.016493938717834257],
+        [-0.14132976349843826, -0.11060664309660294, 1.2519364065950405],
+    ]
+)
+# The range of the logarithm: 10 stops below and 6.5 above a middle grey of 0.18.
+_AGX_MIN_EV, _AGX_MAX_EV = -12.47393, 4.026069
+# Fit of the default contrast curve, highest power first.
+_AGX_CONTRAST = (15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232)
+
+
+def _agx(rgb: Array) -> Array:
+    """Apply AgX with its default look, as three.js (release 185) has it.
+
+    Linear sRGB -> linear Rec. 2020 -> inset -> log2 between two exposures as 0..1 -> contrast
+    polynomial -> outset -> power 2.2, which undoes the curve's display encoding -> linear
+    sRGB, clamped to 0..1. Input and output are linear: an encoding still has to follow.
+    """
+    colour = np.maximum(rgb @ (_AGX_INSET @ _SRGB_TO_REC2020).T, 1e-10)
+    stops = (np.log2(colour) - _AGX_MIN_EV) / (_AGX_MAX_EV - _AGX_MIN_EV)
+    contrast = np.polyval(_AGX_CONTRAST, np.clip(stops, 0, 1))
+    linear = np.maximum(contrast @ _AGX_OUTSET.T, 0) ** 2.2
+    srgb: Array = np.clip(linear @ _REC2020_TO_SRGB.T, 0, 1)
+    return srgb
+
+
+def _gamma22(rgb: Array) -> Array:
+    """Return c^(1 / 2.2), negative values as 0."""
+    return np.maximum(rgb, 0.0) ** (1 / 2.2)
+
+
+def _srgb(rgb: Array) -> Array:
+    """Apply the piecewise curve of IEC 61966-2-1, negative values as 0."""
+    positive = np.maximum(rgb, 0.0)
+    return np.where(positive <= 0.0031308, 12.92 * positive, 1.055 * positive ** (1 / 2.4) - 0.055)
+
+
+# By the name in the settings. Each takes and returns finite rgb, (..., 3), of float64. The
+# curves are meant for values from 0 up; below 0 the formulas are taken as they stand.
+TONE_MAPS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
+    {
+        "none": _none,
+        "reinhard": _reinhard,
+        "aces": _aces,
+        "exponential": _exponential,
+        "khronos_neutral": _khronos_neutral,
+        "agx": _agx,
+    }
+)
+ENCODINGS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
+    {"none": _none, "gamma22": _gamma22, "srgb": _srgb}
+)

@@ -1,0 +1,254 @@
+"""The renderer: scenes and settings in, framebuffers out."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from vkbloom import _core, pipeline_cache
+from vkbloom.adapter import AdapterInfo
+from vkbloom.frames import Frames
+from vkbloom.settings import Separable, Settings, check_size
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import TracebackType
+
+    from numpy.typing import NDArray
+
+    from vkbloom.scene import Scene
+
+Shading = Literal["forward"]
+
+
+def _version() -> str:
+    from vkbloom import __version__  # noqa: PLC0415  the package imports this module
+
+    return __version__
+
+
+def _check_settings(settings: Settings | None) -> Settings:
+    if settings is None:
+        return Separable()
+    if not isinstance(settings, Settings):
+        raise TypeError(f"settings: Settings are needed, not {settings!r}")
+    return settings
+
+
+def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
+    """Return the wanted names, None for all."""
+    if attachments == "all":
+        return None
+    if isinstance(attachments, str):
+        return (attachments,)
+    names = tuple(attachments)
+    for name in names:
+        if not isinstance(name, str):
+            raise TypeError(f"attachments: names are needed, not {name!r}")
+    return names
+
+
+def _allocator(
+    out: Mapping[str, NDArray[Any]] | None,
+) -> Callable[[str, tuple[int, ...], str], NDArray[Any]]:
+    """Return what gives the core its arrays: those of `out` where they fit, else new ones."""
+
+    def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+        if out is None or name not in out:
+            return np.empty(shape, dtype)
+        array = out[name]
+        if not isinstance(array, np.ndarray):
+            raise TypeError(f"out: {name} must be an array, not {type(array).__name__}")
+        if array.shape != shape or array.dtype != np.dtype(dtype):
+            raise ValueError(
+                f"out: {name} has shape {array.shape} and dtype {array.dtype}, "
+                f"it must have {shape} and {dtype}"
+            )
+        if not array.flags.c_contiguous or not array.flags.writeable:
+            raise ValueError(f"out: {name} must be C-contiguous and writeable")
+        return array
+
+    return allocate
+
+
+class Renderer:
+    """A device and its pipeline, in this process until it is closed.
+
+    Parameters
+    ----------
+    adapter : str
+        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", or a
+        part of an adapter's name, in any case. The environment variable VKBLOOM_ADAPTER replaces
+        "auto".
+    validation : bool
+        Turns the Khronos validation layer on, with synchronization validation; its first message
+        raises `ValidationError` from the call that caused it.
+
+    Attributes
+    ----------
+    closed : bool
+    info : AdapterInfo
+
+    Raises
+    ------
+    AdapterNotFoundError
+        No adapter fits; says what was found, what is missing and what to install.
+    Error
+        The device cannot be set up, or the validation layer is not installed.
+
+    Notes
+    -----
+    A context manager; usable from any thread. Calls release the GIL while the device works, and
+    wait for each other. Framebuffers own their memory and outlive the renderer.
+    """
+
+    def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
+        if not isinstance(adapter, str):
+            raise TypeError(f"adapter: a name is needed, not {adapter!r}")
+        if adapter == "auto":
+            adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
+        self._core = _core.Renderer(adapter, bool(validation), pipeline_cache.read)
+        *fields, self._driver_uuid = self._core.info
+        self.info = AdapterInfo(*fields)
+        self._saved_pipelines = 0
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._core.closed
+
+    def close(self) -> None:
+        """Give back all that the renderer holds of the device; may be called twice.
+
+        Raises
+        ------
+        ValidationError
+            With validation on: something was left behind.
+        """
+        self._core.close()
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<vkbloom.Renderer on {self.info.summary}{', closed' if self.closed else ''}>"
+
+    def render(
+        self,
+        scene: Scene,
+        settings: Settings | None = None,
+        size: tuple[int, int] = (1280, 720),
+        *,
+        shading: Shading = "forward",
+        time: float = 0.0,
+        attachments: Literal["all"] | str | Sequence[str] = "all",
+        out: Mapping[str, NDArray[Any]] | None = None,
+    ) -> Frames:
+        """Render a scene with its bloom.
+
+        Parameters
+        ----------
+        scene : Scene
+        settings : Settings, optional
+            By default ``Separable()``, the forward system's.
+        size : (int, int)
+            Width and height of the frame in pixels.
+        shading : {"forward"}
+            Forward: the glow mesh is drawn into buffers of its own, blurred and added to the
+            Phong-lit scene.
+        time : float
+            Of the animation, in turns: 0 and 1 are the same place. Any finite number.
+        attachments : "all" or sequence of str
+            Names of the framebuffers wanted. What is not wanted is neither rendered for its own
+            sake nor read back.
+        out : mapping of str to ndarray, optional
+            Arrays to fill in place, by name; what it lacks is allocated.
+
+        Returns
+        -------
+        Frames
+            ``glow`` (bloom buffer size, (H, W, 4)), ``glow_depth`` ((H, W) float32),
+            ``blur_vertical``, ``bloom`` (at the frame's size), ``scene`` ((H, W, 4) uint8),
+            ``depth`` ((H, W) float32) and ``final`` ((H, W, 4) uint8). With ``direct=True`` there
+            is no ``blur_vertical``; with ``bloom=False`` there are ``scene``, ``depth`` and
+            ``final`` only.
+
+        Raises
+        ------
+        ValueError
+            An argument is out of range, an array of `out` does not fit, or the renderer is closed.
+        TypeError
+            An argument has the wrong type.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed. After any but a lost device the renderer can be used again.
+
+        Notes
+        -----
+        A pass runs only when what it reads, its settings or its size changed since it last ran;
+        ``timings`` of the result names the passes that ran.
+        """
+        settings = _check_settings(settings)
+        if shading != "forward":
+            raise ValueError(f"shading: {shading!r} is not one of forward")
+        if not math.isfinite(time):
+            raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+        from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+        if not isinstance(scene, Scene):
+            raise TypeError(f"scene: a Scene is needed, not {scene!r}")
+        camera = scene.camera
+        arrays, timings = self._core.render(
+            settings,
+            _scene_arrays(scene),
+            (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
+            check_size("size", size),
+            # Whole turns change nothing; without them large times keep their precision.
+            math.fmod(time, 1.0),
+            _check_attachments(attachments),
+            _allocator(out),
+        )
+        return self._frames(arrays, timings, settings)
+
+    def _frames(
+        self, arrays: dict[str, NDArray[Any]], timings: dict[str, float], settings: Settings
+    ) -> Frames:
+        self._save_pipelines()
+        info = {
+            "adapter": self.info.name,
+            "driver": self.info.driver_info or self.info.driver,
+            "version": _version(),
+            "nan": 0,
+            "inf": 0,
+        }
+        return Frames(arrays, timings=timings, settings=settings, info=info)
+
+    def _save_pipelines(self) -> None:
+        """Keep the driver's pipeline cache on disk when new pipelines came into it."""
+        count = self._core.pipeline_count
+        if count != self._saved_pipelines:
+            self._saved_pipelines = count
+            pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
+
+
+def _scene_arrays(scene: Scene) -> Any:
+    """Return the scene as the core takes it."""
+    glow = scene.glow
+    return (
+        scene.serial,
+        scene.body.vertices,
+        scene.body.indices,
+        None if glow is None else glow.vertices,
+        None if glow is None else glow.indices,
+        () if scene.skybox is None else scene.skybox.levels,
+    )

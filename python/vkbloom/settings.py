@@ -1,0 +1,261 @@
+"""The settings of a bloom: frozen dataclasses whose numbers and names the C core declares.
+
+Defaults and ranges come from ``shaders/params.h`` by way of the core's tables, so that a number is
+written down once for the shaders, the core and Python.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable
+from typing import Any, ClassVar, Literal
+
+from vkbloom import _core
+
+Composite = Literal["add", "mix", "screen"]
+ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
+Encoding = Literal["none", "gamma22", "srgb"]
+Texel = Literal["own", "x"]
+BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float"]
+
+BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
+
+#: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
+TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
+
+
+def _number(name: str, default: float | None = None) -> Any:
+    """Declare a field that is a number in the core's table, which gives its default and range."""
+    initial, _, _ = _core.VALUES[name]
+    return dataclasses.field(default=initial if default is None else default)
+
+
+def _flag(name: str) -> Any:
+    """Declare a field that is 0 or 1 in the core's table and a bool in Python."""
+    return dataclasses.field(default=bool(_core.VALUES[name][0]))
+
+
+def _choice(name: str) -> Any:
+    """Declare a field that is one of the core's names; the first is the default."""
+    return dataclasses.field(default=_core.CHOICES[name][0])
+
+
+def check_number(name: str, value: float, low: float, high: float) -> None:
+    """Raise ValueError, naming the field and its range, unless ``low <= value <= high``."""
+    if isinstance(value, str) or not hasattr(value, "__float__"):
+        raise TypeError(f"{name}: a number is needed, not {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{name}: {value!r} is out of range, {low:g} to {high:g}")
+
+
+def _finite_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(value) for value in values)
+    except TypeError:
+        raise TypeError(f"{name}: a sequence of numbers is needed, not {values!r}") from None
+    for number in numbers:
+        if not math.isfinite(number):
+            raise ValueError(f"{name}: {number!r} is not finite")
+    return numbers
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What all methods share; use one of the methods, such as `Separable`.
+
+    Parameters
+    ----------
+    bloom : bool
+        Off: the bloom's passes are left out, ``final`` is the tone-mapped scene.
+    threshold : float or None
+        Brightness from which a colour goes into the bloom, 0 to 65504; None: no extraction. Of a
+        scene, the threshold is applied to the glow.
+    knee : float
+        Softness of the threshold, 0 to 1. 0: colours whose luminance is above the threshold. Else,
+        with b = max(r, g, b), k = threshold * knee and
+        q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
+        max(q, b - threshold) / max(b, 1e-5).
+    composite : {"add", "mix", "screen"}
+        s + i b; s + (b - s) i; 1 - (1 - s)(1 - i b) with both clamped to 0..1.
+    intensity : float
+        The i of the composite, 0 to 65504.
+    tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
+        The curve that the composite passes.
+    exposure : float
+        In stops, -32 to 32: the composite is multiplied by 2**exposure before the curve.
+    encoding : {"none", "gamma22", "srgb"}
+        Applied to rgb after the curve.
+    bloom_size : (int, int) or None
+        Width and height of the bloom buffers in pixels.
+    bloom_scale : float
+        The same as a fraction of the frame, 0.001 to 4, where `bloom_size` is None; sides are
+        floored, never under 1. A forward scene with neither (a scale of 1) has 256 x 256.
+    format : {"rgba8unorm", "rgba16float", "rgba32float"} or None
+        Of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images, the image's
+        own for float images.
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range; names the field, the value and the range.
+    TypeError
+        A field has the wrong type.
+    """
+
+    method: ClassVar[str]
+
+    bloom: bool = _flag("bloom")
+    threshold: float | None = None
+    knee: float = _number("knee")
+    composite: Composite = _choice("composite")
+    intensity: float = _number("intensity")
+    tonemap: ToneMap = _choice("tonemap")
+    exposure: float = _number("exposure")
+    encoding: Encoding = _choice("encoding")
+    bloom_size: tuple[int, int] | None = None
+    bloom_scale: float = _number("bloom_scale")
+    format: BloomFormat | None = None
+
+    def __post_init__(self) -> None:
+        if type(self) is Settings:
+            raise TypeError("Settings is abstract; use a method, such as Separable")
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if field.name in _core.VALUES and not (value is None and field.default is None):
+                self._check_value(field, value)
+            elif field.name in _core.CHOICES and value not in _core.CHOICES[field.name]:
+                names = ", ".join(_core.CHOICES[field.name])
+                raise ValueError(f"{field.name}: {value!r} is not one of {names}")
+        if self.format is not None and self.format not in BLOOM_FORMATS:
+            raise ValueError(f"format: {self.format!r} is not one of {', '.join(BLOOM_FORMATS)}")
+        if self.bloom_size is not None:
+            object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
+
+    def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
+        """Check a number and store it as what it is: NumPy's scalars hash and print otherwise."""
+        _, low, high = _core.VALUES[field.name]
+        check_number(field.name, value, low, high)
+        kind = type(field.default) if field.default is not None else float
+        if kind is not float and value != int(value):
+            raise ValueError(f"{field.name}: {value!r} is not a whole number")
+        object.__setattr__(self, field.name, kind(value))
+
+    def replace(self, **changes: Any) -> Settings:
+        """Return the same settings with some fields changed, as `dataclasses.replace`."""
+        return dataclasses.replace(self, **changes)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields by name, and ``method``; plain values that JSON can hold."""
+        return {"method": self.method, **dataclasses.asdict(self)}
+
+
+def check_size(name: str, size: Any) -> tuple[int, int]:
+    """Return (width, height) as two ints of at least 1, else raise TypeError or ValueError."""
+    try:
+        width, height = size
+        whole = (int(width), int(height))
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: (width, height) is needed, not {size!r}") from None
+    if whole != (width, height) or min(whole) < 1 or max(whole) >= 2**31:
+        raise ValueError(f"{name}: {size!r} is out of range, whole numbers from 1 on")
+    return whole
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Separable(Settings):
+    """A blur by a symmetric kernel, vertical then horizontal: the forward and deferred systems'.
+
+    One pass computes w0 c(0) + strength * sum of w_i (c(+i) + c(-i)) over i = 1..n, its taps
+    ``blur_scale`` texels of the bloom buffer apart, bilinear and clamped to the edge. All passes
+    but the last run at the size of the bloom buffers, the last at every pixel of ``final``.
+
+    Parameters
+    ----------
+    blur_scale : float
+        Distance of the taps in texels, 0 to 16.
+    blur_strength : float
+        Factor of all taps but the centre, 0 to 16.
+    weights : sequence of float
+        Half-kernel w0..wn, 1 to 65 of them.
+    loops : int
+        Vertical and horizontal passes one after the other, 1 to 16 times.
+    layers : sequence of (float, float)
+        (scale, strength), 1 to 8 of them: each is a whole blur at blur_scale * scale, added with
+        its strength.
+    first_tap : {1, 0}
+        0: the loop starts at the centre, which so gets w0 (1 + 2 strength).
+    texel : {"own", "x"}
+        "x": the vertical step is 1 / width of the texture's height, as the horizontal one.
+    direct : bool
+        The same kernel as one N x N pass instead of two of N.
+    **settings
+        The fields of `Settings`.
+
+    Notes
+    -----
+    Source: the forward system and the outline system, `first_tap` and `texel` being the switches
+    between them.
+    """
+
+    method: ClassVar[str] = "separable"
+
+    blur_scale: float = _number("blur_scale")
+    blur_strength: float = _number("blur_strength")
+    weights: tuple[float, ...] = TUTORIAL
+    loops: int = _number("loops")
+    layers: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
+    first_tap: int = _number("first_tap")
+    texel: Texel = _choice("texel")
+    direct: bool = _flag("direct")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "weights", _finite_floats("weights", self.weights))
+        if not 1 <= len(self.weights) <= _core.MAX_WEIGHTS:
+            raise ValueError(
+                f"weights: {len(self.weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
+            )
+        layers = tuple(_finite_floats("layers", layer) for layer in self.layers)
+        if not 1 <= len(layers) <= _core.MAX_LAYERS:
+            raise ValueError(
+                f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}"
+            )
+        if any(len(layer) != 2 for layer in layers):
+            raise ValueError(f"layers: {self.layers!r} must hold (scale, strength) pairs")
+        if any(not 0 <= scale <= 16 for scale, _ in layers):
+            raise ValueError(f"layers: {self.layers!r} has a scale out of range, 0 to 16")
+        object.__setattr__(self, "layers", layers)
+
+
+def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
+    """Make a normalized Gaussian half-kernel.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation in taps, above 0.
+    radius : int, optional
+        Taps to each side, 0 to 64; by default ceil(3 sigma), at most 64.
+
+    Returns
+    -------
+    tuple of float
+        w0..w_radius with w_i proportional to exp(-i^2 / (2 sigma^2)) and
+        w0 + 2 (w1 + ... + w_radius) = 1.
+
+    Raises
+    ------
+    ValueError
+        `sigma` or `radius` is out of range.
+    """
+    limit = _core.MAX_WEIGHTS - 1
+    if not (sigma > 0 and math.isfinite(sigma)):
+        raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
+    if radius is None:
+        radius = min(math.ceil(3 * sigma), limit)
+    if not 0 <= radius <= limit:
+        raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
+    weights = [math.exp(-0.5 * (tap / sigma) ** 2) for tap in range(radius + 1)]
+    total = weights[0] + 2 * sum(weights[1:])
+    return tuple(weight / total for weight in weights)

@@ -1,0 +1,67 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// A blur by a symmetric kernel, in one direction or, as one N x N pass, in both. The source may
+// have another size than the target: the step stays one texel of the source times the scale.
+#include "block.glsl"
+#include "sampling.glsl"
+
+UNIFORM_BLOCK(BLUR_BLOCK);
+
+layout(constant_id = 0) const int DIRECTION = DIRECTION_VERTICAL;
+layout(constant_id = 1) const int RADIUS = 4;
+layout(constant_id = 2) const int FIRST_TAP = 1;
+layout(constant_id = 3) const int TEXEL = TEXEL_OWN;
+layout(constant_id = 4) const int SAMPLING = SAMPLING_FILTER;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+layout(location = 0) out vec4 colour;
+
+float weight(int tap)
+{
+    return params.weights[tap >> 2][tap & 3];
+}
+
+// The kernel's value `tap` texels from its centre: the strength does not touch the centre,
+// unless the taps start at 0, which adds it twice more (the outline's loop).
+float coefficient(int tap)
+{
+    if (tap != 0)
+        return params.blur_strength * weight(tap);
+    return weight(0) * (FIRST_TAP == 0 ? 1.0 + 2.0 * params.blur_strength : 1.0);
+}
+
+vec3 tap_pair(vec2 position, vec2 offset)
+{
+    return sample_at(source, position + offset, SAMPLING).rgb
+         + sample_at(source, position - offset, SAMPLING).rgb;
+}
+
+vec3 blur_line(vec2 position, vec2 tap_step)
+{
+    vec3 sum = coefficient(0) * sample_at(source, position, SAMPLING).rgb;
+    for (int tap = 1; tap <= RADIUS; ++tap)
+        sum += coefficient(tap) * tap_pair(position, float(tap) * tap_step);
+    return sum;
+}
+
+void main()
+{
+    float scale = params.blur_scale * params.layer_scale;
+    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    vec2 across = vec2(scale, 0.0);
+    // In texels of the height, one texel of the width is height / width (`step_ratio`).
+    vec2 down = vec2(0.0, TEXEL == TEXEL_X ? scale * params.step_ratio : scale);
+    vec3 sum;
+    if (DIRECTION == DIRECTION_VERTICAL) {
+        sum = blur_line(position, down);
+    } else if (DIRECTION == DIRECTION_HORIZONTAL) {
+        sum = blur_line(position, across);
+    } else {
+        sum = coefficient(0) * blur_line(position, across);
+        for (int tap = 1; tap <= RADIUS; ++tap)
+            sum += coefficient(tap) * (blur_line(position + float(tap) * down, across)
+                                     + blur_line(position - float(tap) * down, across));
+    }
+    colour = vec4(params.layer_strength * sum, 1.0);
+}

@@ -1,0 +1,99 @@
+// Every parameter of the pipeline, declared once.
+//
+// GLSL expands a block's rows into a std140 uniform block (block.glsl), C expands the same rows
+// into the matching struct and into the table of names, defaults and ranges that Python builds
+// its settings from (csrc/params.c). A row names its block B and is one of
+//
+//   SETTING(B, name, default, min, max)   a float that the user sets, a field of the settings
+//   INPUT(B, type, name)                  a float or int that the core fills in for each pass
+//   VEC4S(B, name, count)                 an array of vec4 that the core fills in for each pass
+
+#define THRESHOLD_ROWS(B, SETTING) \
+    SETTING(B, threshold, 0.0, 0.0, 65504.0) \
+    SETTING(B, knee, 0.0, 0.0, 1.0)
+
+// The matrices of a mesh or skybox draw; the glow mesh's colours pass the threshold.
+#define MESH_BLOCK(B, SETTING, INPUT, VEC4S) \
+    VEC4S(B, projection, 4) \
+    VEC4S(B, view, 4) \
+    VEC4S(B, model, 4) \
+    THRESHOLD_ROWS(B, SETTING)
+
+// A blur pass. `ratio` is source texels a target pixel, `step_ratio` what one texel of the width
+// is in texels of the height; the half-kernel w0..w64 lies four to a vec4.
+#define BLUR_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SETTING(B, blur_scale, 1.0, 0.0, 16.0) \
+    SETTING(B, blur_strength, 1.5, 0.0, 16.0) \
+    INPUT(B, float, layer_scale) \
+    INPUT(B, float, layer_strength) \
+    INPUT(B, float, ratio_x) \
+    INPUT(B, float, ratio_y) \
+    INPUT(B, float, step_ratio) \
+    VEC4S(B, weights, 17)
+
+#define COMPOSITE_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SETTING(B, intensity, 1.0, 0.0, 65504.0) \
+    SETTING(B, exposure, 0.0, -32.0, 32.0)
+
+#define PARAMETER_BLOCKS(BLOCK) \
+    BLOCK(mesh, MESH_BLOCK) \
+    BLOCK(blur, BLUR_BLOCK) \
+    BLOCK(composite, COMPOSITE_BLOCK)
+
+// Settings that no shader reads, for they shape the graph.
+// Whole numbers: COUNT(name, default, min, max); a flag is one of 0 and 1.
+#define COUNT_ROWS(COUNT) \
+    COUNT(bloom, 1, 0, 1) \
+    COUNT(loops, 1, 1, 16) \
+    COUNT(first_tap, 1, 0, 1) \
+    COUNT(direct, 0, 0, 1)
+
+// Real numbers, in double so that sizes come out as they do in Python.
+#define REAL_ROWS(REAL) \
+    REAL(bloom_scale, 1.0, 0.001, 4.0)
+
+// The longest half-kernel (w0..w64) and the most layers of one blur.
+#define MAX_WEIGHTS 65
+#define MAX_LAYERS 8
+
+// Names that a setting can take; each list is a setting and a specialization constant.
+#define COMPOSITE_NAMES(NAME) \
+    NAME(COMPOSITE_ADD, 0, add) \
+    NAME(COMPOSITE_MIX, 1, mix) \
+    NAME(COMPOSITE_SCREEN, 2, screen)
+
+#define TONEMAP_NAMES(NAME) \
+    NAME(TONEMAP_NONE, 0, none) \
+    NAME(TONEMAP_REINHARD, 1, reinhard) \
+    NAME(TONEMAP_ACES, 2, aces) \
+    NAME(TONEMAP_EXPONENTIAL, 3, exponential) \
+    NAME(TONEMAP_KHRONOS_NEUTRAL, 4, khronos_neutral) \
+    NAME(TONEMAP_AGX, 5, agx)
+
+#define ENCODING_NAMES(NAME) \
+    NAME(ENCODING_NONE, 0, none) \
+    NAME(ENCODING_GAMMA22, 1, gamma22) \
+    NAME(ENCODING_SRGB, 2, srgb)
+
+#define TEXEL_NAMES(NAME) \
+    NAME(TEXEL_OWN, 0, own) \
+    NAME(TEXEL_X, 1, x)
+
+#define CHOICES(CHOICE) \
+    CHOICE(composite, COMPOSITE_NAMES) \
+    CHOICE(tonemap, TONEMAP_NAMES) \
+    CHOICE(encoding, ENCODING_NAMES) \
+    CHOICE(texel, TEXEL_NAMES)
+
+// Modes that the core chooses, named in both languages.
+#define MODE_NAMES(NAME) \
+    NAME(COMPOSITE_OFF, -1, off) \
+    NAME(THRESHOLD_NONE, 0, none) \
+    NAME(THRESHOLD_HARD, 1, hard) \
+    NAME(THRESHOLD_KNEE, 2, knee) \
+    NAME(DIRECTION_VERTICAL, 0, vertical) \
+    NAME(DIRECTION_HORIZONTAL, 1, horizontal) \
+    NAME(DIRECTION_BOTH, 2, both) \
+    NAME(SAMPLING_WHOLE, 0, whole) \
+    NAME(SAMPLING_FILTER, 1, filter) \
+    NAME(SAMPLING_FETCH, 2, fetch)

@@ -1,0 +1,26 @@
+// What of a colour goes into the bloom, by brightness.
+
+// Hard: the colour where its Rec. 709 luminance is above the threshold, else black.
+vec3 threshold_hard(vec3 colour, float threshold)
+{
+    return dot(colour, vec3(0.2126, 0.7152, 0.0722)) > threshold ? colour : vec3(0.0);
+}
+
+// Soft: a quadratic knee of half-width threshold * knee around the threshold (api: `knee`).
+vec3 threshold_knee(vec3 colour, float threshold, float knee)
+{
+    float brightness = max(colour.r, max(colour.g, colour.b));
+    float width = threshold * knee;
+    float soft = clamp(brightness - threshold + width, 0.0, 2.0 * width);
+    soft = soft * soft / (4.0 * width + 1e-5);
+    return colour * (max(soft, brightness - threshold) / max(brightness, 1e-5));
+}
+
+vec3 apply_threshold(vec3 colour, int mode, float threshold, float knee)
+{
+    if (mode == THRESHOLD_HARD)
+        return threshold_hard(colour, threshold);
+    if (mode == THRESHOLD_KNEE)
+        return threshold_knee(colour, threshold, knee);
+    return colour;
+}

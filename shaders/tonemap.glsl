@@ -1,0 +1,94 @@
+// Tone maps and encodings of linear colours.
+
+// Reinhard et al. 2002, per channel.
+vec3 tonemap_reinhard(vec3 c)
+{
+    return c / (c + 1.0);
+}
+
+// The fit to the ACES reference curve by Narkowicz, 2015.
+vec3 tonemap_aces(vec3 c)
+{
+    return clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0);
+}
+
+vec3 tonemap_exponential(vec3 c)
+{
+    return 1.0 - exp(-c);
+}
+
+// Khronos PBR Neutral tone mapper, specification 1.0.
+vec3 tonemap_khronos_neutral(vec3 c)
+{
+    const float F90 = 0.04;
+    const float COMPRESSION_START = 0.8 - F90;
+    const float DESATURATION = 0.15;
+    float low = min(c.r, min(c.g, c.b));
+    float offset = low < 2.0 * F90 ? low - low * low / (4.0 * F90) : F90;
+    c -= offset;
+    float peak = max(c.r, max(c.g, c.b));
+    if (peak < COMPRESSION_START)
+        return c;
+    float room = 1.0 - COMPRESSION_START;
+    float compressed = 1.0 - room * room / (peak + room - COMPRESSION_START);
+    c *= compressed / peak;
+    float white = 1.0 - 1.0 / (DESATURATION * (peak - compressed) + 1.0);
+    return mix(c, vec3(compressed), white);
+}
+
+// AgX (Sobotka), as three.js publishes it (r160, tonemapping_pars_fragment): Rec. 2020 inset,
+// log2 range, sixth-order sigmoid fit, outset; the result is linear.
+vec3 tonemap_agx(vec3 c)
+{
+    const mat3 REC709_TO_REC2020 = mat3(0.6274, 0.0691, 0.0164,
+                                        0.3293, 0.9195, 0.0880,
+                                        0.0433, 0.0113, 0.8956);
+    const mat3 REC2020_TO_REC709 = mat3(1.6605, -0.1246, -0.0182,
+                                        -0.5876, 1.1329, -0.1006,
+                                        -0.0728, -0.0083, 1.1187);
+    const mat3 INSET = mat3(0.856627153315983, 0.137318972929847, 0.11189821299995,
+                            0.0951212405381588, 0.761241990602591, 0.0767994186031903,
+                            0.0482516061458583, 0.101439036467562, 0.811302368396859);
+    const mat3 OUTSET = mat3(1.1271005818144368, -0.1413297634984383, -0.14132976349843826,
+                             -0.11060664309660323, 1.157823702216272, -0.11060664309660294,
+                             -0.016493938717834573, -0.016493938717834257, 1.2519364065950405);
+    const float LOW = -12.47393;
+    const float HIGH = 4.026069;
+    vec3 x = max(INSET * (REC709_TO_REC2020 * c), 1e-10);
+    x = clamp((log2(x) - LOW) / (HIGH - LOW), 0.0, 1.0);
+    vec3 x2 = x * x;
+    vec3 x4 = x2 * x2;
+    x = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x
+      - 0.00232;
+    x = OUTSET * x;
+    x = pow(max(x, 0.0), vec3(2.2));
+    return clamp(REC2020_TO_REC709 * x, 0.0, 1.0);
+}
+
+vec3 apply_tonemap(vec3 c, int tonemap)
+{
+    if (tonemap == TONEMAP_REINHARD)
+        return tonemap_reinhard(c);
+    if (tonemap == TONEMAP_ACES)
+        return tonemap_aces(c);
+    if (tonemap == TONEMAP_EXPONENTIAL)
+        return tonemap_exponential(c);
+    if (tonemap == TONEMAP_KHRONOS_NEUTRAL)
+        return tonemap_khronos_neutral(c);
+    if (tonemap == TONEMAP_AGX)
+        return tonemap_agx(c);
+    return c;
+}
+
+vec3 apply_encoding(vec3 c, int encoding)
+{
+    if (encoding == ENCODING_GAMMA22)
+        return pow(max(c, 0.0), vec3(1.0 / 2.2));
+    if (encoding == ENCODING_SRGB) {
+        c = max(c, 0.0);
+        // IEC 61966-2-1.
+        return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055,
+                   greaterThan(c, vec3(0.0031308)));
+    }
+    return c;
+}
