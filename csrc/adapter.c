@@ -101,9 +101,10 @@ bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct 
     if (!open_loader(error))
         return false;
     if (vkEnumerateInstanceVersion == NULL)
-        return vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
-                        "no Vulkan adapter: the Vulkan loader knows only Vulkan 1.0, 1.1 is needed. %s",
-                        INSTALL_HINT);
+        return vkb_fail(
+            error, VKB_ERROR_ADAPTER_NOT_FOUND,
+            "no Vulkan adapter: the Vulkan loader knows only Vulkan 1.0, 1.1 is needed. %s",
+            INSTALL_HINT);
     if (validation && !validation_available())
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "validation was asked for, but %s is not installed. "
@@ -320,8 +321,7 @@ bool vkb_adapter_choose(const struct vkb_instance *instance, const char *choice,
     size_t length = 0;
     for (uint32_t i = 0; i < count && length < sizeof found; ++i)
         length += (size_t)snprintf(found + length, sizeof found - length, "%s%s (%s)",
-                                   i ? ", " : "", adapters[i].name,
-                                   vkb_adapter_type(&adapters[i]));
+                                   i ? ", " : "", adapters[i].name, vkb_adapter_type(&adapters[i]));
     return vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
                     "no Vulkan adapter for \"%s\"; found: %s. %s", choice, found, INSTALL_HINT);
 }

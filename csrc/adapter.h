@@ -10,7 +10,7 @@ struct vkb_instance {
     VkInstance handle;
     bool validation;
     VkDebugUtilsMessengerEXT messenger;
-    unsigned message_count;      // validation messages since the last vkb_instance_check
+    unsigned message_count;  // validation messages since the last vkb_instance_check
     char first_message[1024];
 };
 

@@ -312,8 +312,7 @@ bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene)
         return false;
     scene->data.serial = serial;
     return read_mesh(scene, body_vertices, body_indices, &scene->data.body)
-        && read_mesh(scene, glow_vertices, glow_indices, &scene->data.glow)
-        && read_sky(scene, sky);
+        && read_mesh(scene, glow_vertices, glow_indices, &scene->data.glow) && read_sky(scene, sky);
 }
 
 void vkb_release_scene(struct vkb_held_scene *scene)

@@ -65,8 +65,7 @@ VkImageLayout vkb_access_layout(enum vkb_access access)
 }
 
 void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,
-                        const VkImageMemoryBarrier *image, enum vkb_access from,
-                        enum vkb_access to)
+                        const VkImageMemoryBarrier *image, enum vkb_access from, enum vkb_access to)
 {
     const struct access_info *before = &accesses[from], *after = &accesses[to];
     VkImageMemoryBarrier barrier = *image;

@@ -10,7 +10,7 @@ enum vkb_access {
     VKB_ACCESS_COLOR_TARGET,  // written as a colour attachment
     VKB_ACCESS_COLOR_BLEND,   // the same, reading what is there
     VKB_ACCESS_DEPTH_TARGET,
-    VKB_ACCESS_SAMPLED,       // read by a fragment shader
+    VKB_ACCESS_SAMPLED,  // read by a fragment shader
     VKB_ACCESS_COPY_SOURCE,
     VKB_ACCESS_COPY_TARGET,
     VKB_ACCESS_COUNT,
@@ -38,7 +38,8 @@ struct vkb_target_use {
 
 enum { VKB_MAX_DEPENDENCIES = 10 };  // two for each of up to five targets
 
-// The subpass dependencies of a render pass with those targets, equal ones merged; returns how many.
+// The subpass dependencies of a render pass with those targets, equal ones merged; returns how
+// many.
 uint32_t vkb_subpass_dependencies(const struct vkb_target_use *uses, uint32_t use_count,
                                   VkSubpassDependency *dependencies);
 

@@ -6,28 +6,28 @@ bool vkb_commands_create(const struct vkb_device *device, struct vkb_commands *c
     const struct VolkDeviceTable *vk = &device->vk;
 
     *commands = (struct vkb_commands){0};
-    bool done = VK(error, vk->vkCreateCommandPool(
-                              device->handle,
-                              &(VkCommandPoolCreateInfo){
-                                  .sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
-                                  .flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT,
-                                  .queueFamilyIndex = device->adapter.queue_family,
-                              },
-                              NULL, &commands->pool))
-             && VK(error, vk->vkAllocateCommandBuffers(
-                              device->handle,
-                              &(VkCommandBufferAllocateInfo){
-                                  .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
-                                  .commandPool = commands->pool,
-                                  .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
-                                  .commandBufferCount = 1,
-                              },
-                              &commands->buffer))
-             && VK(error, vk->vkCreateFence(device->handle,
-                                            &(VkFenceCreateInfo){
-                                                .sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO,
-                                            },
-                                            NULL, &commands->fence));
+    bool done =
+        VK(error, vk->vkCreateCommandPool(device->handle,
+                                          &(VkCommandPoolCreateInfo){
+                                              .sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                              .flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT,
+                                              .queueFamilyIndex = device->adapter.queue_family,
+                                          },
+                                          NULL, &commands->pool))
+        && VK(error, vk->vkAllocateCommandBuffers(
+                         device->handle,
+                         &(VkCommandBufferAllocateInfo){
+                             .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+                             .commandPool = commands->pool,
+                             .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
+                             .commandBufferCount = 1,
+                         },
+                         &commands->buffer))
+        && VK(error, vk->vkCreateFence(device->handle,
+                                       &(VkFenceCreateInfo){
+                                           .sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO,
+                                       },
+                                       NULL, &commands->fence));
     if (!done)
         vkb_commands_destroy(device, commands);
     return done;
@@ -47,11 +47,10 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
 
     return VK(error, vk->vkResetCommandPool(device->handle, commands->pool, 0))
         && VK(error, vk->vkBeginCommandBuffer(
-                         commands->buffer,
-                         &(VkCommandBufferBeginInfo){
-                             .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
-                             .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT,
-                         }));
+                         commands->buffer, &(VkCommandBufferBeginInfo){
+                                               .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
+                                               .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT,
+                                           }));
 }
 
 bool vkb_commands_run(struct vkb_device *device, struct vkb_commands *commands,

@@ -33,12 +33,11 @@ static PyObject *describe_pass(const struct vkb_graph *graph, uint32_t index, in
 // flags); an external subpass is -1.
 static PyObject *describe_dependency(const VkSubpassDependency *dependency)
 {
-    return Py_BuildValue("(iikkkkk)", (int)dependency->srcSubpass, (int)dependency->dstSubpass,
-                         (unsigned long)dependency->srcStageMask,
-                         (unsigned long)dependency->dstStageMask,
-                         (unsigned long)dependency->srcAccessMask,
-                         (unsigned long)dependency->dstAccessMask,
-                         (unsigned long)dependency->dependencyFlags);
+    return Py_BuildValue(
+        "(iikkkkk)", (int)dependency->srcSubpass, (int)dependency->dstSubpass,
+        (unsigned long)dependency->srcStageMask, (unsigned long)dependency->dstStageMask,
+        (unsigned long)dependency->srcAccessMask, (unsigned long)dependency->dstAccessMask,
+        (unsigned long)dependency->dependencyFlags);
 }
 
 static PyObject *describe_render_pass(const struct vkb_graph *graph, uint32_t first, uint32_t end)

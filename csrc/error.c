@@ -80,8 +80,7 @@ bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text)
         --start;
     length -= (int)(start - call_text);
 
-    vkb_fail(error, result_kind(result), "%.*s failed with %s", length, start,
-             result_name(result));
+    vkb_fail(error, result_kind(result), "%.*s failed with %s", length, start, result_name(result));
     error->result = result;
     snprintf(error->call, sizeof error->call, "%.*s", length, start);
     return false;

@@ -36,7 +36,8 @@ bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text);
 // The only way in which the core calls a Vulkan function that can fail.
 #define VK(error, call) vkb_check((error), (call), #call)
 
-// Zeroed host memory for count objects of `size` bytes; NULL and a filled error where there is none.
+// Zeroed host memory for count objects of `size` bytes; NULL and a filled error where there is
+// none.
 void *vkb_alloc(struct vkb_error *error, size_t count, size_t size);
 // Grows an array to at least `needed` objects of `size` bytes; keeps it as it was on failure.
 bool vkb_grow(struct vkb_error *error, void **array, size_t *capacity, size_t needed, size_t size);

@@ -15,8 +15,8 @@ enum vkb_format {
 };
 
 struct vkb_format_info {
-    const char *name;       // "rgba8unorm"
-    const char *dtype;      // "uint8"
+    const char *name;   // "rgba8unorm"
+    const char *dtype;  // "uint8"
     VkFormat vk;
     uint32_t channels;
     uint32_t channel_size;  // bytes

@@ -7,9 +7,9 @@ struct run {
     struct vkb_device *device;
     struct vkb_frame *frame;
     const struct vkb_graph *graph;
-    struct vkb_slot **slots;   // by the graph's image index
-    bool *needed;              // by pass
-    uint32_t *ran;             // the first pass of each render pass that was recorded
+    struct vkb_slot **slots;  // by the graph's image index
+    bool *needed;             // by pass
+    uint32_t *ran;            // the first pass of each render pass that was recorded
     uint32_t ran_count;
     VkDeviceSize uniform_used;
     unsigned char *recipe;
@@ -153,8 +153,8 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
         };
     for (uint32_t i = 0; i < image_count; ++i) {
         const struct vkb_image *image = pass->geometry == VKB_GEOMETRY_SKYBOX
-                                            ? &run->frame->scene.sky
-                                            : &run->slots[pass->reads[i]]->image;
+                                          ? &run->frame->scene.sky
+                                          : &run->slots[pass->reads[i]]->image;
         images[i] = (VkDescriptorImageInfo){
             .sampler = pipelines->sampler,
             .imageView = image->view,
@@ -227,7 +227,8 @@ static bool record_pass(struct run *run, uint32_t index, VkRenderPass render_pas
     return true;
 }
 
-// What the passes read, and the targets in the state that the render pass's dependencies go on from.
+// What the passes read, and the targets in the state that the render pass's dependencies go on
+// from.
 static void transition_images(struct run *run, uint32_t first, uint32_t end)
 {
     VkCommandBuffer commands = run->frame->commands.buffer;
@@ -348,20 +349,20 @@ static bool reserve_descriptors(struct run *run, struct vkb_error *error)
     vk->vkDestroyDescriptorPool(run->device->handle, frame->descriptors, NULL);
     frame->descriptors = VK_NULL_HANDLE;
     frame->descriptor_capacity = 0;
-    if (!VK(error, vk->vkCreateDescriptorPool(
-                       run->device->handle,
-                       &(VkDescriptorPoolCreateInfo){
-                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
-                           .maxSets = passes,
-                           .poolSizeCount = 2,
-                           .pPoolSizes =
-                               (VkDescriptorPoolSize[]){
-                                   {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, passes},
-                                   {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                                    passes * VKB_MAX_READS},
-                               },
-                       },
-                       NULL, &frame->descriptors)))
+    if (!VK(error,
+            vk->vkCreateDescriptorPool(
+                run->device->handle,
+                &(VkDescriptorPoolCreateInfo){
+                    .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
+                    .maxSets = passes,
+                    .poolSizeCount = 2,
+                    .pPoolSizes =
+                        (VkDescriptorPoolSize[]){
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, passes},
+                            {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, passes * VKB_MAX_READS},
+                        },
+                },
+                NULL, &frame->descriptors)))
         return false;
     frame->descriptor_capacity = passes;
     return true;
@@ -378,7 +379,8 @@ static bool reserve(struct run *run, const struct vkb_output *outputs, uint32_t 
         const struct vkb_image_row *row = &run->graph->images[outputs[i].image];
         readback += vkb_readback_size(row->format, row->width, row->height);
     }
-    return reserve_descriptors(run, error) && vkb_timer_reserve(run->device, run->graph->pass_count, &run->frame->timer, error)
+    return reserve_descriptors(run, error)
+        && vkb_timer_reserve(run->device, run->graph->pass_count, &run->frame->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
                               params * run->graph->pass_count, &run->frame->uniforms, error)
         && vkb_readback_begin(run->device, &run->frame->readback, readback, error);
@@ -406,8 +408,8 @@ static bool read_timings(const struct run *run, struct vkb_timing *timings, stru
     return true;
 }
 
-static bool record_and_run(struct run *run, const struct vkb_output *outputs,
-                           uint32_t output_count, VkDeviceSize *offsets, struct vkb_error *error)
+static bool record_and_run(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
+                           VkDeviceSize *offsets, struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
     struct vkb_frame *frame = run->frame;
@@ -448,8 +450,8 @@ static bool run_frame(struct run *run, const struct vkb_scene_data *scene,
         || !read_timings(run, timings, error))
         return false;
     for (uint32_t i = 0; i < output_count; ++i)
-        vkb_readback_fetch(&frame->readback, offsets[i],
-                           &run->slots[outputs[i].image]->image, &outputs[i]);
+        vkb_readback_fetch(&frame->readback, offsets[i], &run->slots[outputs[i].image]->image,
+                           &outputs[i]);
     end_writing(run);
     return true;
 }

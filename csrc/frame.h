@@ -35,8 +35,9 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame);
 
 // Runs what the outputs need of the graph and is out of date, then fills the outputs. `timings` has
-// room for every pass of the graph and gets the render passes that ran. `scene` is what the graph draws, NULL
-// for one that draws no scene. A failed run leaves the frame usable, unless the device is lost.
+// room for every pass of the graph and gets the render passes that ran. `scene` is what the graph
+// draws, NULL for one that draws no scene. A failed run leaves the frame usable, unless the device
+// is lost.
 bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
                    const struct vkb_scene_data *scene, const struct vkb_graph *graph,
                    const struct vkb_output *outputs, uint32_t output_count,

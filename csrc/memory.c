@@ -40,13 +40,14 @@ static bool allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
     if (type == UINT32_MAX)
         return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter has no memory type that fits");
     *flags = device->memory.memoryTypes[type].propertyFlags;
-    return VK(error, device->vk.vkAllocateMemory(device->handle,
-                                                 &(VkMemoryAllocateInfo){
-                                                     .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
-                                                     .allocationSize = requirements->size,
-                                                     .memoryTypeIndex = type,
-                                                 },
-                                                 NULL, memory));
+    return VK(error,
+              device->vk.vkAllocateMemory(device->handle,
+                                          &(VkMemoryAllocateInfo){
+                                              .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                              .allocationSize = requirements->size,
+                                              .memoryTypeIndex = type,
+                                          },
+                                          NULL, memory));
 }
 
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
@@ -126,23 +127,21 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 static bool create_handle(const struct vkb_device *device, const struct vkb_image_spec *spec,
                           struct vkb_image *image, struct vkb_error *error)
 {
-    return VK(error,
-              device->vk.vkCreateImage(device->handle,
-                                       &(VkImageCreateInfo){
-                                           .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
-                                           .flags = spec->layers == 6
-                                                        ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT
-                                                        : 0,
-                                           .imageType = VK_IMAGE_TYPE_2D,
-                                           .format = vkb_formats[spec->format].vk,
-                                           .extent = {spec->width, spec->height, 1},
-                                           .mipLevels = spec->levels,
-                                           .arrayLayers = spec->layers,
-                                           .samples = VK_SAMPLE_COUNT_1_BIT,
-                                           .tiling = VK_IMAGE_TILING_OPTIMAL,
-                                           .usage = spec->usage,
-                                       },
-                                       NULL, &image->handle));
+    return VK(error, device->vk.vkCreateImage(
+                         device->handle,
+                         &(VkImageCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                             .flags = spec->layers == 6 ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
+                             .imageType = VK_IMAGE_TYPE_2D,
+                             .format = vkb_formats[spec->format].vk,
+                             .extent = {spec->width, spec->height, 1},
+                             .mipLevels = spec->levels,
+                             .arrayLayers = spec->layers,
+                             .samples = VK_SAMPLE_COUNT_1_BIT,
+                             .tiling = VK_IMAGE_TILING_OPTIMAL,
+                             .usage = spec->usage,
+                         },
+                         NULL, &image->handle));
 }
 
 static VkImageSubresourceRange whole_image(const struct vkb_image *image)

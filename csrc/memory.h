@@ -6,8 +6,8 @@
 #include "format.h"
 
 enum vkb_memory_kind {
-    VKB_MEMORY_DEVICE,  // fast for the device
-    VKB_MEMORY_UPLOAD,  // mapped; the host writes
+    VKB_MEMORY_DEVICE,    // fast for the device
+    VKB_MEMORY_UPLOAD,    // mapped; the host writes
     VKB_MEMORY_READBACK,  // mapped and cached; the host reads
 };
 

@@ -41,7 +41,8 @@ PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
 {
     return Py_BuildValue("(ssssNy#)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
                          adapter->driver_info,
-                         PyUnicode_FromFormat("%u.%u.%u", VK_API_VERSION_MAJOR(adapter->api_version),
+                         PyUnicode_FromFormat("%u.%u.%u",
+                                              VK_API_VERSION_MAJOR(adapter->api_version),
                                               VK_API_VERSION_MINOR(adapter->api_version),
                                               VK_API_VERSION_PATCH(adapter->api_version)),
                          (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE);
@@ -96,10 +97,10 @@ static PyObject *value_table(void)
 
     for (size_t i = 0; table && i < vkb_value_row_count; ++i) {
         const struct vkb_value_row *row = &vkb_value_rows[i];
-        PyObject *entry = row->type == VKB_VALUE_INT
-                              ? Py_BuildValue("(iii)", (int)row->initial, (int)row->low,
-                                              (int)row->high)
-                              : Py_BuildValue("(ddd)", row->initial, row->low, row->high);
+        PyObject *entry =
+            row->type == VKB_VALUE_INT
+                ? Py_BuildValue("(iii)", (int)row->initial, (int)row->low, (int)row->high)
+                : Py_BuildValue("(ddd)", row->initial, row->low, row->high);
         if (!entry || PyDict_SetItemString(table, row->name, entry) < 0)
             Py_CLEAR(table);
         Py_XDECREF(entry);
@@ -204,7 +205,8 @@ static int execute(PyObject *module)
     if (!state->renderer_type
         || PyModule_AddObjectRef(module, "Renderer", state->renderer_type) < 0)
         return -1;
-    return add_steal(module, "VALUES", value_table()) && add_steal(module, "CHOICES", choice_table())
+    return add_steal(module, "VALUES", value_table())
+                && add_steal(module, "CHOICES", choice_table())
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
              ? 0

@@ -10,8 +10,8 @@
 #define REAL_ROW(name, initial, low, high) \
     {#name, VKB_VALUE_DOUBLE, offsetof(struct vkb_values, name), initial, low, high},
 
-const struct vkb_value_row vkb_value_rows[] = {
-    PARAMETER_BLOCKS(BLOCK_ROWS) COUNT_ROWS(COUNT_ROW) REAL_ROWS(REAL_ROW)};
+const struct vkb_value_row vkb_value_rows[] = {PARAMETER_BLOCKS(BLOCK_ROWS) COUNT_ROWS(COUNT_ROW)
+                                                   REAL_ROWS(REAL_ROW)};
 const size_t vkb_value_row_count = sizeof vkb_value_rows / sizeof vkb_value_rows[0];
 
 #define SPELLING(name, value, spelling) [value] = #spelling,

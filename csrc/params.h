@@ -11,8 +11,8 @@
 #define VKB_VEC4 _Alignas(16) float
 
 #define VKB_MEMBER_SETTING(block, name, initial, low, high) float name;
-#define VKB_MEMBER_INPUT(block, type, name) type name;
-#define VKB_MEMBER_VEC4S(block, name, count) VKB_VEC4 name[count][4];
+#define VKB_MEMBER_INPUT(block, type, name)                 type name;
+#define VKB_MEMBER_VEC4S(block, name, count)                VKB_VEC4 name[count][4];
 #define VKB_BLOCK_STRUCT(block, ROWS) \
     struct vkb_##block##_params { \
         ROWS(block, VKB_MEMBER_SETTING, VKB_MEMBER_INPUT, VKB_MEMBER_VEC4S) \
@@ -72,7 +72,7 @@ enum vkb_choice {
 #define VKB_CHOICE_ENUM(choice, NAMES) VKB_CHOICE_##choice,
     CHOICES(VKB_CHOICE_ENUM)
 #undef VKB_CHOICE_ENUM
-    VKB_CHOICE_COUNT,
+        VKB_CHOICE_COUNT,
 };
 
 extern const struct vkb_choice_row vkb_choice_rows[VKB_CHOICE_COUNT];

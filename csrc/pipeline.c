@@ -37,19 +37,19 @@ struct vkb_pipeline_entry {
 static bool create_sampler(const struct vkb_device *device, VkSampler *sampler,
                            struct vkb_error *error)
 {
-    return VK(error, device->vk.vkCreateSampler(
-                         device->handle,
-                         &(VkSamplerCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
-                             .magFilter = VK_FILTER_LINEAR,
-                             .minFilter = VK_FILTER_LINEAR,
-                             .mipmapMode = VK_SAMPLER_MIPMAP_MODE_LINEAR,
-                             .addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                             .addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                             .addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                             .maxLod = VK_LOD_CLAMP_NONE,
-                         },
-                         NULL, sampler));
+    return VK(error,
+              device->vk.vkCreateSampler(device->handle,
+                                         &(VkSamplerCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
+                                             .magFilter = VK_FILTER_LINEAR,
+                                             .minFilter = VK_FILTER_LINEAR,
+                                             .mipmapMode = VK_SAMPLER_MIPMAP_MODE_LINEAR,
+                                             .addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .maxLod = VK_LOD_CLAMP_NONE,
+                                         },
+                                         NULL, sampler));
 }
 
 static bool create_layouts(const struct vkb_device *device, struct vkb_pipelines *pipelines,
@@ -80,14 +80,14 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_pipelines
                              .pBindings = bindings,
                          },
                          NULL, &pipelines->set_layouts[images]))
-        && VK(error, vk->vkCreatePipelineLayout(
-                         device->handle,
-                         &(VkPipelineLayoutCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
-                             .setLayoutCount = 1,
-                             .pSetLayouts = &pipelines->set_layouts[images],
-                         },
-                         NULL, &pipelines->layouts[images]));
+        && VK(error,
+              vk->vkCreatePipelineLayout(device->handle,
+                                         &(VkPipelineLayoutCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                             .setLayoutCount = 1,
+                                             .pSetLayouts = &pipelines->set_layouts[images],
+                                         },
+                                         NULL, &pipelines->layouts[images]));
 }
 
 bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_data,
@@ -178,9 +178,10 @@ static VkAttachmentDescription describe_attachment(enum vkb_format format, enum 
     return (VkAttachmentDescription){
         .format = vkb_formats[format].vk,
         .samples = VK_SAMPLE_COUNT_1_BIT,
-        .loadOp = load == VKB_LOAD_CLEAR ? VK_ATTACHMENT_LOAD_OP_CLEAR
-                                         : VK_ATTACHMENT_LOAD_OP_DONT_CARE,
-        // Depth is stored too, where the forward system's source drops it: it is a framebuffer here.
+        .loadOp =
+            load == VKB_LOAD_CLEAR ? VK_ATTACHMENT_LOAD_OP_CLEAR : VK_ATTACHMENT_LOAD_OP_DONT_CARE,
+        // Depth is stored too, where the forward system's source drops it: it is a framebuffer
+        // here.
         .storeOp = VK_ATTACHMENT_STORE_OP_STORE,
         .stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE,
         .stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE,
@@ -257,8 +258,7 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
                   pipelines->render_pass_count + 1, sizeof *pipelines->render_passes)
         || !create_render_pass(device, &key, render_pass, error))
         return false;
-    struct vkb_render_pass_entry *entry =
-        &pipelines->render_passes[pipelines->render_pass_count++];
+    struct vkb_render_pass_entry *entry = &pipelines->render_passes[pipelines->render_pass_count++];
     memcpy(&entry->key, &key, sizeof key);
     entry->handle = *render_pass;
     return true;
@@ -328,89 +328,88 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
         .dataSize = sizeof pass->constants,
         .pData = pass->constants,
     };
-    return VK(
-        error,
-        device->vk.vkCreateGraphicsPipelines(
-            device->handle, pipelines->cache, 1,
-            &(VkGraphicsPipelineCreateInfo){
-                .sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO,
-                .stageCount = 2,
-                .pStages =
-                    (VkPipelineShaderStageCreateInfo[]){
-                        {
-                            .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                            .stage = VK_SHADER_STAGE_VERTEX_BIT,
-                            .module = vertex,
-                            .pName = "main",
-                        },
-                        {
-                            .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                            .stage = VK_SHADER_STAGE_FRAGMENT_BIT,
-                            .module = fragment,
-                            .pName = "main",
-                            .pSpecializationInfo = &constants,
-                        },
-                    },
-                .pVertexInputState =
-                    &(VkPipelineVertexInputStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
-                        .vertexBindingDescriptionCount = state->vertices,
-                        .pVertexBindingDescriptions =
-                            &(VkVertexInputBindingDescription){
-                                .stride = sizeof(struct vkb_vertex),
-                            },
-                        .vertexAttributeDescriptionCount =
-                            state->vertices ? VKB_VERTEX_ATTRIBUTES : 0,
-                        .pVertexAttributeDescriptions = vkb_vertex_attributes,
-                    },
-                .pInputAssemblyState =
-                    &(VkPipelineInputAssemblyStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
-                        .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST,
-                    },
-                .pViewportState =
-                    &(VkPipelineViewportStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO,
-                        .viewportCount = 1,
-                        .scissorCount = 1,
-                    },
-                .pRasterizationState =
-                    &(VkPipelineRasterizationStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO,
-                        .polygonMode = VK_POLYGON_MODE_FILL,
-                        .cullMode = state->cull,
-                        .frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE,
-                        .lineWidth = 1.0f,
-                    },
-                .pMultisampleState =
-                    &(VkPipelineMultisampleStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
-                        .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT,
-                    },
-                .pDepthStencilState =
-                    &(VkPipelineDepthStencilStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
-                        .depthTestEnable = state->depth_test,
-                        .depthWriteEnable = state->depth_write,
-                        .depthCompareOp = VK_COMPARE_OP_LESS_OR_EQUAL,
-                    },
-                .pColorBlendState =
-                    &(VkPipelineColorBlendStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
-                        .attachmentCount = pass->target_count,
-                        .pAttachments = blends,
-                    },
-                .pDynamicState =
-                    &(VkPipelineDynamicStateCreateInfo){
-                        .sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO,
-                        .dynamicStateCount = 2,
-                        .pDynamicStates = (VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT,
-                                                             VK_DYNAMIC_STATE_SCISSOR},
-                    },
-                .layout = pipelines->layouts[vkb_pass_descriptor_images(pass)],
-                .renderPass = render_pass,
-            },
-            NULL, pipeline));
+    return VK(error,
+              device->vk.vkCreateGraphicsPipelines(
+                  device->handle, pipelines->cache, 1,
+                  &(VkGraphicsPipelineCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO,
+                      .stageCount = 2,
+                      .pStages =
+                          (VkPipelineShaderStageCreateInfo[]){
+                              {
+                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                                  .stage = VK_SHADER_STAGE_VERTEX_BIT,
+                                  .module = vertex,
+                                  .pName = "main",
+                              },
+                              {
+                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                                  .stage = VK_SHADER_STAGE_FRAGMENT_BIT,
+                                  .module = fragment,
+                                  .pName = "main",
+                                  .pSpecializationInfo = &constants,
+                              },
+                          },
+                      .pVertexInputState =
+                          &(VkPipelineVertexInputStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
+                              .vertexBindingDescriptionCount = state->vertices,
+                              .pVertexBindingDescriptions =
+                                  &(VkVertexInputBindingDescription){
+                                      .stride = sizeof(struct vkb_vertex),
+                                  },
+                              .vertexAttributeDescriptionCount =
+                                  state->vertices ? VKB_VERTEX_ATTRIBUTES : 0,
+                              .pVertexAttributeDescriptions = vkb_vertex_attributes,
+                          },
+                      .pInputAssemblyState =
+                          &(VkPipelineInputAssemblyStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
+                              .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST,
+                          },
+                      .pViewportState =
+                          &(VkPipelineViewportStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO,
+                              .viewportCount = 1,
+                              .scissorCount = 1,
+                          },
+                      .pRasterizationState =
+                          &(VkPipelineRasterizationStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO,
+                              .polygonMode = VK_POLYGON_MODE_FILL,
+                              .cullMode = state->cull,
+                              .frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE,
+                              .lineWidth = 1.0f,
+                          },
+                      .pMultisampleState =
+                          &(VkPipelineMultisampleStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
+                              .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT,
+                          },
+                      .pDepthStencilState =
+                          &(VkPipelineDepthStencilStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
+                              .depthTestEnable = state->depth_test,
+                              .depthWriteEnable = state->depth_write,
+                              .depthCompareOp = VK_COMPARE_OP_LESS_OR_EQUAL,
+                          },
+                      .pColorBlendState =
+                          &(VkPipelineColorBlendStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
+                              .attachmentCount = pass->target_count,
+                              .pAttachments = blends,
+                          },
+                      .pDynamicState =
+                          &(VkPipelineDynamicStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO,
+                              .dynamicStateCount = 2,
+                              .pDynamicStates = (VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT,
+                                                                   VK_DYNAMIC_STATE_SCISSOR},
+                          },
+                      .layout = pipelines->layouts[vkb_pass_descriptor_images(pass)],
+                      .renderPass = render_pass,
+                  },
+                  NULL, pipeline));
 }
 
 bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,

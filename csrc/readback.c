@@ -21,8 +21,8 @@ bool vkb_readback_begin(const struct vkb_device *device, struct vkb_readback *re
                         VkDeviceSize size, struct vkb_error *error)
 {
     readback->used = 0;
-    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, READBACK_USAGE, size,
-                              &readback->staging, error);
+    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, READBACK_USAGE, size, &readback->staging,
+                              error);
 }
 
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,

@@ -153,8 +153,8 @@ static bool add_output(const struct vkb_graph *graph, uint32_t image, uint32_t c
     const struct vkb_format_info *format = &vkb_formats[row->format];
     Py_buffer *view = &held->views[held->count];
     PyObject *shape = array_shape(row, channels);
-    PyObject *array = shape ? PyObject_CallFunction(allocate, "sOs", row->name, shape, format->dtype)
-                            : NULL;
+    PyObject *array =
+        shape ? PyObject_CallFunction(allocate, "sOs", row->name, shape, format->dtype) : NULL;
     bool done = array && PyDict_SetItemString(held->arrays, row->name, array) == 0
              && PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) == 0;
 
@@ -168,8 +168,7 @@ static bool add_output(const struct vkb_graph *graph, uint32_t image, uint32_t c
         .memory = view->buf,
     };
     ++held->count;
-    if ((size_t)view->len
-        == (size_t)row->width * row->height * channels * format->channel_size)
+    if ((size_t)view->len == (size_t)row->width * row->height * channels * format->channel_size)
         return true;
     PyErr_Format(PyExc_ValueError, "%s: the array has the wrong size", row->name);
     return false;

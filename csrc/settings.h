@@ -17,9 +17,9 @@ struct vkb_settings {
     enum vkb_method method;
     struct vkb_values values;  // the numbers, where vkb_value_rows puts them
     int choices[VKB_CHOICE_COUNT];
-    bool thresholded;          // else the threshold and the knee do not count
+    bool thresholded;                    // else the threshold and the knee do not count
     uint32_t bloom_width, bloom_height;  // 0: by bloom_scale
-    enum vkb_format format;    // VKB_FORMAT_NONE: by the source
+    enum vkb_format format;              // VKB_FORMAT_NONE: by the source
     float weights[MAX_WEIGHTS];
     uint32_t weight_count;
     struct vkb_layer layers[MAX_LAYERS];

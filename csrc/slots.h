@@ -9,20 +9,20 @@
 struct vkb_slot {
     char name[VKB_NAME_SIZE];
     struct vkb_image image;
-    uint64_t image_id;              // given anew each time that the image is created
-    uint64_t version;               // given anew each time that the image is written
-    unsigned char *recipe;          // what it was last made from, byte by byte comparable
+    uint64_t image_id;      // given anew each time that the image is created
+    uint64_t version;       // given anew each time that the image is written
+    unsigned char *recipe;  // what it was last made from, byte by byte comparable
     size_t recipe_size, recipe_capacity;
-    bool valid;                     // what the recipe says has run to its end
-    VkFramebuffer framebuffer;      // of the render pass whose first target this is
+    bool valid;                 // what the recipe says has run to its end
+    VkFramebuffer framebuffer;  // of the render pass whose first target this is
     VkRenderPass framebuffer_pass;
     uint64_t framebuffer_images[VKB_MAX_TARGETS + 1];
 };
 
 struct vkb_slots {
-    struct vkb_slot **slots;        // pointers, so that they stay where they are
+    struct vkb_slot **slots;  // pointers, so that they stay where they are
     size_t count, capacity;
-    uint64_t clock;                 // the last id or version given out
+    uint64_t clock;  // the last id or version given out
 };
 
 void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots);

@@ -14,14 +14,14 @@ bool vkb_timer_reserve(const struct vkb_device *device, uint32_t spans, struct v
     if (spans <= timer->capacity || device->timestamp_mask == 0)
         return true;
     vkb_timer_destroy(device, timer);
-    if (!VK(error, device->vk.vkCreateQueryPool(
-                       device->handle,
-                       &(VkQueryPoolCreateInfo){
-                           .sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
-                           .queryType = VK_QUERY_TYPE_TIMESTAMP,
-                           .queryCount = 2 * spans,
-                       },
-                       NULL, &timer->queries)))
+    if (!VK(error,
+            device->vk.vkCreateQueryPool(device->handle,
+                                         &(VkQueryPoolCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
+                                             .queryType = VK_QUERY_TYPE_TIMESTAMP,
+                                             .queryCount = 2 * spans,
+                                         },
+                                         NULL, &timer->queries)))
         return false;
     timer->capacity = spans;
     return true;

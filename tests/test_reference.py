@@ -610,8 +610,8 @@ def test_nan_and_infinity_stay_at_their_own_components(tonemap: Any) -> None:
 def final_of(colour: Any, **settings: Any) -> Array:
     """Final of one colour without bloom, as float32 has it (unclamped)."""
     image = np.asarray(colour, float) * np.ones((1, 1, 3))
-    final: Array = reference.composite(image, None, Separable(bloom=False, **settings))
-    return final[0, 0]
+    pixel: Array = reference.composite(image, None, Separable(bloom=False, **settings))[0, 0]
+    return pixel
 
 
 @pytest.mark.parametrize(

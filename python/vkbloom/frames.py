@@ -135,8 +135,8 @@ class Frames(Mapping[str, NDArray[Any]]):
         xarray.Dataset
             Dimensions as `dimensions` gives them; channels carry the coordinates "r", "g",
             "b" and, where there is one, "a". The attributes hold `info` and, as JSON text,
-            the settings and the timings, so that the Dataset can be stored by netCDF and
-            zarr. The variables share memory with the framebuffers.
+            the settings and the timings: text and numbers only, as netCDF and zarr want
+            them. The variables share memory with the framebuffers.
 
         Raises
         ------
@@ -185,7 +185,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         In OpenEXR half stays half and float stays float; 8-bit values are stored as half
         value / 255, from which ``round(255 * value)`` gives the same levels again, with the
         attribute ``vkbloom:dtype`` telling what they were. Depth is a float channel ``Z``.
-        The display window of all parts is that of `final` (or of the last framebuffer), as
+        The display window of all parts is that of `final` (without it, of the last image), as
         the parts of one file must share it. Values are stored as they are: no gamma, no
         multiplication by alpha.
 
@@ -290,7 +290,7 @@ class Frames(Mapping[str, NDArray[Any]]):
             if pixels.dtype == np.uint8:
                 pixels = (pixels / np.float32(255)).astype(np.float16)
             spec = self._spec(oiio, pixels)
-            # In this order OpenImageIO takes the name as the part's own.
+            # What OpenEXR calls the name of the part.
             spec.attribute("oiio:subimagename", name)
             spec.attribute("vkbloom:dtype", str(self[name].dtype))
             spec.full_width, spec.full_height = width, height

@@ -1,0 +1,58 @@
+# make demo: sets up what is missing, renders the built-in scene into out/.
+# make test: the same for the tests, and runs them. Both are quick the second time.
+
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+CORE := $(wildcard csrc/*.[ch]) $(wildcard shaders/*) setup.py pyproject.toml
+
+.PHONY: demo test lint format sanitize clean
+.DELETE_ON_ERROR:
+
+demo: build/stamp/core
+	$(PYTHON) examples/demo.py --out out
+
+test: build/stamp/core build/stamp/test
+	$(PYTHON) -m pytest
+
+lint: build/stamp/core build/stamp/test build/stamp/lint
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/clang-format --dry-run -Werror csrc/*.c csrc/*.h
+
+format: build/stamp/lint
+	$(VENV)/bin/ruff check --fix-only .
+	$(VENV)/bin/ruff format .
+	$(VENV)/bin/clang-format -i csrc/*.c csrc/*.h
+
+# The suite once more over a core with ASan, UBSan and LeakSanitizer.
+sanitize: build/stamp/core build/stamp/test
+	PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh
+
+clean:
+	rm -rf build out $(VENV) python/vkbloom/_core*.so
+
+build/stamp/system:
+	tools/setup_system.sh build
+	@mkdir -p $(@D) && touch $@
+
+$(PYTHON): | build/stamp/system
+	python3 -m venv $(VENV)
+	$(PYTHON) -m pip install --quiet --upgrade pip setuptools wheel
+
+build/stamp/packages: pyproject.toml | $(PYTHON)
+	$(PYTHON) tools/requirements.py all | $(PYTHON) -m pip install --quiet -r /dev/stdin
+	@mkdir -p $(@D) && touch $@
+
+build/stamp/core: $(CORE) build/stamp/packages
+	$(PYTHON) -m pip install --quiet --no-build-isolation --no-deps --editable .
+	@mkdir -p $(@D) && touch $@
+
+build/stamp/test: pyproject.toml | $(PYTHON)
+	tools/setup_system.sh test
+	$(PYTHON) tools/requirements.py test | $(PYTHON) -m pip install --quiet -r /dev/stdin
+	@mkdir -p $(@D) && touch $@
+
+build/stamp/lint: pyproject.toml | $(PYTHON)
+	$(PYTHON) tools/requirements.py lint | $(PYTHON) -m pip install --quiet -r /dev/stdin
+	@mkdir -p $(@D) && touch $@

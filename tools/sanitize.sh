@@ -1,0 +1,36 @@
+#!/bin/sh
+# Runs the test-suite over a core built with the address, undefined-behaviour and leak sanitizers.
+# PYTHON: an interpreter with the test requirements installed. Arguments go to pytest.
+set -eu
+
+cd "$(dirname "$0")/.."
+folder=$PWD/build/sanitize
+mkdir -p "$folder"
+
+# A tree of its own: the sanitized core must not replace the one in use.
+rm -rf "$folder/tree" "$folder/log"
+mkdir -p "$folder/tree" "$folder/log"
+cp -r csrc shaders python setup.py pyproject.toml README.md tests tools examples "$folder/tree/"
+rm -f "$folder"/tree/python/vkbloom/_core*.so
+cd "$folder/tree"
+VKBLOOM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=undefined \
+    -fno-omit-frame-pointer -g -O1 -Wall -Wextra -Werror" \
+    VKBLOOM_LDFLAGS="-fsanitize=address,undefined" \
+    "$PYTHON" setup.py --quiet build_ext --inplace
+
+asan=$(${CC:-cc} -print-file-name=libasan.so)
+# libstdc++ comes before the sanitizer's checks of exceptions, which Mesa's compiler throws.
+stdcxx=$(${CC:-cc} -print-file-name=libstdc++.so.6)
+# The interpreter's own allocations would hide and fake leaks: plain malloc, and a filter that
+# looks for the core in the stacks.
+set +e
+ASAN_OPTIONS="detect_leaks=1:exitcode=0:log_path=$folder/log/asan:fast_unwind_on_malloc=0" \
+    LSAN_OPTIONS="suppressions=$PWD/tools/leaks.supp:print_suppressions=0" \
+    UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:log_path=$folder/log/ubsan" \
+    LD_PRELOAD="$asan $stdcxx" PYTHONMALLOC=malloc PYTHONPATH="$PWD/python" \
+    VKBLOOM_SANITIZED=1 \
+    "$PYTHON" -m pytest -p no:cacheprovider -m "not slow" "$@"
+status=$?
+set -e
+"$PYTHON" tools/sanitizer_report.py "$folder/log"
+exit $status

@@ -1,0 +1,91 @@
+#!/bin/sh
+# Installs what the build and the tests need from the system, where it is missing and apt can do it.
+# Elsewhere it says what is missing. Arguments: the groups wanted, "build" and "test".
+set -eu
+
+missing_packages=""
+missing_names=""
+
+# need NAME PACKAGE COMMAND...: the package is missing unless the command succeeds.
+need() {
+    name=$1
+    package=$2
+    shift 2
+    if ! "$@" >/dev/null 2>&1; then
+        missing_packages="$missing_packages $package"
+        missing_names="$missing_names
+  - $name (Debian: $package)"
+    fi
+}
+
+has_header() {
+    echo "#include <$1>" | ${CC:-cc} -fsyntax-only -DVK_NO_PROTOTYPES -x c -
+}
+
+has_python_headers() {
+    test -f "$(python3 -c 'import sysconfig; print(sysconfig.get_paths()["include"])')/Python.h"
+}
+
+has_loader() {
+    python3 -c 'import ctypes; ctypes.CDLL("libvulkan.so.1")'
+}
+
+has_driver() {
+    # A manifest of any driver, as the loader finds it.
+    test -n "${VK_DRIVER_FILES:-${VK_ICD_FILENAMES:-}}" && return 0
+    for folder in /usr/share /usr/local/share /etc; do
+        ls "$folder"/vulkan/icd.d/*.json && return 0
+    done
+    return 1
+}
+
+has_validation() {
+    for folder in /usr/share /usr/local/share /etc; do
+        test -f "$folder/vulkan/explicit_layer.d/VkLayer_khronos_validation.json" && return 0
+    done
+    return 1
+}
+
+has_glslang() {
+    command -v glslangValidator || command -v glslang
+}
+
+check() {
+    missing_packages=""
+    missing_names=""
+    for group in "$@"; do
+        case $group in
+        build)
+            need "Python 3.11 or later" python3 \
+                python3 -c 'import sys; assert sys.version_info >= (3, 11)'
+            need "Python's venv module" python3-venv python3 -c 'import ensurepip, venv'
+            need "a C compiler" "gcc libc6-dev" has_header stdio.h
+            need "Python's C headers" python3-dev has_python_headers
+            need "glslang" glslang-tools has_glslang
+            need "the Vulkan headers" libvulkan-dev has_header vulkan/vulkan.h
+            need "volk" libvulkan-volk-dev has_header volk.h
+            need "the Vulkan loader" libvulkan1 has_loader
+            need "a Vulkan driver, such as Mesa's lavapipe" mesa-vulkan-drivers has_driver
+            ;;
+        test)
+            need "the Khronos validation layer" vulkan-validationlayers has_validation
+            ;;
+        esac
+    done
+}
+
+check "$@"
+test -z "$missing_names" && exit 0
+
+if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+    echo "Installing with apt:$missing_packages"
+    export DEBIAN_FRONTEND=noninteractive
+    apt-get update -qq
+    # Word splitting is wanted: one argument a package.
+    # shellcheck disable=SC2086
+    apt-get install -qq -y --no-install-recommends $missing_packages >/dev/null
+    check "$@"
+    test -z "$missing_names" && exit 0
+fi
+echo "vkbloom needs these, which are not here:$missing_names" >&2
+exit 1
