@@ -125,6 +125,8 @@ static bool read_method(PyObject *object, enum vkb_method *method)
 {
     static const char *const names[VKB_METHOD_COUNT] = {
         [VKB_METHOD_SEPARABLE] = "separable",
+        [VKB_METHOD_PYRAMID] = "pyramid",
+        [VKB_METHOD_DUAL_KAWASE] = "dual_kawase",
     };
     PyObject *value = PyObject_GetAttrString(object, "method");
 
@@ -319,4 +321,41 @@ void vkb_release_scene(struct vkb_held_scene *scene)
 {
     while (scene->view_count > 0)
         PyBuffer_Release(&scene->views[--scene->view_count]);
+}
+
+bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
+{
+    Py_buffer *view = &image->view;
+
+    if (PyObject_GetBuffer(array, view, PyBUF_STRIDES | PyBUF_FORMAT) < 0)
+        return false;
+    image->held = true;
+    if (!view->format || strlen(view->format) != 1 || !strchr("Bef", view->format[0])) {
+        PyErr_SetString(PyExc_TypeError, "image: an array of uint8, float16 or float32 is needed");
+        return false;
+    }
+    if (view->ndim != 3 || view->shape[0] < 1 || view->shape[1] < 1
+        || (view->shape[2] != 3 && view->shape[2] != 4) || view->shape[0] > INT32_MAX
+        || view->shape[1] > INT32_MAX) {
+        PyErr_SetString(PyExc_ValueError, "image: a shape of (H, W, 3) or (H, W, 4) is needed");
+        return false;
+    }
+    image->input = (struct vkb_input){
+        .memory = view->buf,
+        .row_stride = view->strides[0],
+        .pixel_stride = view->strides[1],
+        .channel_stride = view->strides[2],
+        .format = pixel_format(view->format[0]),
+        .width = (uint32_t)view->shape[1],
+        .height = (uint32_t)view->shape[0],
+        .channels = (uint32_t)view->shape[2],
+    };
+    return true;
+}
+
+void vkb_release_image(struct vkb_held_image *image)
+{
+    if (image->held)
+        PyBuffer_Release(&image->view);
+    image->held = false;
 }

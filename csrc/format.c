@@ -1,5 +1,8 @@
 #include "format.h"
 
+#include "../shaders/params.h"
+
+#include <float.h>
 #include <string.h>
 
 const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
@@ -12,6 +15,7 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .channels = 4,
             .channel_size = 1,
             .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
+            .limit = FLT_MAX,
         },
     [VKB_FORMAT_RGBA16_FLOAT] =
         {
@@ -21,6 +25,7 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .channels = 4,
             .channel_size = 2,
             .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
+            .limit = (float)HALF_LIMIT,
         },
     [VKB_FORMAT_RGBA32_FLOAT] =
         {
@@ -30,6 +35,7 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .channels = 4,
             .channel_size = 4,
             .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
+            .limit = FLT_MAX,
         },
     [VKB_FORMAT_DEPTH32_FLOAT] =
         {

@@ -21,6 +21,7 @@ struct vkb_format_info {
     uint32_t channels;
     uint32_t channel_size;  // bytes
     VkImageAspectFlags aspect;
+    float limit;  // the largest value that it holds, or more
 };
 
 extern const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT];

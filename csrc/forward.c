@@ -104,5 +104,5 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_for
             return false;
     }
     return add_scene(forward, &matrices, graph, &scene, error)
-        && vkb_add_composite(settings, scene, bloom, VKB_FORMAT_RGBA8_UNORM, graph, error);
+        && vkb_add_composite(settings, scene, bloom, graph, error);
 }

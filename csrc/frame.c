@@ -11,6 +11,8 @@ struct run {
     bool *needed;             // by pass
     uint32_t *ran;            // the first pass of each render pass that was recorded
     uint32_t ran_count;
+    struct vkb_slot *input;  // NULL: none, or none that is needed
+    bool send_input;         // the device does not have it yet
     VkDeviceSize uniform_used;
     unsigned char *recipe;
     size_t recipe_size, recipe_capacity;
@@ -30,6 +32,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     device->vk.vkDestroyDescriptorPool(device->handle, frame->descriptors, NULL);
     vkb_buffer_destroy(device, &frame->uniforms);
     vkb_readback_destroy(device, &frame->readback);
+    vkb_upload_destroy(device, &frame->upload);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
     vkb_commands_destroy(device, &frame->commands);
@@ -394,6 +397,8 @@ static void end_writing(struct run *run)
     for (uint32_t i = 0; i < run->ran_count; ++i)
         for (uint32_t t = target_slots(run, &run->graph->passes[run->ran[i]], targets); t-- > 0;)
             targets[t]->valid = true;
+    if (run->input)
+        run->input->valid = true;
 }
 
 // One time a render pass, under the name of the image that it writes.
@@ -418,6 +423,8 @@ static bool record_and_run(struct run *run, const struct vkb_output *outputs, ui
     if (!vkb_commands_begin(device, &frame->commands, error))
         return false;
     vkb_timer_reset(device, commands, &frame->timer);
+    if (run->send_input)
+        vkb_upload_record(device, commands, &frame->upload, &run->input->image);
     if (!record_passes(run, error))
         return false;
     for (uint32_t i = 0; i < output_count; ++i)
@@ -429,7 +436,22 @@ static bool record_and_run(struct run *run, const struct vkb_output *outputs, ui
         && vkb_buffer_invalidate(device, &frame->readback.staging, error);
 }
 
-static bool run_frame(struct run *run, const struct vkb_scene_data *scene,
+// Stages the image and finds out whether the device has it already.
+static bool stage_input(struct run *run, const struct vkb_input *input, struct vkb_error *error)
+{
+    bool changed;
+
+    if (!vkb_upload_stage(run->device, &run->frame->upload, input, &changed, error))
+        return false;
+    for (uint32_t i = 0; i < run->graph->image_count; ++i)
+        if (run->graph->images[i].input)
+            run->input = run->slots[i];
+    run->send_input = run->input && (changed || !run->input->valid);
+    return !run->send_input
+        || vkb_slot_begin_writing(&run->frame->slots, run->input, NULL, 0, error);
+}
+
+static bool run_frame(struct run *run, const struct vkb_frame_source *source,
                       const struct vkb_output *outputs, uint32_t output_count, bool *wanted,
                       VkDeviceSize *offsets, struct vkb_timing *timings, struct vkb_error *error)
 {
@@ -437,7 +459,8 @@ static bool run_frame(struct run *run, const struct vkb_scene_data *scene,
 
     if (!frame->commands.pool && !vkb_commands_create(run->device, &frame->commands, error))
         return false;
-    if (scene && !vkb_scene_load(run->device, &frame->commands, scene, &frame->scene, error))
+    if (source->scene
+        && !vkb_scene_load(run->device, &frame->commands, source->scene, &frame->scene, error))
         return false;
     mark_needed(run, outputs, output_count, wanted);
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
@@ -445,6 +468,8 @@ static bool run_frame(struct run *run, const struct vkb_scene_data *scene,
             && !vkb_slots_resolve(run->device, &frame->slots, &run->graph->images[i],
                                   &run->slots[i], error))
             return false;
+    if (source->input && !stage_input(run, source->input, error))
+        return false;
     if (!reserve(run, outputs, output_count, error)
         || !record_and_run(run, outputs, output_count, offsets, error)
         || !read_timings(run, timings, error))
@@ -466,7 +491,7 @@ static void recover(struct vkb_device *device, struct vkb_frame *frame)
 }
 
 bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
-                   const struct vkb_scene_data *scene, const struct vkb_graph *graph,
+                   const struct vkb_frame_source *source, const struct vkb_graph *graph,
                    const struct vkb_output *outputs, uint32_t output_count,
                    struct vkb_timing *timings, uint32_t *timing_count, struct vkb_error *error)
 {
@@ -483,7 +508,7 @@ bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
         && (run.ran = vkb_alloc(error, graph->pass_count, sizeof *run.ran))
         && (wanted = vkb_alloc(error, graph->image_count, sizeof *wanted))
         && (offsets = vkb_alloc(error, output_count, sizeof *offsets))
-        && run_frame(&run, scene, outputs, output_count, wanted, offsets, timings, error);
+        && run_frame(&run, source, outputs, output_count, wanted, offsets, timings, error);
     if (done)
         *timing_count = run.ran_count;
     else

@@ -10,18 +10,26 @@
 #include "scene.h"
 #include "slots.h"
 #include "timing.h"
+#include "upload.h"
 
 // Everything that lives from frame to frame.
 struct vkb_frame {
     struct vkb_commands commands;
     struct vkb_pipelines pipelines;
     struct vkb_scene scene;
+    struct vkb_upload upload;
     struct vkb_readback readback;
     struct vkb_buffer uniforms;
     struct vkb_timer timer;
     struct vkb_slots slots;
     VkDescriptorPool descriptors;
     uint32_t descriptor_capacity;  // in passes
+};
+
+// What a graph starts from; what it does not use is NULL.
+struct vkb_frame_source {
+    const struct vkb_scene_data *scene;
+    const struct vkb_input *input;
 };
 
 struct vkb_timing {
@@ -39,7 +47,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 // draws, NULL for one that draws no scene. A failed run leaves the frame usable, unless the device
 // is lost.
 bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
-                   const struct vkb_scene_data *scene, const struct vkb_graph *graph,
+                   const struct vkb_frame_source *source, const struct vkb_graph *graph,
                    const struct vkb_output *outputs, uint32_t output_count,
                    struct vkb_timing *timings, uint32_t *timing_count, struct vkb_error *error);
 

@@ -113,6 +113,21 @@ uint32_t vkb_graph_find(const struct vkb_graph *graph, const char *name)
     return VKB_NO_IMAGE;
 }
 
+uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_image_row *row = &graph->images[image];
+    return row->channels ? row->channels : vkb_formats[row->format].channels;
+}
+
+// Whether something has filled the image before pass `pass_index`.
+static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
+{
+    for (uint32_t i = 0; i < pass_index; ++i)
+        if (writes(&graph->passes[i], image))
+            return true;
+    return graph->images[image].input;
+}
+
 static bool check_image(const struct vkb_graph *graph, uint32_t index, uint32_t max_size,
                         struct vkb_error *error)
 {
@@ -172,7 +187,7 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
                         pass->name);
     for (uint32_t i = 0; i < pass->read_count; ++i)
-        if (pass->reads[i] >= graph->image_count)
+        if (pass->reads[i] >= graph->image_count || !is_filled(graph, pass->reads[i], index))
             return vkb_fail(error, VKB_ERROR_GENERAL,
                             "graph: pass %s reads an image that is not there", pass->name);
     for (uint32_t i = 0; i < pass->target_count; ++i)

@@ -23,7 +23,9 @@ struct vkb_image_row {
     char name[VKB_NAME_SIZE];
     enum vkb_format format;
     uint32_t width, height;
-    bool framebuffer;  // one of the frame's results, not only a step towards them
+    uint32_t channels;  // that come back to the host; 0: all
+    bool framebuffer;   // one of the frame's results, not only a step towards them
+    bool input;         // filled by the host, not by a pass
 };
 
 // What a pass draws; the depth test and the culling follow from it.
@@ -86,6 +88,9 @@ enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image);
 // How the passes first..end-1 use their targets: the colours in order, then the depth.
 uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, uint32_t end,
                                struct vkb_target_use *uses);
+
+// The channels of the image that come back to the host.
+uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image);
 
 // The framebuffer of that name, VKB_NO_IMAGE where the graph has none.
 uint32_t vkb_graph_find(const struct vkb_graph *graph, const char *name);

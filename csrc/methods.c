@@ -50,20 +50,35 @@ bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_s
         const struct vkb_settings *, const struct vkb_bloom_source *, struct vkb_graph *,
         uint32_t *, struct vkb_error *) = {
         [VKB_METHOD_SEPARABLE] = vkb_add_separable,
+        [VKB_METHOD_PYRAMID] = vkb_add_mip_chain,
+        [VKB_METHOD_DUAL_KAWASE] = vkb_add_mip_chain,
     };
 
     return methods[settings->method](settings, source, graph, bloom, error);
 }
 
+struct vkb_sampling vkb_sampling_between(const struct vkb_graph *graph, uint32_t source,
+                                         uint32_t target)
+{
+    const struct vkb_image_row *from = &graph->images[source], *to = &graph->images[target];
+
+    return (struct vkb_sampling){
+        .ratio_x = (float)((double)from->width / to->width),
+        .ratio_y = (float)((double)from->height / to->height),
+        .limit = vkb_formats[to->format].limit,
+    };
+}
+
 bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
-                       enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error)
+                       struct vkb_graph *graph, struct vkb_error *error)
 {
     uint32_t final;
     struct vkb_image_row image = {
         .name = "final",
-        .format = format,
+        .format = graph->images[scene].format,
         .width = graph->images[scene].width,
         .height = graph->images[scene].height,
+        .channels = graph->images[scene].channels,
         .framebuffer = true,
     };
 
@@ -81,5 +96,6 @@ bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint
     row.read_count = 2;
     row.block = VKB_BLOCK_composite;
     row.params.composite = settings->values.composite;
+    row.params.composite.limit = vkb_formats[image.format].limit;
     return vkb_graph_add_pass(graph, &row, error);
 }

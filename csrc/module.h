@@ -7,6 +7,7 @@
 #include <Python.h>
 
 #include "methods.h"
+#include "upload.h"
 
 struct vkb_module_state {
     PyObject *renderer_type;
@@ -40,6 +41,18 @@ struct vkb_held_scene {
 // (serial, body vertices, body indices, glow vertices or None, glow indices or None, sky levels)
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
 void vkb_release_scene(struct vkb_held_scene *scene);
+
+// An image's pixels, held until vkb_release_image, which may be called on a zeroed or half-read
+// one.
+struct vkb_held_image {
+    struct vkb_input input;
+    Py_buffer view;
+    bool held;
+};
+
+// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides.
+bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
+void vkb_release_image(struct vkb_held_image *image);
 
 // The graph of a forward frame as Python data: describe(settings, size, has_sky).
 PyObject *vkb_describe(PyObject *module, PyObject *arguments);

@@ -225,9 +225,7 @@ static bool hold_outputs(const struct vkb_graph *graph, PyObject *names, PyObjec
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         int wanted = graph->images[i].framebuffer ? is_wanted(names, graph->images[i].name) : 0;
         if (wanted < 0
-            || (wanted
-                && !add_output(graph, i, vkb_formats[graph->images[i].format].channels, allocate,
-                               held)))
+            || (wanted && !add_output(graph, i, vkb_graph_channels(graph, i), allocate, held)))
             return false;
     }
     return true;
@@ -255,14 +253,16 @@ static PyObject *timing_dict(const struct vkb_timing *timings, uint32_t count)
     return dict;
 }
 
-// Runs the graph with the GIL released; gives (arrays, timings).
+// Runs the graph with the GIL released; gives (arrays, timings, (NaNs, infinities of the input)).
 static PyObject *run_graph(struct renderer *self, const struct vkb_graph *graph,
-                           const struct vkb_scene_data *scene, PyObject *names, PyObject *allocate)
+                           const struct vkb_frame_source *source, PyObject *names,
+                           PyObject *allocate)
 {
     struct held_outputs held = {0};
     struct vkb_error error = {0};
     struct vkb_timing *timings = NULL;
     uint32_t timing_count = 0;
+    uint64_t nan_count = 0, inf_count = 0;
     PyObject *result = NULL, *times;
     bool done;
 
@@ -272,8 +272,12 @@ static PyObject *run_graph(struct renderer *self, const struct vkb_graph *graph,
     PyThread_acquire_lock(self->lock, WAIT_LOCK);
     done = (timings = vkb_alloc(&error, graph->pass_count, sizeof *timings))
         && require_open(self, &error)
-        && vkb_frame_run(&self->device, &self->frame, scene, graph, held.outputs, held.count,
+        && vkb_frame_run(&self->device, &self->frame, source, graph, held.outputs, held.count,
                          timings, &timing_count, &error);
+    if (done && source->input) {
+        nan_count = self->frame.upload.nan_count;
+        inf_count = self->frame.upload.inf_count;
+    }
     // A validation message says more than what it led to.
     if (self->open)
         done = vkb_instance_check(&self->device.instance, &error) && done;
@@ -285,7 +289,8 @@ static PyObject *run_graph(struct renderer *self, const struct vkb_graph *graph,
     }
     times = timing_dict(timings, timing_count);
     if (times)
-        result = Py_BuildValue("(ON)", held.arrays, times);
+        result = Py_BuildValue("(ON(KK))", held.arrays, times, (unsigned long long)nan_count,
+                               (unsigned long long)inf_count);
 end:
     vkb_free(timings);
     release_outputs(&held);
@@ -312,11 +317,42 @@ static PyObject *render(PyObject *object, PyObject *arguments)
         forward.has_sky = scene.data.sky.level_count > 0;
         if (require_open(self, &error) && vkb_build_forward(&settings, &forward, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
-            result = run_graph(self, &graph, &scene.data, names, allocate);
+            result = run_graph(self, &graph, &(struct vkb_frame_source){.scene = &scene.data},
+                               names, allocate);
         else
             vkb_raise(state_of(object), &error);
     }
     vkb_release_scene(&scene);
+    vkb_graph_destroy(&graph);
+    return result;
+}
+
+static PyObject *apply(PyObject *object, PyObject *arguments)
+{
+    struct renderer *self = (struct renderer *)object;
+    PyObject *settings_object, *array, *names, *allocate, *result = NULL;
+    struct vkb_settings settings;
+    struct vkb_graph graph = {0};
+    struct vkb_held_image image = {0};
+    struct vkb_error error = {0};
+
+    if (!PyArg_ParseTuple(arguments, "OOOO:apply", &settings_object, &array, &names, &allocate)
+        || !vkb_read_settings(settings_object, &settings))
+        return NULL;
+    if (vkb_read_image(array, &image)) {
+        const struct vkb_image_source source = {
+            .format = image.input.format,
+            .size = {image.input.width, image.input.height},
+            .channels = image.input.channels,
+        };
+        if (require_open(self, &error) && vkb_build_image(&settings, &source, &graph, &error)
+            && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
+            result = run_graph(self, &graph, &(struct vkb_frame_source){.input = &image.input},
+                               names, allocate);
+        else
+            vkb_raise(state_of(object), &error);
+    }
+    vkb_release_image(&image);
     vkb_graph_destroy(&graph);
     return result;
 }
@@ -363,7 +399,9 @@ static PyObject *get_pipeline_count(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Gives all back; may be called twice."},
     {"render", render, METH_VARARGS,
-     "render(settings, scene, camera, size, time, names, allocate) -> (arrays, timings)"},
+     "render(settings, scene, camera, size, time, names, allocate) -> (arrays, timings, counts)"},
+    {"apply", apply, METH_VARARGS,
+     "apply(settings, image, names, allocate) -> (arrays, timings, counts)"},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };

@@ -35,7 +35,8 @@ static bool add_blur(const struct vkb_settings *settings, const struct vkb_bloom
                      uint32_t to, struct vkb_graph *graph, struct vkb_error *error)
 {
     struct vkb_pass_row row = vkb_fullscreen_row(name, VKB_SHADER_blur_frag, to);
-    const struct vkb_image_row *source_row = &graph->images[from], *target_row = &graph->images[to];
+    const struct vkb_image_row *source_row = &graph->images[from];
+    const struct vkb_sampling sampling = vkb_sampling_between(graph, from, to);
     const enum vkb_texel texel = (enum vkb_texel)settings->choices[VKB_CHOICE_texel];
     struct vkb_blur_params *params = &row.params.blur;
 
@@ -46,8 +47,9 @@ static bool add_blur(const struct vkb_settings *settings, const struct vkb_bloom
     params->blur_strength = settings->values.blur.blur_strength;
     params->layer_scale = settings->layers[layer].scale;
     params->layer_strength = 1.0f;
-    params->ratio_x = (float)((double)source_row->width / target_row->width);
-    params->ratio_y = (float)((double)source_row->height / target_row->height);
+    params->ratio_x = sampling.ratio_x;
+    params->ratio_y = sampling.ratio_y;
+    params->limit = sampling.limit;
     params->step_ratio = (float)((double)source_row->height / source_row->width);
     for (uint32_t i = 0; i < settings->weight_count; ++i)
         params->weights[i / 4][i % 4] = settings->weights[i];

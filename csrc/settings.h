@@ -7,7 +7,12 @@
 
 #include <stdbool.h>
 
-enum vkb_method { VKB_METHOD_SEPARABLE, VKB_METHOD_COUNT };
+enum vkb_method {
+    VKB_METHOD_SEPARABLE,
+    VKB_METHOD_PYRAMID,
+    VKB_METHOD_DUAL_KAWASE,
+    VKB_METHOD_COUNT,
+};
 
 struct vkb_layer {
     float scale, strength;

@@ -24,7 +24,8 @@ void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots)
 
 static VkImageUsageFlags image_usage(enum vkb_format format)
 {
-    return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
+    return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
+         | VK_IMAGE_USAGE_SAMPLED_BIT
          | (format == VKB_FORMAT_DEPTH32_FLOAT ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
                                                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT);
 }
@@ -105,7 +106,8 @@ bool vkb_slot_begin_writing(struct vkb_slots *slots, struct vkb_slot *slot, cons
     slot->version = ++slots->clock;
     if (!vkb_grow(error, (void **)&slot->recipe, &slot->recipe_capacity, size, 1))
         return false;
-    memcpy(slot->recipe, recipe, size);
+    if (size)
+        memcpy(slot->recipe, recipe, size);
     slot->recipe_size = size;
     return true;
 }

@@ -6,11 +6,12 @@
 #include "sampling.glsl"
 
 UNIFORM_BLOCK(BLUR_BLOCK);
+#include "storage.glsl"
 
 layout(constant_id = 0) const int DIRECTION = DIRECTION_VERTICAL;
 layout(constant_id = 1) const int RADIUS = 4;
 layout(constant_id = 2) const int FIRST_TAP = 1;
-layout(constant_id = 3) const int TEXEL = TEXEL_OWN;
+layout(constant_id = 3) const int STEP_TEXEL = TEXEL_OWN;
 layout(constant_id = 4) const int SAMPLING = SAMPLING_FILTER;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
@@ -51,7 +52,7 @@ void main()
     vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
     vec2 across = vec2(scale, 0.0);
     // In texels of the height, one texel of the width is height / width (`step_ratio`).
-    vec2 down = vec2(0.0, TEXEL == TEXEL_X ? scale * params.step_ratio : scale);
+    vec2 down = vec2(0.0, STEP_TEXEL == TEXEL_X ? scale * params.step_ratio : scale);
     vec3 sum;
     if (DIRECTION == DIRECTION_VERTICAL) {
         sum = blur_line(position, down);
@@ -63,5 +64,5 @@ void main()
             sum += coefficient(tap) * (blur_line(position + float(tap) * down, across)
                                      + blur_line(position - float(tap) * down, across));
     }
-    colour = vec4(params.layer_strength * sum, 1.0);
+    colour = vec4(storable(params.layer_strength * sum), 1.0);
 }

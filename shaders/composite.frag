@@ -6,6 +6,7 @@
 #include "tonemap.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
+#include "storage.glsl"
 
 layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
 layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
@@ -29,10 +30,11 @@ void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec4 source = texelFetch(scene, pixel, 0);
-    vec3 result = source.rgb;
+    // Curves that mix the channels must not spread one channel's NaN to the others.
+    vec3 result = finite_or_zero(source.rgb);
     if (COMPOSITE != COMPOSITE_OFF)
-        result = composite(source.rgb, texelFetch(bloom, pixel, 0).rgb);
+        result = composite(result, texelFetch(bloom, pixel, 0).rgb);
     result = apply_encoding(apply_tonemap(result * exp2(params.exposure), TONEMAP), ENCODING);
     // NaN and infinity of the source stay at their own pixels, whatever the curve makes of them.
-    colour = vec4(mix(source.rgb, result, is_finite(source.rgb)), source.a);
+    colour = vec4(mix(source.rgb, storable(result), is_finite(source.rgb)), source.a);
 }

@@ -8,6 +8,13 @@
 //   INPUT(B, type, name)                  a float or int that the core fills in for each pass
 //   VEC4S(B, name, count)                 an array of vec4 that the core fills in for each pass
 
+// Of a pass that reads another image: texels of the source a pixel of the target, and the largest
+// value that the target's format holds.
+#define SAMPLING_ROWS(B, INPUT) \
+    INPUT(B, float, ratio_x) \
+    INPUT(B, float, ratio_y) \
+    INPUT(B, float, limit)
+
 #define THRESHOLD_ROWS(B, SETTING) \
     SETTING(B, threshold, 0.0, 0.0, 65504.0) \
     SETTING(B, knee, 0.0, 0.0, 1.0)
@@ -19,25 +26,43 @@
     VEC4S(B, model, 4) \
     THRESHOLD_ROWS(B, SETTING)
 
-// A blur pass. `ratio` is source texels a target pixel, `step_ratio` what one texel of the width
-// is in texels of the height; the half-kernel w0..w64 lies four to a vec4.
+// A blur pass. `step_ratio` is what one texel of the width is in texels of the height; the half-kernel w0..w64 lies four to a vec4.
 #define BLUR_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, blur_scale, 1.0, 0.0, 16.0) \
     SETTING(B, blur_strength, 1.5, 0.0, 16.0) \
     INPUT(B, float, layer_scale) \
     INPUT(B, float, layer_strength) \
-    INPUT(B, float, ratio_x) \
-    INPUT(B, float, ratio_y) \
     INPUT(B, float, step_ratio) \
+    SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, weights, 17)
+
+// The reduction of an image to the bloom buffer, with the threshold.
+#define EXTRACT_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    THRESHOLD_ROWS(B, SETTING)
+
+// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below.
+#define PYRAMID_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SETTING(B, radius, 1.0, 0.0, 16.0) \
+    SAMPLING_ROWS(B, INPUT) \
+    INPUT(B, float, own) \
+    INPUT(B, float, coarse)
+
+#define KAWASE_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SETTING(B, offset, 1.0, 0.0, 16.0) \
+    SAMPLING_ROWS(B, INPUT)
 
 #define COMPOSITE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, intensity, 1.0, 0.0, 65504.0) \
-    SETTING(B, exposure, 0.0, -32.0, 32.0)
+    SETTING(B, exposure, 0.0, -32.0, 32.0) \
+    INPUT(B, float, limit)
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
+    BLOCK(extract, EXTRACT_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \
+    BLOCK(pyramid, PYRAMID_BLOCK) \
+    BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK)
 
 // Settings that no shader reads, for they shape the graph.
@@ -46,11 +71,16 @@
     COUNT(bloom, 1, 0, 1) \
     COUNT(loops, 1, 1, 16) \
     COUNT(first_tap, 1, 0, 1) \
-    COUNT(direct, 0, 0, 1)
+    COUNT(direct, 0, 0, 1) \
+    COUNT(levels, 6, 1, 16) \
+    COUNT(firefly_filter, 0, 0, 1)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \
     REAL(bloom_scale, 1.0, 0.001, 4.0)
+
+// The largest half float.
+#define HALF_LIMIT 65504.0
 
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65

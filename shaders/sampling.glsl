@@ -1,8 +1,13 @@
-// Samples at positions in texels (the first texel's centre is 0.5), clamped to the edge.
+// Samples at positions in texels (the first texel's centre is 0.5), clamped to the edge. A shader
+// that includes this may define TEXEL to change what is read of a texel.
+
+#ifndef TEXEL
+#define TEXEL(value) (value)
+#endif
 
 vec4 fetch_clamped(sampler2D image, ivec2 texel)
 {
-    return texelFetch(image, clamp(texel, ivec2(0), textureSize(image, 0) - 1), 0);
+    return TEXEL(texelFetch(image, clamp(texel, ivec2(0), textureSize(image, 0) - 1), 0));
 }
 
 // Bilinear in full float precision: hardware filters have 8 bits of position, or fewer.

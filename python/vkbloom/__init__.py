@@ -22,7 +22,7 @@ from vkbloom.frames import Frames
 from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Scene
-from vkbloom.settings import TUTORIAL, Separable, Settings, gaussian_weights
+from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
 
 __version__ = version("vkbloom")
 
@@ -32,9 +32,11 @@ __all__ = [
     "AdapterNotFoundError",
     "Camera",
     "DeviceLostError",
+    "DualKawase",
     "Error",
     "Frames",
     "OutOfMemoryError",
+    "Pyramid",
     "Renderer",
     "Scene",
     "Separable",

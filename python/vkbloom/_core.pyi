@@ -20,6 +20,7 @@ _Scene = tuple[
     NDArray[np.uint32] | None,
     tuple[_Array, ...],
 ]
+_Result = tuple[dict[str, _Array], dict[str, float], tuple[int, int]]
 _Allocate = Callable[[str, tuple[int, ...], str], _Array]
 
 class Error(Exception):
@@ -57,4 +58,12 @@ class Renderer:
         names: tuple[str, ...] | None,
         allocate: _Allocate,
         /,
-    ) -> tuple[dict[str, _Array], dict[str, float]]: ...
+    ) -> _Result: ...
+    def apply(
+        self,
+        settings: object,
+        image: _Array,
+        names: tuple[str, ...] | None,
+        allocate: _Allocate,
+        /,
+    ) -> _Result: ...

@@ -14,7 +14,7 @@ from vkbloom.frames import Frames
 from vkbloom.settings import Separable, Settings, check_size
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from types import TracebackType
 
     from numpy.typing import NDArray
@@ -36,6 +36,19 @@ def _check_settings(settings: Settings | None) -> Settings:
     if not isinstance(settings, Settings):
         raise TypeError(f"settings: Settings are needed, not {settings!r}")
     return settings
+
+
+def _check_image(image: object) -> NDArray[Any]:
+    """Return the image, in this machine's byte order, if the core can take it."""
+    if not isinstance(image, np.ndarray):
+        raise TypeError(f"image: an array is needed, not {type(image).__name__}")
+    if image.dtype.name not in ("uint8", "float16", "float32"):
+        raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
+        raise ValueError(
+            f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+        )
+    return image.astype(image.dtype.newbyteorder("="), copy=False)
 
 
 def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
@@ -208,7 +221,7 @@ class Renderer:
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: a Scene is needed, not {scene!r}")
         camera = scene.camera
-        arrays, timings = self._core.render(
+        arrays, timings, specials = self._core.render(
             settings,
             _scene_arrays(scene),
             (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
@@ -218,18 +231,128 @@ class Renderer:
             _check_attachments(attachments),
             _allocator(out),
         )
-        return self._frames(arrays, timings, settings)
+        return self._frames(arrays, timings, specials, settings)
+
+    def apply(
+        self,
+        image: NDArray[Any],
+        settings: Settings | None = None,
+        *,
+        attachments: Literal["all"] | str | Sequence[str] = "all",
+        out: Mapping[str, NDArray[Any]] | None = None,
+    ) -> Frames:
+        """Give an image bloom.
+
+        Parameters
+        ----------
+        image : ndarray, shape (H, W, 3) or (H, W, 4)
+            uint8 (read as value / 255), float16 or float32; any strides. RGB gets alpha 1; RGBA
+            keeps its alpha, which the bloom never changes. NaN and infinity count as 0 in the
+            bloom and stay where they are in ``final``.
+        settings : Settings, optional
+            By default ``Separable()``.
+        attachments, out
+            As for `render`.
+
+        Returns
+        -------
+        Frames
+            ``glow`` (what the threshold lets through), the blur's framebuffers
+            (``blur_vertical``; or ``down_0``, ``down_1``, ... and ..., ``up_0``), ``bloom``, all
+            (H, W, 4) in the format of the bloom buffers, and ``final``, which has the image's
+            shape and dtype. With ``bloom=False`` there is ``final`` only. ``info`` counts the
+            "nan" and "inf" of the image.
+
+        Raises
+        ------
+        ValueError
+            The image has another shape or is larger than the adapter allows, an argument is out
+            of range, an array of `out` does not fit, or the renderer is closed.
+        TypeError
+            The image has another dtype, or an argument another type.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed. After any but a lost device the renderer can be used again.
+
+        Notes
+        -----
+        The same image again, to the byte, is not sent to the device again, and passes run only
+        when what they read or their settings changed.
+        """
+        settings = _check_settings(settings)
+        arrays, timings, specials = self._core.apply(
+            settings, _check_image(image), _check_attachments(attachments), _allocator(out)
+        )
+        return self._frames(arrays, timings, specials, settings)
+
+    def apply_many(
+        self,
+        image: NDArray[Any],
+        settings_seq: Iterable[Settings],
+        *,
+        attachments: Literal["all"] | str | Sequence[str] = "all",
+    ) -> Iterator[Frames]:
+        """Give an image bloom with one settings after the other.
+
+        Parameters
+        ----------
+        image
+            As for `apply`; it must not change before the last frame is taken.
+        settings_seq : iterable of Settings
+        attachments
+            As for `apply`.
+
+        Yields
+        ------
+        Frames
+            One for each of the settings, in their order; only the passes that a change of settings
+            puts out of date run.
+        """
+        for settings in settings_seq:
+            yield self.apply(image, settings, attachments=attachments)
+
+    def render_many(
+        self,
+        scene: Scene,
+        settings_seq: Iterable[Settings],
+        size: tuple[int, int] = (1280, 720),
+        *,
+        shading: Shading = "forward",
+        time: float = 0.0,
+        attachments: Literal["all"] | str | Sequence[str] = "all",
+    ) -> Iterator[Frames]:
+        """Render a scene with one settings after the other.
+
+        Parameters
+        ----------
+        scene, size, shading, time, attachments
+            As for `render`.
+        settings_seq : iterable of Settings
+
+        Yields
+        ------
+        Frames
+            One for each of the settings, in their order; only the passes that a change of settings
+            puts out of date run.
+        """
+        for settings in settings_seq:
+            yield self.render(
+                scene, settings, size, shading=shading, time=time, attachments=attachments
+            )
 
     def _frames(
-        self, arrays: dict[str, NDArray[Any]], timings: dict[str, float], settings: Settings
+        self,
+        arrays: dict[str, NDArray[Any]],
+        timings: dict[str, float],
+        specials: tuple[int, int],
+        settings: Settings,
     ) -> Frames:
         self._save_pipelines()
         info = {
             "adapter": self.info.name,
             "driver": self.info.driver_info or self.info.driver,
             "version": _version(),
-            "nan": 0,
-            "inf": 0,
+            "nan": specials[0],
+            "inf": specials[1],
         }
         return Frames(arrays, timings=timings, settings=settings, info=info)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from vkbloom import _core
 
@@ -136,12 +136,17 @@ class Settings:
         """Check a number and store it as what it is: NumPy's scalars hash and print otherwise."""
         _, low, high = _core.VALUES[field.name]
         check_number(field.name, value, low, high)
-        kind = type(field.default) if field.default is not None else float
-        if kind is not float and value != int(value):
+        if isinstance(field.default, bool):
+            number: float = bool(value)
+        elif isinstance(field.default, int):
+            number = int(value)
+        else:
+            number = float(value)
+        if number != value:
             raise ValueError(f"{field.name}: {value!r} is not a whole number")
-        object.__setattr__(self, field.name, kind(value))
+        object.__setattr__(self, field.name, number)
 
-    def replace(self, **changes: Any) -> Settings:
+    def replace(self, **changes: Any) -> Self:
         """Return the same settings with some fields changed, as `dataclasses.replace`."""
         return dataclasses.replace(self, **changes)
 
@@ -181,7 +186,7 @@ class Separable(Settings):
     loops : int
         Vertical and horizontal passes one after the other, 1 to 16 times.
     layers : sequence of (float, float)
-        (scale, strength), 1 to 8 of them: each is a whole blur at blur_scale * scale, added with
+        (scale, strength), 1 to 8 of them, each number 0 to 16: each is a whole blur at blur_scale * scale, added with
         its strength.
     first_tap : {1, 0}
         0: the loop starts at the centre, which so gets w0 (1 + 2 strength).
@@ -223,9 +228,73 @@ class Separable(Settings):
             )
         if any(len(layer) != 2 for layer in layers):
             raise ValueError(f"layers: {self.layers!r} must hold (scale, strength) pairs")
-        if any(not 0 <= scale <= 16 for scale, _ in layers):
-            raise ValueError(f"layers: {self.layers!r} has a scale out of range, 0 to 16")
+        if any(not 0 <= number <= 16 for layer in layers for number in layer):
+            raise ValueError(f"layers: {self.layers!r} has a number out of range, 0 to 16")
         object.__setattr__(self, "layers", layers)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Pyramid(Settings):
+    """A mip chain: 13 taps down, a 3 x 3 tent up, the levels added on the way.
+
+    Parameters
+    ----------
+    levels : int
+        Of the chain, 1 to 16. ``down_0`` is half of the bloom size, each next the floored half,
+        never under 1; a level of 1 x 1 ends the chain, unless it is the first.
+    radius : float
+        Distance of the tent's taps in texels of the smaller level, 0 to 16.
+    firefly_filter : bool
+        In the first downsample the five 2 x 2 groups are weighted by 1 / (1 + luminance of the
+        group's mean) and renormalized.
+    **settings
+        The fields of `Settings`.
+
+    Notes
+    -----
+    Down: centre 0.125; four diagonals 1 texel away 0.125 each; four axials 2 texels away 0.0625
+    each; four diagonals 2 texels away 0.03125 each. Up: (1 2 1)^2 / 16,
+    up_k = down_k + tent(up_k+1). ``bloom`` is tent(up_0) at every pixel of ``final``, divided by
+    the number of levels, so that a flat image keeps its value. In "rgba8unorm", which ends at 1,
+    the images on the way up hold the mean of the levels that went into them instead of their sum;
+    the bloom is the same.
+
+    Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
+    SIGGRAPH 2014.
+    """
+
+    method: ClassVar[str] = "pyramid"
+
+    levels: int = _number("levels")
+    radius: float = _number("radius")
+    firefly_filter: bool = _flag("firefly_filter")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DualKawase(Settings):
+    """A chain of halved images, five taps down and eight taps up, nothing added on the way.
+
+    Parameters
+    ----------
+    levels : int
+        Of the chain, 1 to 16; their sizes as those of `Pyramid`.
+    offset : float
+        Factor of all distances between taps, 0 to 16.
+    **settings
+        The fields of `Settings`.
+
+    Notes
+    -----
+    Down: (4 c + the four diagonals half a texel of the source away) / 8. Up: (the four axials one
+    texel of the smaller level away + 2 times the four diagonals half a texel of it away) / 12.
+
+    Source: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
+    """
+
+    method: ClassVar[str] = "dual_kawase"
+
+    levels: int = _number("levels", default=4)
+    offset: float = _number("offset")
 
 
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:

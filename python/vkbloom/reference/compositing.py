@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .image import as_float
+from .image import as_float, format_of, storage
 from .sampling import Array
 from .tone_map import ENCODINGS, TONE_MAPS
 
@@ -54,7 +54,7 @@ def composite(
         Of the same types, finite. Not read where ``settings.bloom`` is off.
     settings : vkbloom.Separable, Pyramid or DualKawase
     dtype : dtype, optional
-        Of the final image; the scene's by default. For uint8 the result is clamped to 0..1.
+        Of the final image; the scene's by default. The result is clamped to what it holds.
 
     Returns
     -------
@@ -83,9 +83,9 @@ def composite(
             )
         rgb = _blend(rgb, glow, settings.composite, settings.intensity)
     rgb = ENCODINGS[settings.encoding](TONE_MAPS[settings.tonemap](rgb * 2.0**settings.exposure))
+    rgb = storage(format_of(np.empty(0, stored), None))(rgb)
     rgb = np.where(np.isfinite(original), rgb, original)
-    final = np.concatenate([rgb, image[..., 3:]], axis=-1)
-    return np.clip(final, 0, 1) if stored == np.uint8 else final
+    return np.concatenate([rgb, image[..., 3:]], axis=-1)
 
 
 def _blend(scene: Array, bloom: Array, mode: str, intensity: float) -> Array:

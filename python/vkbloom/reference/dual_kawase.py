@@ -5,9 +5,9 @@ From Martin, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
+from .image import Storage
 from .levels import level_sizes
 from .sampling import CENTRE, Array, Taps, sample
 
@@ -27,7 +27,7 @@ def passes(
     glow: Array,
     settings: DualKawaseSettings,
     size: tuple[int, int],
-    store: Callable[[Array], Array],
+    store: Storage,
 ) -> dict[str, Array]:
     """Return the framebuffers on the way down and up; nothing is added on the way up.
 

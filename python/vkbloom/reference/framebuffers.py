@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import dual_kawase, pyramid, separable
 from .compositing import CompositeSettings, composite
-from .image import as_float, finite, format_of, storage
+from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
 from .threshold import extract
 
@@ -37,7 +37,7 @@ class Settings(CompositeSettings, Protocol):
 
 class _Method(NamedTuple):
     # (glow, settings, size of the bloom, storing) -> framebuffers after the glow
-    passes: Callable[[Array, Any, tuple[int, int], Callable[[Array], Array]], dict[str, Array]]
+    passes: Callable[[Array, Any, tuple[int, int], Storage], dict[str, Array]]
     gain: Callable[[Any], float]
 
 
@@ -55,8 +55,8 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     centres, thresholded, blurred and composited. Components that are NaN or infinite count as
     0 in the bloom and stay as they are in "final".
 
-    Bloom buffers of the format "rgba8unorm" are clamped to 0..1 wherever they are stored;
-    nothing is rounded to a format's levels, and "rgba16float" does not overflow here.
+    Bloom buffers of the format "rgba8unorm" are clamped to 0..1 wherever they are stored, those
+    of "rgba16float" to +-65504; nothing is rounded to a format's levels.
 
     Parameters
     ----------

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import dataclasses
+import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from .sampling import Array
 
-__all__ = ["as_float", "finite", "format_of", "storage"]
+__all__ = ["Storage", "as_float", "finite", "format_of", "storage"]
 
 _FORMATS = {
     "uint8": "rgba8unorm",
@@ -68,12 +70,31 @@ def format_of(image: NDArray[Any], format: str | None) -> str:
     return _FORMATS[np.asarray(image).dtype.name] if format is None else format
 
 
-def storage(format: str) -> Callable[[Array], Array]:
-    """Return what storing in a bloom buffer of a format does to the values.
+@dataclasses.dataclass(frozen=True)
+class Storage:
+    """What storing in a format does to the values: it keeps them between two ends.
 
-    "rgba8unorm" clamps to 0..1. Nothing is rounded to a format's levels, which is what the
-    tolerance of a comparison is for. Values beyond 65504 become infinite in "rgba16float" on a
-    device and stay what they are here.
+    Nothing is rounded to a format's levels, which is what the tolerance of a comparison is for.
+    """
+
+    low: float
+    high: float
+
+    def __call__(self, image: Array) -> Array:
+        """Return the image as stored."""
+        return np.clip(image, self.low, self.high)
+
+
+_STORAGES = {
+    "rgba8unorm": Storage(0, 1),
+    # A value that overflowed to infinity would spread over the picture, so buffers end here.
+    "rgba16float": Storage(-65504, 65504),
+    "rgba32float": Storage(-math.inf, math.inf),
+}
+
+
+def storage(format: str) -> Storage:
+    """Return what storing in a bloom buffer of a format does to the values.
 
     Parameters
     ----------
@@ -81,23 +102,14 @@ def storage(format: str) -> Callable[[Array], Array]:
 
     Returns
     -------
-    callable
+    Storage
 
     Raises
     ------
     ValueError
         Another format.
     """
-    if format == "rgba8unorm":
-        return _clamp
-    if format in ("rgba16float", "rgba32float"):
-        return _keep
-    raise ValueError(f'format must be "rgba8unorm", "rgba16float" or "rgba32float", not {format!r}')
-
-
-def _clamp(image: Array) -> Array:
-    return np.clip(image, 0, 1)
-
-
-def _keep(image: Array) -> Array:
-    return image
+    if format not in _STORAGES:
+        names = ", ".join(map(repr, _STORAGES))
+        raise ValueError(f"format must be one of {names}, not {format!r}")
+    return _STORAGES[format]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
+from .image import Storage
 from .levels import level_sizes
 from .sampling import Array, sample
 from .threshold import luminance
@@ -41,15 +41,15 @@ def passes(
     glow: Array,
     settings: PyramidSettings,
     size: tuple[int, int],
-    store: Callable[[Array], Array],
+    store: Storage,
 ) -> dict[str, Array]:
     """Return the pyramid's framebuffers.
 
     The bloom is the sum of all levels, each brought up through those above it by the tent, and
-    divided by their number N. The division is spread over the way up, so that no stored image
-    leaves the range of its inputs: up_N-1 = down_N-1 and
-    up_k = (down_k + (N - 1 - k) tent(up_k+1)) / (N - k), the mean of the levels k and below;
-    the bloom is tent(up_0).
+    divided by their number N: up_N-1 = down_N-1, up_k = down_k + tent(up_k+1), and the bloom is
+    tent(up_0) / N. In buffers that end at 1, up_k is divided by the number of
+    levels in it, up_k = (down_k + (N - 1 - k) tent(up_k+1)) / (N - k), and the bloom, tent(up_0),
+    is the same.
 
     Parameters
     ----------
@@ -81,13 +81,16 @@ def passes(
         downs.append(source)
         framebuffers[f"down_{k}"] = source
 
-    mean = downs[-1]
+    means = store.high == 1
+    up = downs[-1]
     for k in range(len(sizes) - 2, -1, -1):
+        upsampled = _tent(up, sizes[k], settings.radius)
         below = len(sizes) - 1 - k
-        upsampled = _tent(mean, sizes[k], settings.radius)
-        mean = store((downs[k] + below * upsampled) / (below + 1))
-        framebuffers[f"up_{k}"] = mean
-    framebuffers["bloom"] = store(_tent(mean, size, settings.radius))
+        up = (downs[k] + below * upsampled) / (below + 1) if means else downs[k] + upsampled
+        up = store(up)
+        framebuffers[f"up_{k}"] = up
+    total = _tent(up, size, settings.radius)
+    framebuffers["bloom"] = store(total if means else total / len(sizes))
     return framebuffers
 
 

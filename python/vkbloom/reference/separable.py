@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
+from .image import Storage
 from .sampling import Array, sample
 
 __all__ = ["gain", "passes"]
@@ -37,7 +37,7 @@ def passes(
     glow: Array,
     settings: SeparableSettings,
     size: tuple[int, int],
-    store: Callable[[Array], Array],
+    store: Storage,
 ) -> dict[str, Array]:
     """Return the blur's framebuffers.
 

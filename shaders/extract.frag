@@ -1,0 +1,28 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// An image reduced to the size of the bloom buffers, then what of it is bright enough. NaN and
+// infinity count as 0 before they can reach a neighbour.
+#include "block.glsl"
+#include "finite.glsl"
+#include "threshold.glsl"
+
+#define TEXEL(value) vec4(finite_or_zero((value).rgb), 1.0)
+#include "sampling.glsl"
+
+UNIFORM_BLOCK(EXTRACT_BLOCK);
+#include "storage.glsl"
+
+layout(constant_id = 0) const int THRESHOLD_MODE = 0;
+layout(constant_id = 1) const int SAMPLING = SAMPLING_FETCH;
+
+layout(set = 0, binding = 1) uniform sampler2D image;
+
+layout(location = 0) out vec4 colour;
+
+void main()
+{
+    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    vec3 reduced = sample_at(image, position, SAMPLING).rgb;
+    vec3 bright = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
+    colour = vec4(storable(bright), 1.0);
+}

@@ -1,0 +1,27 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Dual Kawase, down: four times the centre and four diagonals, half a texel of the source times
+// the offset away (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015).
+#include "block.glsl"
+#include "sampling.glsl"
+
+UNIFORM_BLOCK(KAWASE_BLOCK);
+#include "storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+layout(location = 0) out vec4 colour;
+
+void main()
+{
+    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    vec2 diagonal = vec2(0.5, -0.5) * params.offset;
+    vec3 sum = 4.0 * sample_at(source, position, SAMPLING).rgb;
+    sum += sample_at(source, position + diagonal.xx, SAMPLING).rgb;
+    sum += sample_at(source, position + diagonal.xy, SAMPLING).rgb;
+    sum += sample_at(source, position + diagonal.yx, SAMPLING).rgb;
+    sum += sample_at(source, position + diagonal.yy, SAMPLING).rgb;
+    colour = vec4(storable(sum / 8.0), 1.0);
+}

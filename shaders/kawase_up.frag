@@ -1,0 +1,31 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Dual Kawase, up: four axial taps one texel of the smaller level times the offset away, and four
+// diagonal ones half as far that count twice (source: kawase_down.frag).
+#include "block.glsl"
+#include "sampling.glsl"
+
+UNIFORM_BLOCK(KAWASE_BLOCK);
+#include "storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+
+layout(set = 0, binding = 1) uniform sampler2D smaller;
+
+layout(location = 0) out vec4 colour;
+
+void main()
+{
+    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    vec2 axial = vec2(params.offset, 0.0);
+    vec2 diagonal = vec2(0.5, -0.5) * params.offset;
+    vec3 sum = sample_at(smaller, position + axial.xy, SAMPLING).rgb;
+    sum += sample_at(smaller, position - axial.xy, SAMPLING).rgb;
+    sum += sample_at(smaller, position + axial.yx, SAMPLING).rgb;
+    sum += sample_at(smaller, position - axial.yx, SAMPLING).rgb;
+    vec3 diagonals = sample_at(smaller, position + diagonal.xx, SAMPLING).rgb;
+    diagonals += sample_at(smaller, position + diagonal.xy, SAMPLING).rgb;
+    diagonals += sample_at(smaller, position + diagonal.yx, SAMPLING).rgb;
+    diagonals += sample_at(smaller, position + diagonal.yy, SAMPLING).rgb;
+    colour = vec4(storable((sum + 2.0 * diagonals) / 12.0), 1.0);
+}

@@ -1,0 +1,19 @@
+// What a shader writes to a target: kept inside the range of its format, for a value that overflowed
+// to infinity would spread over the picture in the passes after it; and for half floats rounded to
+// the nearest one, for some adapters (llvmpipe among them) cut the bits off, which makes a picture
+// darker pass by pass.
+
+vec3 nearest_half(vec3 value)
+{
+    uvec3 bits = floatBitsToUint(value);
+    // 13 bits of the mantissa go; ties to even. Below the smallest normal half the step is coarser
+    // than this, and nobody sees it.
+    bits += 0xfffu + ((bits >> 13) & 1u);
+    return uintBitsToFloat(bits & 0xffffe000u);
+}
+
+vec3 storable(vec3 value)
+{
+    vec3 kept = clamp(value, -params.limit, params.limit);
+    return params.limit == HALF_LIMIT ? nearest_half(kept) : kept;
+}
