@@ -65,6 +65,7 @@ class BuildCore(build_ext):
     """build_ext with the shaders compiled first and the compiler's options set."""
 
     def build_extension(self, ext: Extension) -> None:
+        """Build one extension, with the embedded shaders as one more source."""
         write_spirv()
         ext.include_dirs.append(str(SPIRV))
         ext.sources.append(str(SPIRV / "spirv.c"))

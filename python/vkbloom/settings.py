@@ -186,8 +186,8 @@ class Separable(Settings):
     loops : int
         Vertical and horizontal passes one after the other, 1 to 16 times.
     layers : sequence of (float, float)
-        (scale, strength), 1 to 8 of them, each number 0 to 16: each is a whole blur at blur_scale * scale, added with
-        its strength.
+        (scale, strength), 1 to 8 of them, each number 0 to 16: each is a whole blur at
+        blur_scale * scale, added with its strength.
     first_tap : {1, 0}
         0: the loop starts at the centre, which so gets w0 (1 + 2 strength).
     texel : {"own", "x"}

@@ -1,0 +1,5 @@
+"""``python -m vkbloom.cli``, the command line where the installed script is not on the path."""
+
+from vkbloom.cli import main
+
+main()

@@ -1,0 +1,23 @@
+"""The options that choose an adapter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+
+def device_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--adapter`` and ``--validation``, the arguments of `vkbloom.Renderer`."""
+    command = click.option(
+        "--validation",
+        is_flag=True,
+        help="Run with the Khronos validation layer; its first message is a failure.",
+    )(command)
+    return click.option(
+        "--adapter",
+        default="auto",
+        show_default=True,
+        help="auto, software, hardware, or a part of an adapter's name.",
+    )(command)

@@ -1,0 +1,65 @@
+"""``vkbloom doctor``: whether this machine can render, and if not, why."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Final
+
+import click
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+import vkbloom
+from vkbloom.cli.terminal import show
+from vkbloom.doctor import Finding, Report, examine
+
+_STYLES: Final = {"ok": "green", "note": "yellow", "problem": "bold red"}
+
+
+def _json(report: Report) -> str:
+    return json.dumps(
+        {
+            "version": vkbloom.__version__,
+            "can_render": report.can_render,
+            "findings": [dataclasses.asdict(finding) for finding in report.findings],
+        },
+        indent=2,
+    )
+
+
+def _table(findings: tuple[Finding, ...]) -> Table:
+    table = Table.grid(padding=(0, 2))
+    for _ in range(3):
+        table.add_column(overflow="fold")
+    for finding in findings:
+        table.add_row(Text(finding.status, _STYLES[finding.status]), finding.topic, finding.found)
+        if finding.advice:
+            table.add_row("", "", f"-> {finding.advice}")
+    return table
+
+
+def _verdict(report: Report) -> str:
+    problems = sum(finding.status == "problem" for finding in report.findings)
+    able = "This machine can render." if report.can_render else "Nothing can render here."
+    return f"{able} Problems found: {problems}."
+
+
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="Print one object with all findings.")
+def command(as_json: bool) -> int:
+    """Find out whether this machine can render, and if not, why.
+
+    Looks at the Vulkan loader, its drivers and layers, the adapters, the pipeline cache and the
+    optional packages, and makes a small test render whose right result is known. Exit status 1
+    where nothing can render.
+    """
+    with Console(stderr=True).status("Looking around"):
+        report = examine()
+    if as_json:
+        click.echo(_json(report))
+    else:
+        show(_table(report.findings))
+        click.echo(f"\n{_verdict(report)}")
+    return 0 if report.can_render else 1

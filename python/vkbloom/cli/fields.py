@@ -1,0 +1,211 @@
+"""Options made from the fields of dataclasses, so that a new field needs no new option here."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import re
+import types
+import typing
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol
+
+import click
+
+from vkbloom.cli.program import given
+
+if TYPE_CHECKING:
+    _ParamType = click.ParamType[Any]
+else:
+    # Generic in later versions of click only.
+    _ParamType = click.ParamType
+
+
+class _Word(_ParamType):
+    """A value that is written in one word, such as 256x256."""
+
+    def __init__(self, form: str, read: Callable[[str], Any]) -> None:
+        self.name = form
+        self._read = read
+
+    def convert(
+        self, value: str, param: click.Parameter | None, ctx: click.Context | None
+    ) -> object:
+        """Return what the word stands for."""
+        try:
+            return self._read(value)
+        except (ValueError, click.BadParameter):
+            self.fail(f"{value!r} is not of the form {self.name}", param, ctx)
+
+
+def _read_size(word: str) -> tuple[int, int]:
+    width, height = word.lower().split("x")
+    return int(width), int(height)
+
+
+def _read_numbers(word: str, separator: str = ",") -> tuple[float, ...]:
+    return tuple(float(number) for number in word.split(separator))
+
+
+def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
+    return tuple(_read_numbers(pair, ":") for pair in word.split(","))
+
+
+#: The type of an option for (width, height).
+SIZE: Final = _Word("WxH", _read_size)
+
+_FORMS: Final[Mapping[object, _ParamType]] = {
+    float: click.FLOAT,
+    int: click.INT,
+    tuple[int, int]: SIZE,
+    tuple[float, ...]: _Word("A,B,...", _read_numbers),
+    tuple[float, float, float]: _Word("X,Y,Z", _read_numbers),
+    tuple[tuple[float, float], ...]: _Word("A:B,C:D,...", _read_pairs),
+}
+
+
+def _form(annotation: object) -> _ParamType:
+    """Return the type of option that an annotation asks for.
+
+    Raises
+    ------
+    TypeError
+        There is none yet.
+    """
+    if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
+        (inner,) = (part for part in typing.get_args(annotation) if part is not types.NoneType)
+        return _or_none(_form(inner))
+    if typing.get_origin(annotation) is Literal:
+        return click.Choice(typing.get_args(annotation))
+    if annotation not in _FORMS:
+        raise TypeError(f"there is no form of option for {annotation!r}")
+    return _FORMS[annotation]
+
+
+def _or_none(form: _ParamType) -> _Word:
+    def read(word: str) -> object:
+        return None if word.lower() == "none" else form.convert(word, None, None)
+
+    choices = form.choices if isinstance(form, click.Choice) else [form.name]
+    return _Word("|".join([*choices, "none"]), read)
+
+
+def _described_parameters(kind: type) -> dict[str, str]:
+    """Return the first sentence on each parameter from a class's numpydoc docstring."""
+    # There is none where Python runs with -OO.
+    lines = inspect.cleandoc(kind.__doc__ or "").splitlines()
+    texts: dict[str, list[str]] = {}
+    names: list[str] = []
+    start = lines.index("Parameters") + 2 if "Parameters" in lines else len(lines)
+    for line, following in zip(lines[start:], [*lines[start + 1 :], ""], strict=True):
+        if following.startswith("---"):
+            break
+        if line.startswith(" "):
+            for name in names:
+                texts[name].append(line.strip())
+        elif line:
+            names = line.partition(" : ")[0].split(", ")
+            texts.update({name: [] for name in names})
+    return {
+        name: re.split(r"\.(?:\s|$)", " ".join(text))[0].replace("`", "")
+        for name, text in texts.items()
+    }
+
+
+def _spelled(value: object, separator: str = ",") -> str:
+    """Spell a default as it would be given as an option."""
+    match value:
+        case bool():
+            return "on" if value else "off"
+        case float():
+            return f"{value:.12g}"
+        case tuple():
+            return separator.join(_spelled(part, ":") for part in value)
+        case _:
+            return str(value).lower()
+
+
+class _Dataclass(Protocol):
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+
+@dataclasses.dataclass
+class _Field:
+    """A field that becomes an option."""
+
+    annotation: object
+    helps: list[str]
+
+
+def _collect(
+    kinds: Mapping[str, type[_Dataclass]], base: type[_Dataclass] | None
+) -> dict[str, _Field]:
+    """Return the fields of some dataclasses by name, without those of their base."""
+    inherited = {field.name for field in dataclasses.fields(base)} if base else set()
+    found: dict[str, _Field] = {}
+    for label, kind in kinds.items():
+        annotations = typing.get_type_hints(kind)
+        texts = _described_parameters(kind)
+        for declaration in dataclasses.fields(kind):
+            name = declaration.name
+            if name in inherited:
+                continue
+            field = found.setdefault(name, _Field(annotations[name], []))
+            if field.annotation != annotations[name]:
+                raise TypeError(f"{name} is {field.annotation} as well as {annotations[name]}")
+            default = f"{label and label + ', '}default {_spelled(declaration.default)}"
+            field.helps.append(f"{texts.get(name, '')} [{default}]".strip())
+    return found
+
+
+def options(
+    kinds: Mapping[str, type[_Dataclass]],
+    into: str,
+    *,
+    base: type[_Dataclass] | None = None,
+    prefix: str = "",
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that adds an option to a command for each field of some dataclasses.
+
+    Parameters
+    ----------
+    kinds : mapping of str to type
+        Dataclasses, by what the help calls them; "" for nothing. A field that several have becomes
+        one option, whose help has each one's text.
+    into : str
+        The command's keyword argument that gets those given by the user: a dict of field name to
+        value.
+    base : type, optional
+        A dataclass whose fields are left out.
+    prefix : str
+        Of the options' names, as in "camera-".
+
+    Raises
+    ------
+    TypeError
+        A field's type has no form of option, or fields of one name differ in type.
+    """
+    fields = _collect(kinds, base)
+    parameters = {name: f"{prefix}{name}".replace("-", "_") for name in fields}
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def run(**values: object) -> object:
+            every = {name: values.pop(parameter) for name, parameter in parameters.items()}
+            chosen = {name: every[name] for name in every if given(parameters[name])}
+            return command(**values, **{into: chosen})
+
+        for name, field in reversed(fields.items()):
+            option = f"{prefix}{name}".replace("_", "-")
+            is_flag = field.annotation is bool
+            run = click.option(
+                f"--{option}/--no-{option}" if is_flag else f"--{option}",
+                parameters[name],
+                default=None,
+                type=None if is_flag else _form(field.annotation),
+                help=" ".join(field.helps),
+            )(run)
+        return run
+
+    return decorate

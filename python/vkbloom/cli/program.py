@@ -1,0 +1,92 @@
+"""The program: its commands, and how whatever goes wrong becomes one line and an exit status."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Final, NoReturn
+
+import click
+from click.core import ParameterSource
+
+import vkbloom
+
+#: Each is a module of this package with a click command called `command`.
+COMMANDS: Final = ("render", "adapters", "doctor")
+
+_FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
+
+
+class Program(click.Group):
+    """A group whose commands are imported when they are called, and whose errors are one line.
+
+    The value that a command returns is the exit status, None being 0.
+    """
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands, in the order of the help."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command, None where there is no such command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"vkbloom.cli.{cmd_name}").command
+        return command
+
+    def main(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, prog_name: str | None = None, **options: Any
+    ) -> NoReturn:
+        """Run the program and exit: 0, 1 where it failed, 2 where it was used wrongly."""
+        options["standalone_mode"] = False
+        try:
+            status = super().main(args, prog_name, **options)
+        except click.UsageError as error:
+            where = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
+            _exit(2, error.format_message() + where)
+        except click.ClickException as error:
+            _exit(1, error.format_message())
+        except click.Abort:
+            _exit(1, "interrupted")
+        except _FAILURES as error:
+            _exit(1, _described(error))
+        sys.exit(status)
+
+
+def _described(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return str(error) or type(error).__name__
+
+
+def _exit(status: int, message: str) -> NoReturn:
+    click.echo(f"vkbloom: {' '.join(message.split())}", err=True)
+    sys.exit(status)
+
+
+@contextmanager
+def blaming_the_call() -> Iterator[None]:
+    """Turn a TypeError or ValueError of an argument into wrong use, which is exit status 2."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        raise click.UsageError(str(error)) from error
+
+
+def given(name: str) -> bool:
+    """Return whether a parameter of the running command is set by the user, not by default."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source not in (None, ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
+
+
+@click.group(
+    cls=Program,
+    # Without a command, an error of one line as for all wrong use, and not the whole help.
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+@click.version_option(package_name="vkbloom", message="%(prog)s %(version)s")
+def program() -> None:
+    """Render bloom and look at every framebuffer of it."""

@@ -1,0 +1,127 @@
+"""``vkbloom render``: a scene, once or as an animation, into image files."""
+
+from __future__ import annotations
+
+import os
+import typing
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import click
+from rich import box
+from rich.table import Table
+from tqdm import tqdm
+
+import vkbloom
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import SIZE
+from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.scene_options import scene_options
+from vkbloom.cli.settings_options import settings_options
+from vkbloom.cli.terminal import show
+from vkbloom.renderer import Shading
+
+_SHADINGS: Final = typing.get_args(Shading)
+
+
+@click.command()
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(),
+    help="The file, or the folder, to write to. NAME.exr: one file with all framebuffers; NAME.png "
+    "and others: a file for each; no extension: a folder of PNG files. What a format cannot hold "
+    "becomes an .exr beside it.",
+)
+@click.option(
+    "--size", type=SIZE, default="1280x720", show_default=True, help="Of the frame, in pixels."
+)
+@click.option(
+    "--time", default=0.0, show_default=True, help="Of the animation, in turns: 1 is 0 again."
+)
+@click.option(
+    "--frames",
+    "count",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Render this many frames of one whole turn, from --time on, into numbered files.",
+)
+@click.option("--shading", type=click.Choice(_SHADINGS), default=_SHADINGS[0], show_default=True)
+@click.option(
+    "--attachments",
+    metavar="all|NAME,...",
+    help="The framebuffers wanted [default all, of an animation final]",
+)
+@device_options
+@scene_options
+@settings_options
+def command(
+    *,
+    out: str,
+    size: tuple[int, int],
+    time: float,
+    count: int | None,
+    shading: Shading,
+    attachments: str | None,
+    adapter: str,
+    validation: bool,
+    scene: Callable[[], vkbloom.Scene],
+    settings: vkbloom.Settings,
+) -> None:
+    """Render a scene with its bloom and write the framebuffers."""
+    wanted = attachments or ("all" if count is None else "final")
+    loaded = scene()
+    written: list[Path] = []
+    seconds: dict[str, list[float]] = {}
+    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+        click.echo(f"Rendering on {renderer.info.summary}")
+        # None: shown where standard error is a terminal.
+        disable = True if count is None else None
+        turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
+        for index in turn:
+            with blaming_the_call():
+                frames = renderer.render(
+                    loaded,
+                    settings,
+                    size,
+                    time=time + index / (count or 1),
+                    attachments=wanted if wanted == "all" else wanted.split(","),
+                    shading=shading,
+                )
+                target = out if count is None else _numbered(out, index, count)
+                written += frames.save(target)
+            for name, duration in frames.timings.items():
+                seconds.setdefault(name, []).append(duration)
+    show(_times(seconds, "CPU" if renderer.info.type == "cpu" else "GPU"))
+    for line in _listed(written, is_animation=count is not None):
+        click.echo(line)
+
+
+def _numbered(out: str, index: int, count: int) -> Path:
+    """Return the file of one frame of an animation; makes the folder where `out` is one."""
+    target = Path(out)
+    number = f"{index:0{max(4, len(str(count - 1)))}}"
+    if target.is_dir() or not target.suffix or out.endswith(("/", os.sep)):
+        target.mkdir(parents=True, exist_ok=True)
+        return target / f"{number}.png"
+    return target.with_name(f"{target.stem}_{number}{target.suffix}")
+
+
+def _times(seconds: dict[str, list[float]], device: str) -> Table:
+    """Return a table of the time of each pass, the mean of the frames in which it ran."""
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("pass")
+    table.add_column(f"ms on the {device}", justify="right")
+    table.add_column("runs", justify="right")
+    for name, durations in seconds.items():
+        mean = sum(durations) / len(durations)
+        table.add_row(name, f"{1e3 * mean:.3f}", str(len(durations)))
+    return table
+
+
+def _listed(written: list[Path], *, is_animation: bool) -> list[str]:
+    if not is_animation or len(written) < 3:
+        return [f"wrote {path}" for path in written]
+    return [f"wrote {len(written)} files, {written[0]} to {written[-1]}"]

@@ -1,0 +1,64 @@
+"""The options that choose a scene: its files and its camera."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Any, Final
+
+import click
+
+from vkbloom import Camera, Scene, gltf, skybox
+from vkbloom.cli import fields
+from vkbloom.cli.program import blaming_the_call
+
+_BUILT_IN: Final = "ufo"
+_FACES: Final = 6
+
+
+def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of a scene to a command, which gets a function that loads it as `scene`.
+
+    The function raises OSError or ValueError for files that do not load, and click.UsageError for
+    options out of range.
+    """
+
+    @click.option(
+        "--scene",
+        "base",
+        default=_BUILT_IN,
+        metavar="ufo|PATH",
+        help=f"The mesh that is lit: a glTF file, or the built-in saucer [default {_BUILT_IN}]",
+    )
+    @click.option("--glow", type=click.Path(), help="The mesh that glows: a glTF file.")
+    @click.option(
+        "--skybox",
+        "sky",
+        type=click.Path(),
+        multiple=True,
+        help="Once: a KTX 1 cubemap or an equirectangular image. Six times: the images of the "
+        "faces +x, -x, +y, -y, +z, -z.",
+    )
+    @fields.options({"": Camera}, "camera", prefix="camera-")
+    @functools.wraps(command)
+    def run(
+        base: str, glow: str | None, sky: tuple[str, ...], camera: dict[str, Any], **rest: object
+    ) -> object:
+        if len(sky) not in (0, 1, _FACES):
+            raise click.UsageError(f"--skybox is given {len(sky)} times; once or six times it is")
+        return command(scene=lambda: _load(base, glow, sky, camera), **rest)
+
+    return run
+
+
+def _load(base: str, glow: str | None, sky: tuple[str, ...], camera: dict[str, Any]) -> Scene:
+    scene = Scene.ufo() if base == _BUILT_IN else Scene.from_gltf(base)
+    changes: dict[str, Any] = {}
+    if glow is not None:
+        changes["glow"] = gltf.load_mesh(glow)
+    if sky:
+        changes["skybox"] = skybox.load(sky[0] if len(sky) == 1 else list(sky))
+    with blaming_the_call():
+        changes["camera"] = dataclasses.replace(scene.camera, **camera)
+    return dataclasses.replace(scene, **changes)

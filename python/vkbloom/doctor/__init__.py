@@ -1,0 +1,217 @@
+"""Find out whether this machine can render, and if not, why.
+
+Nothing here raises for what is wrong with the machine: each thing looked at becomes a `Finding`.
+Whatever opens a driver happens in a process of its own (`vkbloom.doctor.child`), so that a driver
+that crashes becomes a finding as well.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from vkbloom.doctor import child, drivers, installation
+from vkbloom.doctor.finding import Finding, Status
+
+__all__ = ["Finding", "Report", "Status", "examine"]
+
+_VALIDATION_LAYER: Final = "VK_LAYER_KHRONOS_validation"
+#: Versions of Mesa whose lavapipe the package is tested with.
+TESTED_MESA: Final = ("22.3.6", "25.0.7")
+
+# A loader that finds much to complain about repeats itself.
+_MESSAGES: Final = 6
+
+_INSTALL_LOADER: Final = (
+    "Install the Vulkan loader (Debian, Ubuntu: apt install libvulkan1; Fedora: dnf install "
+    "vulkan-loader; Arch: pacman -S vulkan-icd-loader), and a driver as well."
+)
+_INSTALL_LAYER: Final = (
+    "Where validation=True is wanted: apt install vulkan-validationlayers (Debian, Ubuntu), "
+    "dnf install vulkan-validation-layers (Fedora), pacman -S vulkan-validation-layers (Arch)."
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that the doctor found.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+    can_render : bool
+        Whether the test render came out right on one adapter at least.
+    """
+
+    findings: tuple[Finding, ...]
+    can_render: bool
+
+
+def examine() -> Report:
+    """Look at everything that rendering needs, and make a test render on each adapter.
+
+    Returns
+    -------
+    Report
+
+    Notes
+    -----
+    Takes some seconds. The test render fills the pipeline cache, as any render does.
+    """
+    loader = child.ask("loader")
+    version, layers = _facts(loader)
+    listed = child.ask("adapters", environment={"VK_LOADER_DEBUG": "error,warn"})
+    adapters: list[Mapping[str, str]] = [] if listed.value is None else listed.value["adapters"]
+
+    chosen = child.ask("render", "auto", "plain")
+    renders = {} if chosen.value is None else {chosen.value["name"]: chosen}
+    for adapter in adapters:
+        if adapter["name"] not in renders:
+            renders[adapter["name"]] = child.ask("render", adapter["name"], "plain")
+    working = [name for name, answer in renders.items() if answer.value is not None]
+    foundation = [_loader(loader), *drivers.examine(version)]
+    has_problem = any(finding.status == "problem" for finding in foundation)
+    findings = [
+        installation.package(),
+        *foundation,
+        *installation.environment(),
+        _adapters(listed, has_problem),
+        *([_software(adapters)] if adapters else []),
+        *installation.gpu_nodes(any(adapter["type"] != "cpu" for adapter in adapters)),
+        *([_chosen(chosen)] if adapters else []),
+        *(_test_render(name, answer) for name, answer in renders.items()),
+        *_validation(layers, working[0] if working else None),
+        installation.cache([adapter["driver_uuid"] for adapter in adapters]),
+        *installation.extras(),
+    ]
+    can_render = any(
+        answer.value is not None and not answer.value["differences"] for answer in renders.values()
+    )
+    return Report(tuple(findings), can_render)
+
+
+def _facts(loader: child.Answer) -> tuple[tuple[int, ...] | None, Mapping[str, str] | None]:
+    """Return version and layers of the loader, None where they are not known."""
+    if loader.value is None:
+        return None, None
+    return tuple(map(int, loader.value["version"].split("."))), loader.value["layers"]
+
+
+def _loader(loader: child.Answer) -> Finding:
+    if loader.value is None:
+        return Finding("Vulkan loader", "problem", f"not found: {loader.failure}", _INSTALL_LOADER)
+    version, file = loader.value["version"], loader.value["file"] or "place unknown"
+    if version.startswith("1.0."):
+        return Finding(
+            "Vulkan loader",
+            "problem",
+            f"Vulkan {version}, {file}; 1.1 is needed",
+            "Install a newer Vulkan loader.",
+        )
+    return Finding("Vulkan loader", "ok", f"Vulkan {version}, {file}")
+
+
+def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
+    """Judge the list of adapters; `has_problem`: something below it does not work."""
+    if listed.value and listed.value["adapters"]:
+        names = [f"{entry['name']} ({entry['type']})" for entry in listed.value["adapters"]]
+        return Finding("adapters", "ok", ", ".join(names))
+    reason = listed.failure or "every driver was asked, and none has a device with Vulkan 1.1"
+    said = (
+        f"; the loader says: {' / '.join(listed.messages[:_MESSAGES])}" if listed.messages else ""
+    )
+    return Finding(
+        "adapters",
+        "problem",
+        f"none: {reason}{said}",
+        "See to the problems above first." if has_problem else drivers.INSTALL_DRIVER,
+    )
+
+
+def _software(adapters: list[Mapping[str, str]]) -> Finding:
+    topic = "lavapipe"
+    found = [adapter for adapter in adapters if adapter["type"] == "cpu"]
+    if not found:
+        return Finding(
+            topic,
+            "note",
+            'there is no software adapter, so adapter="software" will not work',
+            "Where that is wanted: apt install mesa-vulkan-drivers (Debian, Ubuntu).",
+        )
+    described = found[0]["driver_info"] or "no version"
+    tested = " and ".join(TESTED_MESA)
+    # As in "Mesa 22.3.6 (LLVM 15.0.6)".
+    if any(described.startswith(f"Mesa {version} ") for version in TESTED_MESA):
+        return Finding(topic, "ok", f"{described}, one of the tested versions ({tested})")
+    return Finding(
+        topic,
+        "note",
+        f"{described}; tested are {tested}, others are expected to work",
+        "Trust the test render below.",
+    )
+
+
+def _chosen(chosen: child.Answer) -> Finding:
+    topic = "chosen adapter"
+    wanted = os.environ.get("VKBLOOM_ADAPTER")
+    if wanted:
+        reason = f'VKBLOOM_ADAPTER is {wanted!r}, which takes the place of "auto"'
+        advice = "Correct or unset VKBLOOM_ADAPTER."
+    else:
+        reason = '"auto" takes discrete before integrated before virtual before cpu'
+        advice = 'Choose another one: VKBLOOM_ADAPTER=software, "hardware" or a part of its name.'
+    if chosen.value is None:
+        return Finding(topic, "problem", f"{reason}, and fails: {chosen.failure}", advice)
+    return Finding(topic, "ok", f"{chosen.value['summary']}; {reason}")
+
+
+def _test_render(name: str, answer: child.Answer) -> Finding:
+    topic = "test render"
+    if answer.value is None:
+        return Finding(
+            topic,
+            "problem",
+            f"{name} fails: {answer.failure}",
+            "Update its driver, or use another adapter.",
+        )
+    if answer.value["differences"]:
+        return Finding(
+            topic,
+            "problem",
+            f"{name} renders wrong: {'; '.join(answer.value['differences'])}",
+            "Update its driver, or use another adapter; its framebuffers can't be trusted.",
+        )
+    milliseconds = 1e3 * sum(answer.value["timings"].values())
+    whole = 1e3 * answer.value["seconds"]
+    return Finding(
+        topic,
+        "ok",
+        f"{name} renders right: its framebuffers agree with the figures that they must have "
+        f"({milliseconds:.2f} ms in its passes, {whole:.0f} ms with setting up)",
+    )
+
+
+def _validation(layers: Mapping[str, str] | None, adapter: str | None) -> Iterator[Finding]:
+    """Judge the validation layer, by a test render on an adapter that works without it."""
+    topic = "validation layer"
+    if layers is None:
+        return
+    if _VALIDATION_LAYER not in layers:
+        yield Finding(topic, "note", f"{_VALIDATION_LAYER} is not installed", _INSTALL_LAYER)
+        return
+    version = layers[_VALIDATION_LAYER]
+    if adapter is None:
+        yield Finding(topic, "ok", f"installed, version {version}; not tried, as nothing renders")
+        return
+    answer = child.ask("render", adapter, "validated")
+    if answer.value is None:
+        yield Finding(
+            topic,
+            "problem",
+            f"version {version} is installed, but the test render fails with it: {answer.failure}",
+            "Install the layer again, in the version of the loader; or do without validation.",
+        )
+    else:
+        yield Finding(topic, "ok", f"version {version}; the test render passes it")

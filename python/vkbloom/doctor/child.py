@@ -1,0 +1,124 @@
+"""Run what may crash, such as a broken driver, in a process of its own, and bring back its answer.
+
+A driver is native code from elsewhere: it can end the process that opens it, print to its standard
+output, or never return. In a child each of these becomes a sentence.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+TIMEOUT: Final = 60.0
+#: What the line with a probe's answer begins with: drivers and layers print on stdout as well.
+ANSWER_MARK: Final = "vkbloom-probe "
+_OPEN_DRIVER: Final = "import ctypes, sys; ctypes.CDLL(sys.argv[1]).vk_icdGetInstanceProcAddr"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a child process found.
+
+    Attributes
+    ----------
+    value : mapping or None
+        Its findings; None where it failed.
+    failure : str
+        Why it failed, in one sentence; "" where it did not.
+    messages : tuple of str
+        What it wrote to its standard error, line by line.
+    """
+
+    value: Mapping[str, Any] | None
+    failure: str = ""
+    messages: tuple[str, ...] = ()
+
+
+def ask(*question: str, environment: Mapping[str, str] | None = None) -> Answer:
+    """Run `vkbloom.doctor.probe` with arguments and return what it found.
+
+    Parameters
+    ----------
+    *question : str
+        The arguments.
+    environment : mapping of str to str, optional
+        Variables to set on top of this process's own.
+
+    Returns
+    -------
+    Answer
+    """
+    ended = _run(["-m", "vkbloom.doctor.probe", *question], environment)
+    if isinstance(ended, str):
+        return Answer(None, ended)
+    messages = tuple(line for line in ended.stderr.splitlines() if line.strip())
+    if ended.returncode:
+        return Answer(None, _ending(ended), messages)
+    answers = [line for line in ended.stdout.splitlines() if line.startswith(ANSWER_MARK)]
+    if not answers:
+        return Answer(None, "the process that tried it ended without an answer", messages)
+    value: dict[str, Any] = json.loads(answers[0].removeprefix(ANSWER_MARK))
+    if "failure" in value:
+        return Answer(None, value["failure"], messages)
+    return Answer(value, messages=messages)
+
+
+def why_driver_does_not_open(library: str) -> str:
+    """Open a driver's library as the Vulkan loader would.
+
+    Parameters
+    ----------
+    library : str
+        A path, or a file name that the system's search finds.
+
+    Returns
+    -------
+    str
+        Why it cannot be used, in one sentence; "" where it can.
+    """
+    ended = _run(["-c", _OPEN_DRIVER, library], None)
+    if isinstance(ended, str):
+        return ended
+    return _ending(ended) if ended.returncode else ""
+
+
+def _run(
+    arguments: list[str], environment: Mapping[str, str] | None
+) -> subprocess.CompletedProcess[str] | str:
+    """Return the ended process, or why there is none."""
+    if not sys.executable:
+        return "this Python does not know its own executable, so no process was started"
+    try:
+        return subprocess.run(
+            [sys.executable, *arguments],
+            env={**os.environ, **(environment or {})},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=TIMEOUT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"no answer within {TIMEOUT:g} s"
+    except OSError as error:
+        return f"{sys.executable} does not start: {error.strerror}"
+
+
+def _ending(ended: subprocess.CompletedProcess[str]) -> str:
+    """Say how a process ended that did not end well."""
+    if ended.returncode < 0:
+        try:
+            name = signal.Signals(-ended.returncode).name
+        except ValueError:
+            name = "unnamed"
+        return f"the process that tried it was ended by signal {-ended.returncode} ({name})"
+    lines = ended.stderr.strip().splitlines()
+    # The last line of a Python traceback is "<type>: <message>".
+    return lines[-1].partition(": ")[2] or lines[-1] if lines else f"exit {ended.returncode}"

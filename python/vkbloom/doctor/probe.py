@@ -1,0 +1,158 @@
+"""What the doctor runs in processes of their own: ``python -m vkbloom.doctor.probe <what>``.
+
+Prints one line of JSON behind `ANSWER_MARK`; ``{"failure": ...}`` where what was tried failed.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import vkbloom
+from vkbloom import _core
+from vkbloom.doctor import trial
+from vkbloom.doctor.child import ANSWER_MARK
+
+# As the core looks for it.
+_LOADER_NAMES: Final = {
+    "win32": ("vulkan-1.dll",),
+    "darwin": ("libvulkan.dylib", "libvulkan.1.dylib", "libMoltenVK.dylib"),
+}
+_LINUX_LOADER_NAMES: Final = ("libvulkan.so.1", "libvulkan.so")
+
+
+class _Symbol(ctypes.Structure):
+    """Dl_info of dlfcn.h."""
+
+    _fields_ = (
+        ("file", ctypes.c_char_p),
+        ("base", ctypes.c_void_p),
+        ("name", ctypes.c_char_p),
+        ("address", ctypes.c_void_p),
+    )
+
+
+class _Layer(ctypes.Structure):
+    """VkLayerProperties of vulkan_core.h."""
+
+    _fields_ = (
+        ("name", ctypes.c_char * 256),
+        ("spec_version", ctypes.c_uint32),
+        ("implementation_version", ctypes.c_uint32),
+        ("description", ctypes.c_char * 256),
+    )
+
+
+def _version(packed: int) -> str:
+    """Unpack VK_MAKE_API_VERSION."""
+    return f"{packed >> 22 & 0x7F}.{packed >> 12 & 0x3FF}.{packed & 0xFFF}"
+
+
+def _open_loader() -> ctypes.CDLL:
+    failures = []
+    for name in _LOADER_NAMES.get(sys.platform, _LINUX_LOADER_NAMES):
+        try:
+            return ctypes.CDLL(name)
+        except OSError as error:
+            failures.append(str(error))
+    raise OSError("; ".join(failures))
+
+
+def _file_of(library: ctypes.CDLL) -> str:
+    """Return the file that a library was opened from, "" where the system does not tell."""
+    if sys.platform == "win32":
+        return ""
+    symbol = _Symbol()
+    address = ctypes.cast(library.vkGetInstanceProcAddr, ctypes.c_void_p)
+    found = ctypes.CDLL(None).dladdr(address, ctypes.byref(symbol))
+    return symbol.file.decode(errors="replace") if found and symbol.file else ""
+
+
+def _layers(library: ctypes.CDLL) -> dict[str, str]:
+    """Return the versions of the layers that the loader lists, by name."""
+    count = ctypes.c_uint32()
+    if library.vkEnumerateInstanceLayerProperties(ctypes.byref(count), None):
+        return {}
+    layers = (_Layer * count.value)()
+    if library.vkEnumerateInstanceLayerProperties(ctypes.byref(count), layers) < 0:
+        return {}
+    return {
+        layer.name.decode(errors="replace"): _version(layer.spec_version)
+        for layer in layers[: count.value]
+    }
+
+
+def loader() -> dict[str, Any]:
+    """Return the Vulkan loader's file and version, and the versions of the layers by name."""
+    library = _open_loader()
+    version = ctypes.c_uint32(1 << 22)
+    # Vulkan 1.0 has no such function.
+    if hasattr(library, "vkEnumerateInstanceVersion"):
+        library.vkEnumerateInstanceVersion(ctypes.byref(version))
+    return {
+        "file": _file_of(library),
+        "version": _version(version.value),
+        "layers": _layers(library),
+    }
+
+
+def adapters() -> dict[str, Any]:
+    """Return the adapters that vkbloom can use."""
+    return {
+        "adapters": [
+            {"name": name, "type": kind, "driver_info": driver_info, "driver_uuid": uuid.hex()}
+            for name, kind, _, driver_info, _, uuid in _core.adapters()
+        ]
+    }
+
+
+def render(adapter: str, validation: str) -> dict[str, Any]:
+    """Make the test render; with the validation layer where `validation` is "validated"."""
+    with vkbloom.Renderer(adapter, validation=validation == "validated") as renderer:
+        start = time.perf_counter()
+        frames = trial.render(renderer)
+        return {
+            "name": renderer.info.name,
+            "summary": renderer.info.summary,
+            "seconds": time.perf_counter() - start,
+            "timings": dict(frames.timings),
+            "differences": trial.differences(frames),
+        }
+
+
+_QUESTIONS: Final[Mapping[str, Callable[..., dict[str, Any]]]] = {
+    "loader": loader,
+    "adapters": adapters,
+    "render": render,
+}
+
+
+def _told(error: Exception) -> str:
+    """Tell what went wrong in one line."""
+    text = " ".join(str(error).split())
+    if isinstance(error, vkbloom.AdapterNotFoundError):
+        # What follows says what to install and to ask the doctor, who is speaking already.
+        return text.partition(". ")[0]
+    if text and isinstance(error, (vkbloom.Error, OSError)):
+        return text
+    return f"{type(error).__name__}: {text}"
+
+
+def main() -> None:
+    """Answer what the command line asks."""
+    what, *arguments = sys.argv[1:]
+    try:
+        value = _QUESTIONS[what](*arguments)
+    except Exception as error:
+        # Whatever it is, it is what the doctor shall report.
+        value = {"failure": _told(error)}
+    # A driver may have left an unfinished line.
+    print(f"\n{ANSWER_MARK}{json.dumps(value)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
