@@ -28,7 +28,9 @@ def times(rendered: dict[str, vkbloom.Frames], device: str) -> Table:
     table.add_column(f"pass, ms on the {device}")
     for name in rendered:
         table.add_column(name.replace("_", " "), justify="right")
-    for name in dict.fromkeys(name for frames in rendered.values() for name in frames.timings):
+    # The longest list first: the passes come in the order in which they run.
+    by_length = sorted(rendered.values(), key=lambda frames: -len(frames.timings))
+    for name in dict.fromkeys(name for frames in by_length for name in frames.timings):
         seconds = [frames.timings.get(name) for frames in rendered.values()]
         table.add_row(name, *("-" if time is None else f"{1e3 * time:.3f}" for time in seconds))
     sums = [sum(frames.timings.values()) for frames in rendered.values()]
@@ -49,8 +51,10 @@ def main(out: Path, adapter: str) -> None:
         "bloom_off": vkbloom.Separable(bloom=False),
         "bloom_on": vkbloom.Separable(),
     }.items():
-        # A renderer of its own for each, so that every pass runs, and is timed, in both.
+        # A renderer of its own for each, so that every pass runs, and is timed, in both. The first
+        # frame is of another time and only there to have the pipelines compiled.
         with vkbloom.Renderer(adapter) as renderer:
+            renderer.render(scene, settings, SIZE, time=0.5)
             rendered[name] = renderer.render(scene, settings, SIZE)
             info = renderer.info
 
