@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import sys
+from importlib.util import find_spec
 
 
 def main() -> None:
     """Run the command line and exit with its status: 0, 1 (failed) or 2 (wrong use)."""
-    try:
-        # Late, because the packages of the extra may be missing, which shall be one line.
-        from vkbloom.cli.program import program  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        if error.name not in {"click", "rich", "tqdm"}:
-            raise
-        sys.exit(f"vkbloom: the command line needs {error.name}: pip install vkbloom[cli]")
+    missing = [name for name in ("click", "rich", "tqdm") if find_spec(name) is None]
+    if missing:
+        needed = " and ".join(missing)
+        sys.exit(f"vkbloom: the command line needs {needed}: pip install vkbloom[cli]")
+    # Late, because it imports what may be missing.
+    from vkbloom.cli.program import program  # noqa: PLC0415
+
     program()

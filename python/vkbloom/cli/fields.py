@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import itertools
 import re
 import types
 import typing
@@ -28,6 +29,10 @@ class _Word(_ParamType):
     def __init__(self, form: str, read: Callable[[str], Any]) -> None:
         self.name = form
         self._read = read
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """Return what stands for the value in the help."""
+        return self.name
 
     def convert(
         self, value: str, param: click.Parameter | None, ctx: click.Context | None
@@ -98,7 +103,7 @@ def _described_parameters(kind: type) -> dict[str, str]:
     texts: dict[str, list[str]] = {}
     names: list[str] = []
     start = lines.index("Parameters") + 2 if "Parameters" in lines else len(lines)
-    for line, following in zip(lines[start:], [*lines[start + 1 :], ""], strict=True):
+    for line, following in itertools.pairwise([*lines[start:], ""]):
         if following.startswith("---"):
             break
         if line.startswith(" "):

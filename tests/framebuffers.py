@@ -1,0 +1,95 @@
+"""Made-up framebuffers, and readers of the files that come of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from vkbloom import Separable, Settings
+from vkbloom.frames import Frames
+
+INFO = {
+    "adapter": "Some <GPU> & co",
+    "driver": "driver 1.2",
+    "version": "0.1.0",
+    "nan": 3,
+    "inf": 0,
+}
+TIMINGS = {"glow": 0.001, "blur_vertical": 0.004, "composite": 0.002}
+
+
+def make(
+    arrays: Mapping[str, NDArray[Any]],
+    *,
+    timings: Mapping[str, float] = TIMINGS,
+    settings: Settings | None = None,
+) -> Frames:
+    return Frames(
+        arrays, timings=timings, settings=settings or Separable(blur_scale=2.0), info=INFO
+    )
+
+
+def noise(*shape: int, dtype: str, seed: int = 1) -> NDArray[Any]:
+    generator = np.random.default_rng(seed)
+    if dtype == "uint8":
+        return generator.integers(0, 256, shape, dtype=np.uint8)
+    return (generator.standard_normal(shape) * 100).astype(dtype)
+
+
+def mixed() -> Frames:
+    """Return Frames of every dtype, of two sizes, with three and four channels, and depth."""
+    return make(
+        {
+            "glow": noise(5, 7, 4, dtype="float16"),
+            "glow_depth": noise(5, 7, dtype="float32"),
+            "blur_vertical": noise(5, 7, 4, dtype="float16"),
+            "scene": noise(11, 13, 3, dtype="float32"),
+            "depth": noise(11, 13, dtype="float32"),
+            "final": noise(11, 13, 4, dtype="uint8"),
+        }
+    )
+
+
+@dataclasses.dataclass
+class Part:
+    pixels: NDArray[Any]
+    channels: tuple[str, ...]
+    attributes: dict[str, Any]
+
+
+def read(file: Path) -> dict[str, Part]:
+    """Read every part of a file with its stored values, alpha not multiplied in."""
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    reader = oiio.ImageInput.open(str(file), config)
+    assert reader is not None, oiio.geterror()
+    parts = {}
+    index = 0
+    while reader.seek_subimage(index, 0):
+        spec = reader.spec()
+        pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
+        assert pixels is not None, reader.geterror()
+        parts[spec.getattribute("oiio:subimagename") or ""] = Part(
+            pixels,
+            tuple(spec.channelnames),
+            {attribute.name: attribute.value for attribute in spec.extra_attribs},
+        )
+        index += 1
+    reader.close()
+    return parts
+
+
+def decode(data: bytes | None, folder: Path) -> NDArray[np.uint8]:
+    assert data is not None
+    (folder / "decoded.png").write_bytes(data)
+    return read(folder / "decoded.png")[""].pixels
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(file.name for file in folder.iterdir())

@@ -1,0 +1,528 @@
+"""The command line: options, files, exit statuses and errors of one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom.cli import fields
+from vkbloom.cli.program import COMMANDS, blaming_the_call, program
+from vkbloom.cli.settings_options import METHODS, settings_options
+from vkbloom.scene import Camera, Scene
+
+oiio = pytest.importorskip("OpenImageIO")
+
+ASSETS = Path(vkbloom.__file__).parent / "assets"
+SMALL = ("--size", "48x32", "--adapter", "software", "--bloom-size", "16x16")
+SMALL_SETTINGS = vkbloom.Separable(bloom_size=(16, 16))
+
+
+def vkb(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(program, [str(argument) for argument in arguments])
+
+
+def one_line(stderr: str) -> str:
+    """Return an error without the program's name, having checked that it is one line."""
+    assert stderr.startswith("vkbloom: ")
+    assert stderr.count("\n") == 1
+    assert "Traceback" not in stderr
+    return stderr.removeprefix("vkbloom: ")
+
+
+def pixels(path: Path) -> NDArray[Any]:
+    image = oiio.ImageBuf(str(path))
+    assert not image.has_error, image.geterror()
+    read: NDArray[Any] = image.get_pixels(image.spec().format)
+    return read
+
+
+def rendered(**arguments: Any) -> vkbloom.Frames:
+    with vkbloom.Renderer("software") as renderer:
+        scene = arguments.pop("scene", None) or Scene.ufo()
+        settings = arguments.pop("settings", SMALL_SETTINGS)
+        return renderer.render(scene, settings, (48, 32), **arguments)
+
+
+def rgb(array: NDArray[Any]) -> NDArray[Any]:
+    return array[..., :3]
+
+
+# The program
+
+
+def test_the_help_names_every_command() -> None:
+    result = vkb("--help")
+    assert result.exit_code == 0
+    for name in COMMANDS:
+        assert re.search(rf"^  {name} +\w", result.stdout, re.M)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help(name: str) -> None:
+    result = vkb(name, "--help")
+    assert result.exit_code == 0
+    assert result.stdout.startswith(f"Usage: program {name}")
+    assert result.stderr == ""
+
+
+def test_it_tells_its_version() -> None:
+    assert vkb("--version").stdout == f"program {vkbloom.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "Missing command"),
+        (("rendr",), "No such command 'rendr'"),
+        (("render",), "Missing option '-o'"),
+        (("render", "-o", "x.png", "--nonsense"), "--nonsense"),
+        (("adapters", "more"), "more"),
+    ],
+)
+def test_wrong_use_is_one_line_and_status_2(arguments: tuple[str, ...], message: str) -> None:
+    result = vkb(*arguments)
+    assert result.exit_code == 2
+    assert message in one_line(result.stderr)
+    assert "--help)" in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (vkbloom.DeviceLostError("the device\nis lost"), "the device is lost"),
+        (FileNotFoundError(2, "No such file or directory", "a.png"), "a.png: No such file"),
+        (OSError("damaged"), "damaged"),
+        (ValueError("a.gltf: damaged"), "a.gltf: damaged"),
+        (ModuleNotFoundError("pip install vkbloom[scenes]"), "pip install vkbloom[scenes]"),
+        (MemoryError(), "MemoryError"),
+    ],
+)
+def test_a_failure_is_one_line_and_status_1(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException, message: str
+) -> None:
+    def fail() -> None:
+        raise error
+
+    monkeypatch.setattr(vkbloom, "adapters", fail)
+    result = vkb("adapters")
+    assert result.exit_code == 1
+    assert one_line(result.stderr).startswith(message)
+
+
+def test_an_interrupt_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(vkbloom, "adapters", interrupt)
+    result = vkb("adapters")
+    # The first line break ends the line on which a terminal shows ^C.
+    assert (result.exit_code, result.stderr) == (1, "\nvkbloom: interrupted\n")
+
+
+def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vkbloom, "adapters", lambda: {}["missing"])
+    assert isinstance(vkb("adapters").exception, KeyError)
+
+
+# Options from fields
+
+
+@click.command()
+@settings_options
+def chosen(settings: vkbloom.Settings) -> vkbloom.Settings:
+    return settings
+
+
+def settings_from(*arguments: str) -> Any:
+    return chosen.main(list(arguments), standalone_mode=False)
+
+
+@pytest.mark.parametrize("kind", METHODS.values(), ids=list(METHODS))
+def test_every_field_of_every_method_is_an_option(kind: type[vkbloom.Settings]) -> None:
+    names = {option for parameter in chosen.params for option in parameter.opts}
+    assert names >= {f"--{field.name.replace('_', '-')}" for field in dataclasses.fields(kind)}
+
+
+def test_every_method_is_there() -> None:
+    assert set(METHODS) >= {"separable"}
+    for name, kind in METHODS.items():
+        assert settings_from("--method", name) == kind()
+
+
+def test_every_preset_is_there() -> None:
+    for name, settings in vkbloom.presets.items():
+        assert settings_from("--preset", name) == settings
+
+
+def test_the_default_is_the_renderers() -> None:
+    assert settings_from() == vkbloom.Separable()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "changes"),
+    [
+        ("--blur-scale 0.5", {"blur_scale": 0.5}),
+        ("--weights 0.2,0.1", {"weights": (0.2, 0.1)}),
+        ("--weights 1", {"weights": (1.0,)}),
+        ("--layers 1:1,2:0.5", {"layers": ((1.0, 1.0), (2.0, 0.5))}),
+        ("--threshold 0.25 --knee 0.5", {"threshold": 0.25, "knee": 0.5}),
+        ("--threshold none", {"threshold": None}),
+        ("--no-bloom", {"bloom": False}),
+        ("--bloom", {"bloom": True}),
+        ("--direct", {"direct": True}),
+        ("--bloom-size 320x200", {"bloom_size": (320, 200)}),
+        ("--bloom-size none", {"bloom_size": None}),
+        ("--format rgba16float", {"format": "rgba16float"}),
+        ("--format none", {"format": None}),
+        ("--tonemap none", {"tonemap": "none"}),
+        ("--tonemap agx --exposure -1.5", {"tonemap": "agx", "exposure": -1.5}),
+        ("--loops 3 --first-tap 0 --texel x", {"loops": 3, "first_tap": 0, "texel": "x"}),
+    ],
+)
+def test_options_become_settings(arguments: str, changes: dict[str, Any]) -> None:
+    assert settings_from(*arguments.split()) == vkbloom.Separable(**changes)
+
+
+def test_options_change_a_preset() -> None:
+    changed = settings_from("--preset", "outline", "--blur-strength", "2")
+    assert changed == vkbloom.presets["outline"].replace(blur_strength=2.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("--blur-scale 17", "blur_scale: 17.0 is out of range, 0 to 16"),
+        ("--blur-scale nan", "blur_scale: nan is out of range"),
+        ("--blur-scale wide", "'--blur-scale': 'wide'"),
+        ("--loops 1.5", "'--loops': '1.5'"),
+        ("--loops 0", "loops: 0 is out of range, 1 to 16"),
+        ("--weights 1,x", "'--weights': '1,x' is not of the form A,B,..."),
+        ("--layers 1,2", "layers: ((1.0,), (2.0,)) must hold (scale, strength) pairs"),
+        ("--bloom-size 256", "'--bloom-size': '256' is not of the form WxH|none"),
+        ("--bloom-size 0x5", "bloom_size: (0, 5) is out of range"),
+        ("--format rgba8", "'--format': 'rgba8' is not of the form rgba8unorm|"),
+        ("--tonemap filmic", "'--tonemap': 'filmic' is not one of 'none'"),
+        ("--threshold high", "'--threshold': 'high' is not of the form float|none"),
+        ("--method box", "'--method': 'box'"),
+        ("--size 48", "'--size': '48' is not of the form WxH"),
+        ("--size 0x8", "size: (0, 8) is out of range"),
+        ("--time nan", "time: nan is out of range"),
+        ("--frames 0", "'--frames': 0 is not in the range x>=1"),
+        ("--attachments final,glare", "attachments: there is no 'glare' here, only glow"),
+        ("--camera-fov 180", "fov is 180.0; over 0 and under 180"),
+        ("--camera-position 1,2", "position has 2 entries; three are needed"),
+        ("--skybox a.png --skybox b.png", "--skybox is given 2 times"),
+    ],
+)
+def test_values_out_of_range_are_wrong_use(tmp_path: Path, arguments: str, message: str) -> None:
+    result = vkb("render", "-o", tmp_path / "out.png", *SMALL, *arguments.split())
+    assert result.exit_code == 2
+    assert message in one_line(result.stderr)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_method_has_no_field_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class Box(vkbloom.Settings):
+        method = "box"
+        radius: float = 1.0
+
+    monkeypatch.setitem(METHODS, "box", Box)
+    command = settings_options(lambda settings: settings)
+    changed = click.command(command).main(
+        ["--method", "box", "--radius", "3", "--knee", "0.5"], standalone_mode=False
+    )
+    assert changed == Box(radius=3.0, knee=0.5)
+    with pytest.raises(click.UsageError, match="the method separable has no --radius"):
+        click.command(command).main(["--radius", "3"], standalone_mode=False)
+    with pytest.raises(click.UsageError, match="--preset tutorial is of the method separable"):
+        click.command(command).main(
+            ["--method", "box", "--preset", "tutorial"], standalone_mode=False
+        )
+
+
+def test_the_help_of_an_option_is_the_fields_docstring() -> None:
+    @dataclasses.dataclass
+    class Lens:
+        """Of a camera.
+
+        Parameters
+        ----------
+        width, height : float
+            In `mm`, 0.5 to 2. Not less.
+        shape : {"round", "flat"}
+            As seen
+            from the front.
+
+        Notes
+        -----
+        width : float
+            Not this one.
+        """
+
+        width: float = 1.0
+        height: float = 0.5
+        shape: Literal["round", "flat"] = "flat"
+
+    command = click.command(fields.options({"": Lens, "big": Lens}, "lens")(lambda lens: lens))
+    assert [(option.name, getattr(option, "help", None)) for option in command.params] == [
+        ("width", "In mm, 0.5 to 2 [default 1] In mm, 0.5 to 2 [big, default 1]"),
+        ("height", "In mm, 0.5 to 2 [default 0.5] In mm, 0.5 to 2 [big, default 0.5]"),
+        (
+            "shape",
+            "As seen from the front [default flat] As seen from the front [big, default flat]",
+        ),
+    ]
+
+
+def test_a_field_that_no_option_can_give_is_refused() -> None:
+    @dataclasses.dataclass
+    class Odd:
+        table: dict[str, float]
+
+    with pytest.raises(TypeError, match=r"no form of option for dict\[str, float\]"):
+        fields.options({"": Odd}, "odd")(lambda odd: odd)
+
+
+def test_fields_of_one_name_and_two_types_are_refused() -> None:
+    one = dataclasses.make_dataclass("one", [("radius", float, 1.0)])
+    other = dataclasses.make_dataclass("other", [("radius", int, 1)])
+    with pytest.raises(TypeError, match="radius is"):
+        fields.options({"one": one, "other": other}, "both")
+
+
+@pytest.mark.parametrize("error", [TypeError, ValueError])
+def test_arguments_are_blamed_with_their_own_words(error: type[Exception]) -> None:
+    with pytest.raises(click.UsageError, match="size: too small"), blaming_the_call():
+        raise error("size: too small")
+
+
+# render
+
+
+def test_render_writes_every_framebuffer(tmp_path: Path) -> None:
+    result = vkb("render", "-o", tmp_path / "out.png", *SMALL)
+    assert (result.exit_code, result.stderr) == (0, "")
+    expected = rendered()
+    depths = {"glow_depth", "depth"}
+    names = {f"out_{name}.{'exr' if name in depths else 'png'}" for name in expected}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    for name, array in expected.items():
+        if name not in depths:
+            assert (rgb(pixels(tmp_path / f"out_{name}.png")) == rgb(array)).all()
+
+
+def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:
+    stdout = vkb("render", "-o", tmp_path / "out.exr", *SMALL).stdout
+    with vkbloom.Renderer("software") as renderer:
+        assert stdout.startswith(f"Rendering on {renderer.info.summary}\n")
+    assert "ms on the CPU" in stdout
+    times = dict(re.findall(r"^ +(\w+) +(\d+\.\d{3}) +1$", stdout, re.M))
+    assert list(times) == list(rendered().timings)
+    assert all(0 < float(time) < 60_000 for time in times.values())
+    assert stdout.endswith(f"\nwrote {tmp_path / 'out.exr'}\n")
+
+
+@pytest.mark.parametrize("out", ["folder", "folder/"])
+def test_render_writes_into_a_folder(tmp_path: Path, out: str) -> None:
+    result = vkb("render", "-o", f"{tmp_path}/{out}", *SMALL, "--attachments", "final,bloom")
+    assert result.exit_code == 0
+    assert {path.name for path in (tmp_path / "folder").iterdir()} == {"bloom.png", "final.png"}
+
+
+def test_render_uses_settings_time_and_camera(tmp_path: Path) -> None:
+    out = tmp_path / "out.png"
+    result = vkb(
+        *("render", "-o", out, *SMALL, "--attachments", "final", "--time", "0.25"),
+        *("--blur-strength", "3", "--camera-position", "0,0,-14", "--camera-fov", "30"),
+    )
+    assert result.exit_code == 0
+    expected = rendered(
+        scene=Scene.ufo().with_camera(Camera(position=(0, 0, -14), fov=30)),
+        settings=SMALL_SETTINGS.replace(blur_strength=3.0),
+        time=0.25,
+    )
+    assert (rgb(pixels(out)) == rgb(expected["final"])).all()
+    assert (rgb(expected["final"]) != rgb(rendered()["final"])).any()
+
+
+def test_render_loads_scenes(tmp_path: Path) -> None:
+    body, glow = ASSETS / "saucer.gltf", ASSETS / "saucer_glow.gltf"
+    faces = [ASSETS / f"starfield_{face}.png" for face in ("px", "nx", "py", "ny", "pz", "nz")]
+    skies = itertools.chain.from_iterable(("--skybox", face) for face in faces)
+    for name, options, scene in (
+        ("plain", (), Scene.from_gltf(body)),
+        ("all", ("--glow", glow, *skies), Scene.ufo()),
+        ("one", ("--skybox", faces[0]), Scene.from_gltf(body, skybox=faces[0])),
+    ):
+        out = tmp_path / f"{name}.png"
+        wanted = ("--scene", body, "--attachments", "final", *options)
+        result = vkb("render", "-o", out, *SMALL, *wanted)
+        assert (result.exit_code, result.stderr) == (0, "")
+        assert (rgb(pixels(out)) == rgb(rendered(scene=scene)["final"])).all()
+
+
+def test_an_animation_is_one_turn_in_numbered_files(tmp_path: Path) -> None:
+    result = vkb("render", "-o", tmp_path / "a.png", *SMALL, "--frames", "3", "--time", "0.5")
+    assert (result.exit_code, result.stderr) == (0, "")
+    paths = [tmp_path / f"a_{index:04}.png" for index in range(3)]
+    assert sorted(tmp_path.iterdir()) == paths
+    for index, path in enumerate(paths):
+        expected = rendered(time=0.5 + index / 3)["final"]
+        assert (rgb(pixels(path)) == rgb(expected)).all()
+    assert result.stdout.endswith(f"\nwrote 3 files, {paths[0]} to {paths[2]}\n")
+    assert re.search(r"^ +glow +[\d.]+ +3$", result.stdout, re.M)
+
+
+def test_an_animation_in_a_folder(tmp_path: Path) -> None:
+    wanted = ("--frames", "2", "--attachments", "glow,final")
+    assert vkb("render", "-o", f"{tmp_path}/new/", *SMALL, *wanted).exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [
+        "0000_final.png",
+        "0000_glow.png",
+        "0001_final.png",
+        "0001_glow.png",
+    ]
+
+
+def test_render_passes_validation(tmp_path: Path) -> None:
+    result = vkb("render", "-o", tmp_path / "out.exr", *SMALL, "--validation")
+    assert (result.exit_code, result.stderr) == (0, "")
+
+
+def test_validation_is_handed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
+    result = vkb("render", "-o", tmp_path / "out.exr", *SMALL, "--validation")
+    assert result.exit_code == 1
+    assert "validation" in one_line(result.stderr)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (("-o", "{tmp}/out.png", "--scene", "{tmp}/no.gltf"), 1, "{tmp}/no.gltf: No such file"),
+        (("-o", "{tmp}/out.png", "--scene", "{tmp}/bad.gltf"), 1, "{tmp}/bad.gltf"),
+        (("-o", "{tmp}/out.png", "--glow", "{tmp}/no.gltf"), 1, "{tmp}/no.gltf: No such file"),
+        (("-o", "{tmp}/out.png", "--skybox", "{tmp}/bad.gltf"), 1, "{tmp}/bad.gltf"),
+        (("-o", "{tmp}/none/out.png"), 1, "{tmp}/none/out_glow.png: No such file"),
+        (("-o", "{tmp}/out.foo"), 2, "'.foo'"),
+        (("-o", "{tmp}/out.png", "--adapter", "no such"), 1, 'no Vulkan adapter for "no such"'),
+    ],
+)
+def test_what_render_cannot_do_is_one_line(
+    tmp_path: Path, arguments: tuple[str, ...], status: int, message: str
+) -> None:
+    (tmp_path / "bad.gltf").write_text("{broken")
+    named = [argument.format(tmp=tmp_path) for argument in arguments]
+    result = vkb("render", *SMALL, *named)
+    assert result.exit_code == status
+    assert message.format(tmp=tmp_path) in one_line(result.stderr)
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.gltf"]
+
+
+# adapters
+
+
+def test_adapters_as_a_table() -> None:
+    result = vkb("adapters")
+    assert result.exit_code == 0
+    for adapter in vkbloom.adapters():
+        # On one line, although no terminal says how wide lines may be.
+        row = next(line for line in result.stdout.splitlines() if adapter.name in line)
+        assert re.split(r" {2,}", row.strip()) == [
+            value for value in dataclasses.astuple(adapter) if value
+        ]
+
+
+def test_adapters_as_json() -> None:
+    result = vkb("adapters", "--json")
+    assert result.exit_code == 0
+    found = [vkbloom.AdapterInfo(**entry) for entry in json.loads(result.stdout)]
+    assert tuple(found) == vkbloom.adapters() != ()
+
+
+@pytest.mark.parametrize(("options", "stdout"), [((), ""), (("--json",), "[]\n")])
+def test_no_adapter_is_a_failure(
+    monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], stdout: str
+) -> None:
+    monkeypatch.setattr(vkbloom, "adapters", tuple)
+    result = vkb("adapters", *options)
+    assert (result.exit_code, result.stdout) == (1, stdout)
+    assert "vkbloom doctor tells why" in one_line(result.stderr)
+
+
+# As a process
+
+
+def python(*arguments: str, **changes: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *arguments],
+        env={**os.environ, **changes},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_process_ends_with_the_status() -> None:
+    done = python("-m", "vkbloom.cli", "adapters", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(json.loads(done.stdout)) == len(vkbloom.adapters())
+    failed = python("-m", "vkbloom.cli", "render", "-o", "x.png", "--scene", "/no.gltf")
+    assert (failed.returncode, failed.stdout) == (1, "")
+    assert one_line(failed.stderr) == "/no.gltf: No such file or directory\n"
+    misused = python("-m", "vkbloom.cli", "render")
+    assert (misused.returncode, misused.stdout) == (2, "")
+    assert "Missing option" in one_line(misused.stderr)
+
+
+@pytest.mark.parametrize("missing", ["click", "rich", "tqdm"])
+def test_a_missing_extra_is_one_line(missing: str) -> None:
+    # None in sys.modules makes an import fail as if nothing were installed.
+    hide = f"import sys; sys.modules[{missing!r}] = None; from vkbloom.cli import main; main()"
+    ended = python("-c", hide, "render", "-o", "x.png")
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert "pip install vkbloom[cli]" in one_line(ended.stderr)
+
+
+def test_importing_the_entry_point_is_quick() -> None:
+    listed = python("-c", "import sys, vkbloom.cli; print(*sys.modules)").stdout.split()
+    assert "vkbloom.cli" in listed
+    assert not {"click", "rich", "tqdm", "OpenImageIO", "pygltflib"} & set(listed)
+
+
+def test_text_survives_a_plain_terminal(tmp_path: Path) -> None:
+    out = str(tmp_path / "out.exr")
+    ended = python(*("-m", "vkbloom.cli", "render", "-o", out, *SMALL), PYTHONIOENCODING="ascii")
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "ms on the CPU" in ended.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no pseudo-terminal")
+def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    command = [sys.executable, "-m", "vkbloom.cli", "render", "-o", str(tmp_path / "a.png")]
+    ended = subprocess.run(
+        [*command, *SMALL, "--frames", "2"], stdout=subprocess.PIPE, stderr=theirs, check=False
+    )
+    os.close(theirs)
+    shown = os.read(ours, 65536).decode()
+    os.close(ours)
+    assert ended.returncode == 0
+    assert "0/2" in shown
+    assert "%" not in ended.stdout.decode()
