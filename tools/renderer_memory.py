@@ -1,19 +1,25 @@
-"""Measure what a renderer leaves behind in memory, and how much of it is the driver's own.
+"""Measure what a renderer leaves behind, and how much of it is the driver's own.
 
-Three things are repeated, and the growth of the process is shown in bytes for one repetition:
+Three things are repeated, and the growth of the process for one repetition is shown:
 
 - ``device``: a bare Vulkan instance and device, created and destroyed through ctypes, with nothing
   of vkbloom in it;
 - ``renderer``: a `vkbloom.Renderer`, created and closed;
 - ``frame``: the same with one small frame of all framebuffers between.
 
-Three sizes are taken, after a collection and a trim of the heap:
+They are so twice: with the driver's library unloaded by the loader whenever the last instance goes
+("unloaded"), and with an instance kept open beside, so that it stays loaded ("loaded"). What the
+driver allocates once a load is lost at the unloading and shows in the first only. Last ("open"),
+the growth for one more frame of a renderer that stays open, sizes and settings changing.
+
+What is measured, after a collection and a trim of the heap, as the median of several rounds:
 
 - ``heap``: bytes in use by malloc, of all libraries and of Python (whose own allocator is turned
-  off), exact to the byte whatever the heap's fragmentation;
-- ``data``: resident memory that is not executable, the heap with its gaps and all other mappings;
-- ``code``: resident memory of anonymous executable mappings. The package makes none: it is what
-  the driver compiled shaders to and did not give back.
+  off), whatever the heap's fragmentation;
+- ``data``: resident bytes that are not executable, the heap with its gaps and all other mappings;
+- ``code``: resident bytes of anonymous executable mappings. The package makes none: it is what the
+  driver compiled shaders to;
+- ``descriptors`` and ``threads``.
 
 Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT]``
 """
@@ -22,27 +28,33 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import itertools
 import json
 import os
+import statistics
 import sys
 from collections.abc import Callable
-from typing import ClassVar
 
 import vkbloom
 
-# One arena, so that memory does not wander between the heaps of threads; and all of Python's
-# objects in it, so that they count by the byte.
-ENVIRONMENT = {"PYTHONMALLOC": "malloc", "MALLOC_ARENA_MAX": "1"}
+# One arena without a cache before it, and all of Python's objects in it, so that the bytes in use
+# are exact.
+ENVIRONMENT = {
+    "PYTHONMALLOC": "malloc",
+    "MALLOC_ARENA_MAX": "1",
+    "GLIBC_TUNABLES": "glibc.malloc.tcache_count=0",
+}
+
+WARM_UP = 24
+ROUNDS = 10
 
 CPU = 4  # VK_PHYSICAL_DEVICE_TYPE_CPU
-
-_Fields = ClassVar[list[tuple[str, type]]]
 
 
 class _HeapInfo(ctypes.Structure):
     """struct mallinfo2 of <malloc.h>."""
 
-    _fields_: _Fields = [
+    _fields_ = tuple(
         (name, ctypes.c_size_t)
         for name in (
             "arena",
@@ -56,13 +68,13 @@ class _HeapInfo(ctypes.Structure):
             "fordblks",
             "keepcost",
         )
-    ]
+    )
 
 
 class _InstanceCreateInfo(ctypes.Structure):
     """VkInstanceCreateInfo."""
 
-    _fields_: _Fields = [
+    _fields_ = (
         ("type", ctypes.c_uint32),
         ("next", ctypes.c_void_p),
         ("flags", ctypes.c_uint32),
@@ -71,26 +83,26 @@ class _InstanceCreateInfo(ctypes.Structure):
         ("layers", ctypes.c_void_p),
         ("extension_count", ctypes.c_uint32),
         ("extensions", ctypes.c_void_p),
-    ]
+    )
 
 
 class _QueueCreateInfo(ctypes.Structure):
     """VkDeviceQueueCreateInfo."""
 
-    _fields_: _Fields = [
+    _fields_ = (
         ("type", ctypes.c_uint32),
         ("next", ctypes.c_void_p),
         ("flags", ctypes.c_uint32),
         ("family", ctypes.c_uint32),
         ("count", ctypes.c_uint32),
         ("priorities", ctypes.c_void_p),
-    ]
+    )
 
 
 class _DeviceCreateInfo(ctypes.Structure):
     """VkDeviceCreateInfo."""
 
-    _fields_: _Fields = [
+    _fields_ = (
         ("type", ctypes.c_uint32),
         ("next", ctypes.c_void_p),
         ("flags", ctypes.c_uint32),
@@ -101,11 +113,11 @@ class _DeviceCreateInfo(ctypes.Structure):
         ("extension_count", ctypes.c_uint32),
         ("extensions", ctypes.c_void_p),
         ("features", ctypes.c_void_p),
-    ]
+    )
 
 
 def sizes() -> dict[str, int]:
-    """Return the sizes of this process in bytes, as the module describes them."""
+    """Return what this process has in use, as the module describes it."""
     # CPython's cache of type attributes holds on to up to 4096 names until it is cleared.
     getattr(sys, "_clear_internal_caches", sys._clear_type_cache)()
     gc.collect()
@@ -124,19 +136,31 @@ def sizes() -> dict[str, int]:
                 code += int(words[1]) * 1024
             elif words[0] == "Rss:" and not executable:
                 data += int(words[1]) * 1024
-    return {"heap": heap.uordblks + heap.hblkhd, "data": data, "code": code}
+    return {
+        "heap": heap.uordblks + heap.hblkhd,
+        "data": data,
+        "code": code,
+        "descriptors": len(os.listdir("/proc/self/fd")),
+        "threads": len(os.listdir("/proc/self/task")),
+    }
 
 
 def growth(action: Callable[[], None], count: int) -> dict[str, float]:
-    """Return the bytes that one call of the action leaves behind, on the average of `count`."""
+    """Return what one call of the action leaves behind, the median of ROUNDS of `count` in all."""
     # What the first calls build up once, in the loader, the driver and Python.
-    for _ in range(max(10, count // 10)):
+    for _ in range(WARM_UP):
         action()
-    before = sizes()
-    for _ in range(count):
-        action()
-    after = sizes()
-    return {name: (after[name] - before[name]) / count for name in before}
+    taken = [sizes()]
+    for _ in range(ROUNDS):
+        for _ in range(count // ROUNDS):
+            action()
+        taken.append(sizes())
+    # A median, because a table of Python's that grows in one of the rounds is no leak.
+    return {
+        name: statistics.median(b[name] - a[name] for a, b in itertools.pairwise(taken))
+        / (count // ROUNDS)
+        for name in taken[0]
+    }
 
 
 def _check(call: str, result: int) -> None:
@@ -144,62 +168,80 @@ def _check(call: str, result: int) -> None:
         raise RuntimeError(f"{call} failed with {result}")
 
 
-def bare_device() -> Callable[[], None]:
-    """Return what makes and destroys an instance and a device of the software adapter."""
-    vulkan = ctypes.CDLL("libvulkan.so.1")
-    priority = ctypes.c_float(1.0)
-    queue = _QueueCreateInfo(type=2, count=1, priorities=ctypes.addressof(priority))
-    instance_info = _InstanceCreateInfo(type=1)
-    device_info = _DeviceCreateInfo(type=3, queue_count=1, queues=ctypes.addressof(queue))
+class BareDevice:
+    """An instance and a device of the software adapter, with nothing else."""
 
-    def device_type(adapter: int | None) -> int:
-        # VkPhysicalDeviceProperties: four 32-bit numbers, then the type; 824 bytes in all.
-        properties = (ctypes.c_uint32 * 256)()
-        vulkan.vkGetPhysicalDeviceProperties(ctypes.c_void_p(adapter), properties)
-        return properties[4]
+    def __init__(self) -> None:
+        self.vulkan = ctypes.CDLL("libvulkan.so.1")
+        self.instance, self.device = ctypes.c_void_p(), ctypes.c_void_p()
+        info = _InstanceCreateInfo(type=1)
+        _check(
+            "vkCreateInstance",
+            self.vulkan.vkCreateInstance(ctypes.byref(info), None, ctypes.byref(self.instance)),
+        )
+        priority = ctypes.c_float(1.0)
+        queue = _QueueCreateInfo(type=2, count=1, priorities=ctypes.addressof(priority))
+        device_info = _DeviceCreateInfo(type=3, queue_count=1, queues=ctypes.addressof(queue))
+        _check(
+            "vkCreateDevice",
+            self.vulkan.vkCreateDevice(
+                self._software(), ctypes.byref(device_info), None, ctypes.byref(self.device)
+            ),
+        )
 
-    def action() -> None:
-        instance, device = ctypes.c_void_p(), ctypes.c_void_p()
+    def _software(self) -> ctypes.c_void_p:
         count = ctypes.c_uint32(32)
         adapters = (ctypes.c_void_p * 32)()
         _check(
-            "vkCreateInstance",
-            vulkan.vkCreateInstance(ctypes.byref(instance_info), None, ctypes.byref(instance)),
-        )
-        _check(
             "vkEnumeratePhysicalDevices",
-            vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), adapters),
+            self.vulkan.vkEnumeratePhysicalDevices(self.instance, ctypes.byref(count), adapters),
         )
-        software = next(a for a in adapters[: count.value] if device_type(a) == CPU)
-        _check(
-            "vkCreateDevice",
-            vulkan.vkCreateDevice(
-                ctypes.c_void_p(software), ctypes.byref(device_info), None, ctypes.byref(device)
-            ),
-        )
-        # The queue belongs to what the callers compare with; it needs no destruction.
-        vulkan.vkGetDeviceQueue(device, 0, 0, ctypes.byref(ctypes.c_void_p()))
-        vulkan.vkDestroyDevice(device, None)
-        vulkan.vkDestroyInstance(instance, None)
+        for adapter in map(ctypes.c_void_p, adapters[: count.value]):
+            # VkPhysicalDeviceProperties: four 32-bit numbers, then the type; 824 bytes in all.
+            properties = (ctypes.c_uint32 * 256)()
+            self.vulkan.vkGetPhysicalDeviceProperties(adapter, properties)
+            if properties[4] == CPU:
+                return adapter
+        raise RuntimeError("there is no software adapter")
+
+    def destroy(self) -> None:
+        """Give both back."""
+        self.vulkan.vkDestroyDevice(self.device, None)
+        self.vulkan.vkDestroyInstance(self.instance, None)
+
+
+def changing_frames(renderer: vkbloom.Renderer, scene: vkbloom.Scene) -> Callable[[], None]:
+    """Return what renders the next of 24 frames, no two in a row alike, again and again."""
+    sizes = [(64, 36), (33, 57), (1, 1), (120, 8)]
+    settings = [
+        vkbloom.Separable(),
+        vkbloom.Separable(blur_scale=1.5, bloom_size=(40, 30)),
+        vkbloom.Separable(layers=((1.0, 1.0), (2.0, 0.5)), format="rgba16float"),
+        vkbloom.Separable(loops=2, bloom_scale=0.5, tonemap="aces"),
+        vkbloom.Separable(direct=True, bloom_size=(9, 9)),
+        vkbloom.Separable(bloom=False),
+    ]
+    requests = itertools.cycle(itertools.product(settings, sizes))
+    times = itertools.cycle(i / 7 for i in range(7))
+
+    def action() -> None:
+        chosen, size = next(requests)
+        renderer.render(scene, chosen, size, time=next(times))
 
     return action
 
 
-def measure(count: int) -> dict[str, dict[str, float]]:
-    """Return the growth for one repetition of each of the three things, of `count` each."""
-    scene = vkbloom.Scene.ufo()
-
-    def renderer() -> None:
-        vkbloom.Renderer("software").close()
+def measure(count: int, scene: vkbloom.Scene) -> dict[str, dict[str, float]]:
+    """Return the growth for one device, `count` of them, one renderer and one with a frame."""
 
     def frame() -> None:
-        with vkbloom.Renderer("software") as opened:
-            opened.render(scene, size=(32, 32))
+        with vkbloom.Renderer("software") as renderer:
+            renderer.render(scene, size=(32, 32))
 
     return {
-        "device": growth(bare_device(), count),
-        "renderer": growth(renderer, count),
-        "frame": growth(frame, max(1, count // 5)),
+        "device": growth(lambda: BareDevice().destroy(), count),
+        "renderer": growth(lambda: vkbloom.Renderer("software").close(), count),
+        "frame": growth(frame, max(ROUNDS, count // 5)),
     }
 
 
@@ -207,7 +249,15 @@ def main() -> None:
     """Print the growths as JSON."""
     if any(os.environ.get(name) != value for name, value in ENVIRONMENT.items()):
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **ENVIRONMENT})
-    print(json.dumps(measure(int(sys.argv[1]) if len(sys.argv) > 1 else 500), indent=1))
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 500
+    scene = vkbloom.Scene.ufo()
+    unloaded = measure(count, scene)
+    kept = BareDevice()
+    loaded = measure(count, scene)
+    kept.destroy()
+    with vkbloom.Renderer("software") as renderer:
+        frames = growth(changing_frames(renderer, scene), 4 * count)
+    print(json.dumps({"unloaded": unloaded, "loaded": loaded, "open": frames}, indent=1))
 
 
 if __name__ == "__main__":
