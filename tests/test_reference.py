@@ -444,13 +444,23 @@ def test_sizes_of_the_levels(
     assert framebuffers["bloom"].shape == (7, 9, 3)
 
 
-def test_stored_levels_of_the_pyramid_are_means() -> None:
+def test_stored_levels_of_the_pyramid_are_sums() -> None:
     glow = random_image(24, 24)
     framebuffers = reference.passes(glow, Pyramid(levels=3))
     up_1 = slow_taps(framebuffers["down_2"], (6, 6), tent(1.0)) + framebuffers["down_1"]
-    assert_close(framebuffers["up_1"], up_1 / 2)
-    up_0 = 2 * slow_taps(framebuffers["up_1"], (12, 12), tent(1.0)) + framebuffers["down_0"]
-    assert_close(framebuffers["up_0"], up_0 / 3)
+    assert_close(framebuffers["up_1"], up_1)
+    up_0 = slow_taps(framebuffers["up_1"], (12, 12), tent(1.0)) + framebuffers["down_0"]
+    assert_close(framebuffers["up_0"], up_0)
+    assert_close(framebuffers["bloom"], slow_taps(up_0, (24, 24), tent(1.0)) / 3)
+
+
+def test_stored_levels_of_the_pyramid_are_means_in_eight_bits() -> None:
+    glow = random_image(24, 24)
+    sums = reference.passes(glow, Pyramid(levels=3))
+    means = reference.passes(glow, Pyramid(levels=3), format="rgba8unorm")
+    assert_close(means["up_1"], sums["up_1"] / 2)
+    assert_close(means["up_0"], sums["up_0"] / 3)
+    assert_close(means["bloom"], sums["bloom"])
 
 
 def test_reduction_samples_at_pixel_centres() -> None:
