@@ -94,12 +94,13 @@ static bool add_layer(const struct vkb_settings *settings, const struct vkb_bloo
     for (int loop = 0; loop < loops; ++loop) {
         const bool last = loop + 1 == loops;
         const bool shown = last && last_layer;
-        snprintf(name, sizeof name, shown ? "blur_vertical" : "blur_vertical_%u_%d", layer, loop);
+        const uint8_t l = (uint8_t)layer, k = (uint8_t)loop;  // both far below 256
+        snprintf(name, sizeof name, shown ? "blur_vertical" : "blur_vertical_%u_%u", l, k);
         if (!direct
             && !add_step(settings, source, name, shown, DIRECTION_VERTICAL, layer, image, graph,
                          error))
             return false;
-        snprintf(name, sizeof name, direct ? "blur_%u_%d" : "blur_horizontal_%u_%d", layer, loop);
+        snprintf(name, sizeof name, direct ? "blur_%u_%u" : "blur_horizontal_%u_%u", l, k);
         if (!last
             && !add_step(settings, source, name, false,
                          direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL, layer, image, graph,

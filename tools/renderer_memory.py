@@ -21,7 +21,8 @@ What is measured, after a collection and a trim of the heap, as the median of se
   driver compiled shaders to;
 - ``descriptors`` and ``threads``.
 
-Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT]``
+Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT]``, COUNT renderers
+(default 500, at least 100)
 """
 
 from __future__ import annotations
@@ -31,9 +32,10 @@ import gc
 import itertools
 import json
 import os
-import statistics
 import sys
 from collections.abc import Callable
+
+import numpy as np
 
 import vkbloom
 
@@ -45,8 +47,9 @@ ENVIRONMENT = {
     "GLIBC_TUNABLES": "glibc.malloc.tcache_count=0",
 }
 
-WARM_UP = 24
 ROUNDS = 10
+WARM_UP = 20
+SIZES = ("heap", "data", "code", "descriptors", "threads")
 
 CPU = 4  # VK_PHYSICAL_DEVICE_TYPE_CPU
 
@@ -116,8 +119,8 @@ class _DeviceCreateInfo(ctypes.Structure):
     )
 
 
-def sizes() -> dict[str, int]:
-    """Return what this process has in use, as the module describes it."""
+def sizes() -> tuple[int, ...]:
+    """Return what this process has in use, in the order of SIZES."""
     # CPython's cache of type attributes holds on to up to 4096 names until it is cleared.
     getattr(sys, "_clear_internal_caches", sys._clear_type_cache)()
     gc.collect()
@@ -136,31 +139,33 @@ def sizes() -> dict[str, int]:
                 code += int(words[1]) * 1024
             elif words[0] == "Rss:" and not executable:
                 data += int(words[1]) * 1024
-    return {
-        "heap": heap.uordblks + heap.hblkhd,
-        "data": data,
-        "code": code,
-        "descriptors": len(os.listdir("/proc/self/fd")),
-        "threads": len(os.listdir("/proc/self/task")),
-    }
+    in_use = heap.uordblks + heap.hblkhd
+    descriptors, threads = (len(os.listdir(f"/proc/self/{name}")) for name in ("fd", "task"))
+    return in_use, data, code, descriptors, threads
 
 
-def growth(action: Callable[[], None], count: int) -> dict[str, float]:
-    """Return what one call of the action leaves behind, the median of ROUNDS of `count` in all."""
+def growth(
+    action: Callable[[], None], count: int, settle: Callable[[], None] = lambda: None
+) -> dict[str, float]:
+    """Return what one call leaves behind, the median of ROUNDS; `count` calls in all.
+
+    `settle` is called before each look at the sizes.
+    """
     # What the first calls build up once, in the loader, the driver and Python.
     for _ in range(WARM_UP):
         action()
-    taken = [sizes()]
-    for _ in range(ROUNDS):
+    # Allocated before the first look, so that looking leaves nothing behind.
+    taken = np.zeros((ROUNDS + 1, len(SIZES)))
+    settle()
+    taken[0] = sizes()
+    for row in range(1, ROUNDS + 1):
         for _ in range(count // ROUNDS):
             action()
-        taken.append(sizes())
+        settle()
+        taken[row] = sizes()
     # A median, because a table of Python's that grows in one of the rounds is no leak.
-    return {
-        name: statistics.median(b[name] - a[name] for a, b in itertools.pairwise(taken))
-        / (count // ROUNDS)
-        for name in taken[0]
-    }
+    middle = np.median(np.diff(taken, axis=0), axis=0) / (count // ROUNDS)
+    return dict(zip(SIZES, middle.tolist(), strict=True))
 
 
 def _check(call: str, result: int) -> None:
@@ -210,38 +215,45 @@ class BareDevice:
         self.vulkan.vkDestroyInstance(self.instance, None)
 
 
-def changing_frames(renderer: vkbloom.Renderer, scene: vkbloom.Scene) -> Callable[[], None]:
-    """Return what renders the next of 24 frames, no two in a row alike, again and again."""
+def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
+    """Return the growth for one more frame of a renderer that stays open, `count` of them."""
     sizes = [(64, 36), (33, 57), (1, 1), (120, 8)]
     settings = [
         vkbloom.Separable(),
         vkbloom.Separable(blur_scale=1.5, bloom_size=(40, 30)),
         vkbloom.Separable(layers=((1.0, 1.0), (2.0, 0.5)), format="rgba16float"),
-        vkbloom.Separable(loops=2, bloom_scale=0.5, tonemap="aces"),
-        vkbloom.Separable(direct=True, bloom_size=(9, 9)),
+        vkbloom.Separable(loops=2, bloom_scale=0.5, direct=True, tonemap="aces"),
         vkbloom.Separable(bloom=False),
     ]
     requests = itertools.cycle(itertools.product(settings, sizes))
-    times = itertools.cycle(i / 7 for i in range(7))
+    times = itertools.cycle([0.0, 0.3, 0.55, 0.8])
 
-    def action() -> None:
-        chosen, size = next(requests)
-        renderer.render(scene, chosen, size, time=next(times))
+    with vkbloom.Renderer("software") as renderer:
 
-    return action
+        def action() -> None:
+            chosen, size = next(requests)
+            renderer.render(scene, chosen, size, time=next(times))
+
+        def settle() -> None:
+            # The driver keeps blocks of 64 KiB of its last pictures; those of a pixel need none.
+            for time in range(8):
+                tiny = vkbloom.Separable(bloom_size=(1, 1))
+                renderer.render(scene, tiny, (1, 1), time=time / 8)
+
+        return growth(action, count, settle)
 
 
 def measure(count: int, scene: vkbloom.Scene) -> dict[str, dict[str, float]]:
-    """Return the growth for one device, `count` of them, one renderer and one with a frame."""
+    """Return the growth for one device, one of `count` renderers, and one that drew a frame."""
 
     def frame() -> None:
         with vkbloom.Renderer("software") as renderer:
             renderer.render(scene, size=(32, 32))
 
     return {
-        "device": growth(lambda: BareDevice().destroy(), count),
+        "device": growth(lambda: BareDevice().destroy(), count // 5),
         "renderer": growth(lambda: vkbloom.Renderer("software").close(), count),
-        "frame": growth(frame, max(ROUNDS, count // 5)),
+        "frame": growth(frame, count // 10),
     }
 
 
@@ -255,8 +267,7 @@ def main() -> None:
     kept = BareDevice()
     loaded = measure(count, scene)
     kept.destroy()
-    with vkbloom.Renderer("software") as renderer:
-        frames = growth(changing_frames(renderer, scene), 4 * count)
+    frames = frame_growth(scene, 4 * count)
     print(json.dumps({"unloaded": unloaded, "loaded": loaded, "open": frames}, indent=1))
 
 

@@ -8,6 +8,7 @@ that crashes becomes a finding as well.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -142,8 +143,9 @@ def _software(adapters: list[Mapping[str, str]]) -> Finding:
         )
     described = found[0]["driver_info"] or "no version"
     tested = " and ".join(TESTED_MESA)
-    # As in "Mesa 22.3.6 (LLVM 15.0.6)".
-    if any(described.startswith(f"Mesa {version} ") for version in TESTED_MESA):
+    # As in "Mesa 22.3.6 (LLVM 15.0.6)"; a distribution may append its own revision.
+    version = re.match(r"Mesa ([\d.]+)", described)
+    if version and version[1] in TESTED_MESA:
         return Finding(topic, "ok", f"{described}, one of the tested versions ({tested})")
     return Finding(
         topic,

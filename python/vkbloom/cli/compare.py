@@ -1,0 +1,194 @@
+"""``vkbloom compare``: how much two image files differ."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from typing import Any
+
+import click
+
+from vkbloom import images
+from vkbloom.cli import fields
+from vkbloom.cli.image_files import note, read, subimage_option
+from vkbloom.cli.program import blaming_the_call
+from vkbloom.comparison import Comparison, Limits, compare, difference
+
+
+@click.command()
+@click.argument("first", metavar="A", type=click.Path())
+@click.argument("second", metavar="B", type=click.Path())
+@click.option(
+    "--diff",
+    metavar="OUT",
+    type=click.Path(),
+    help="Write a picture of the absolute differences; those of alpha are white, and what is NaN "
+    "or infinite in one image only is magenta.",
+)
+@click.option(
+    "--diff-scale",
+    metavar="X",
+    type=click.FLOAT,
+    help="What they are multiplied with [default so that the largest becomes 1]",
+)
+@click.option(
+    "--allow-nan",
+    is_flag=True,
+    help="Let NaN, and infinity of one sign, pass where both images have it.",
+)
+@click.option(
+    "--data-range",
+    metavar="X",
+    type=click.FLOAT,
+    help="Of SSIM and PSNR [default 1; of floats what they span together with 0 and 1]",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one object.")
+@subimage_option
+@fields.options({"": Limits}, "chosen")
+def command(
+    *,
+    first: str,
+    second: str,
+    diff: str | None,
+    diff_scale: float | None,
+    allow_nan: bool,
+    data_range: float | None,
+    as_json: bool,
+    subimage: int,
+    chosen: dict[str, Any],
+) -> int:
+    """Compare the image files A, the reference, and B.
+
+    Prints the largest error with its place and the mean error, the share of pixels that differ,
+    PSNR and SSIM (scikit-image's, over all channels) and the mean FLIP (OpenImageIO's, of the
+    colours alone: of integers, as sRGB, LDR-FLIP; of floats, as linear, HDR-FLIP). Integers
+    count as 0 to 1. Values are compared as they are stored.
+
+    The exit status is 1 if a limit is exceeded, and without any limit, as of cmp, if a single
+    value differs. It is always 1 for images of different size, number of channels or kind
+    (integers against floats), for NaN and infinity in one of them, and in both at the same place
+    without --allow-nan. A figure that has a limit and cannot be computed, such as SSIM of an
+    image under 7 pixels, fails too.
+    """
+    with blaming_the_call():
+        limits = Limits(**chosen)
+        if diff is not None:
+            images.check_writable(diff)
+    if diff is None and diff_scale is not None:
+        raise click.UsageError("--diff-scale is for --diff")
+    a, b = read(first, subimage), read(second, subimage)
+    with blaming_the_call():
+        found = compare(
+            a.pixels,
+            b.pixels,
+            threshold=0.0 if limits.fail_percent is None else limits.max_error or 0.0,
+            allow_nan=allow_nan,
+            data_range=data_range,
+        )
+    found = _with_windows(found, a, b)
+    failures = found.failures(limits)
+    scale = None
+    if diff is not None:
+        scale = _write_difference(a, b, diff, diff_scale)
+    if as_json:
+        click.echo(json.dumps(_object(first, second, found, failures, scale), indent=2))
+    else:
+        for line in _lines(first, second, a, found, failures):
+            click.echo(line)
+        if scale is not None:
+            click.echo(f"wrote {diff}, differences times {scale:.6g}")
+    return 1 if failures else 0
+
+
+def _with_windows(found: Comparison, a: images.StoredImage, b: images.StoredImage) -> Comparison:
+    """Add a mismatch where pixels of one size have different places."""
+    windows = [(*image.origin, *image.display) for image in (a, b)]
+    if a.pixels.shape[:2] != b.pixels.shape[:2] or windows[0] == windows[1]:
+        return found
+    places = " against ".join(
+        f"data at {x},{y} and display {width} x {height} at {left},{top}"
+        for x, y, left, top, width, height in windows
+    )
+    reason = f"the windows differ, {places}"
+    return dataclasses.replace(found, mismatches=(*found.mismatches, reason))
+
+
+def _write_difference(
+    a: images.StoredImage, b: images.StoredImage, path: str, scale: float | None
+) -> float | None:
+    """Write the difference picture and return its scale, None where there is no picture."""
+    try:
+        picture, used = difference(a.pixels, b.pixels, scale)
+    except ValueError as error:
+        note(f"{path} is not written: {error}")
+        return None
+    for text in images.save(images.Picture.of_values(picture), path):
+        note(text)
+    return used
+
+
+def _object(
+    first: str,
+    second: str,
+    found: Comparison,
+    failures: tuple[str, ...],
+    scale: float | None,
+) -> dict[str, Any]:
+    """Return what --json prints; JSON has no infinity, so that it becomes None."""
+    figures = {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in dataclasses.asdict(found).items()
+    }
+    return {
+        "a": first,
+        "b": second,
+        "passed": not failures,
+        "failures": failures,
+        "identical": found.identical,
+        **figures,
+        "diff_scale": scale,
+    }
+
+
+def _lines(
+    first: str,
+    second: str,
+    a: images.StoredImage,
+    found: Comparison,
+    failures: tuple[str, ...],
+) -> list[str]:
+    """Return the report for people."""
+    height, width, channels = a.pixels.shape
+    lines = [f"{first}: {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}", second]
+    if found.percent_over is not None:
+        lines += _figures(found, a.channels)
+    for reason in failures:
+        lines.append(f"FAILED: {reason}")
+    if not failures:
+        lines.append("identical" if found.identical else "passed")
+    return lines
+
+
+def _figures(found: Comparison, channels: tuple[str, ...]) -> list[str]:
+    largest = _shown(found.max_error)
+    if found.max_error_at is not None and found.max_error_values is not None:
+        x, y, channel = found.max_error_at
+        values = " against ".join(f"{value:.6g}" for value in found.max_error_values)
+        largest += f" at x {x}, y {y}, channel {channels[channel]}: {values}"
+    over = f" by more than {found.threshold:g}" if found.threshold else ""
+    rows = {
+        "max error": largest,
+        "mean error": _shown(found.mean_error),
+        "pixels": f"{_shown(found.percent_over)} % differ{over}",
+        "PSNR": f"{_shown(found.psnr)} dB" if found.psnr is not None else "",
+        "SSIM": _shown(found.ssim),
+        "FLIP": _shown(found.flip),
+    }
+    for name, reason in found.not_computed.items():
+        rows[name.upper()] = f"not computed: {reason}"
+    return [f"  {label:<11}{text}" for label, text in rows.items()]
+
+
+def _shown(value: float | None) -> str:
+    return "no values to compare" if value is None else f"{value:.6g}"

@@ -1,0 +1,61 @@
+"""Image files as arguments: how they are read, and what is said about them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from vkbloom import images
+
+_STANDARD_ERROR = 2
+
+
+def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--subimage``, the argument of `vkbloom.images.load`."""
+    return click.option(
+        "--subimage",
+        metavar="N",
+        type=click.IntRange(min=0),
+        default=0,
+        show_default=True,
+        help="Which part to read of files that have several.",
+    )(command)
+
+
+def read(path: str, subimage: int) -> images.StoredImage:
+    """Read an image file; the only message of a failure is that of the exception."""
+    with _silenced():
+        return images.load(path, subimage)
+
+
+def note(text: str) -> None:
+    """Tell the user something that is no failure, on standard error."""
+    click.echo(f"vkbloom: note: {text}", err=True)
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Keep the C libraries of image formats from writing to standard error.
+
+    libpng does so of damaged files, and not through OpenImageIO.
+    """
+    sys.stderr.flush()
+    try:
+        kept = os.dup(_STANDARD_ERROR)
+    except OSError:
+        # There is no standard error that could be written to.
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, _STANDARD_ERROR)
+        yield
+    finally:
+        os.dup2(kept, _STANDARD_ERROR)
+        os.close(nowhere)
+        os.close(kept)

@@ -1,0 +1,71 @@
+"""Fixtures: a renderer on the software adapter under validation, scenes, and given files."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from vkbloom import Renderer, Scene, Settings
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
+
+
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """Name settings in the names of tests by what is not the default."""
+    if not isinstance(val, Settings):
+        return None
+    changes = {
+        field.name: getattr(val, field.name)
+        for field in dataclasses.fields(val)
+        if getattr(val, field.name) != field.default
+    }
+    return ",".join(f"{name}={value}" for name, value in changes.items()) or "default"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test reads or writes the pipeline cache of the user, or follows the user's choice."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path_factory.mktemp("pipelines")))
+        patch.delenv("VKBLOOM_ADAPTER", raising=False)
+        yield
+
+
+@pytest.fixture(scope="session")
+def renderer(environment: None) -> Iterator[Renderer]:
+    """A renderer whose first validation message raises, at the latest when it is closed."""
+    with Renderer("software", validation=True) as opened:
+        yield opened
+
+
+@pytest.fixture
+def new_renderer() -> Iterator[Callable[[], Renderer]]:
+    """Opens renderers as `renderer` is one, and closes them after the test."""
+    opened: list[Renderer] = []
+
+    def open_one() -> Renderer:
+        opened.append(Renderer("software", validation=True))
+        return opened[-1]
+
+    yield open_one
+    for one in opened:
+        one.close()
+
+
+@pytest.fixture(scope="session")
+def scene() -> Scene:
+    return Scene.ufo()
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Meshes and frames of the original program, which lie beside the repository."""
+    folder = Path(__file__).resolve().parents[2] / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip("the original's meshes and frames (../shared/data) are not here")
+    return folder

@@ -1,0 +1,61 @@
+"""Scenes whose glow is a given image, so that a test chooses every pixel that is blurred."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import Camera, Scene
+from vkbloom.scene import Mesh
+
+# The model matrix of time 0 moves a mesh by (0, -1, 0.25); this camera takes that back and stands
+# DISTANCE away from the plane z = 0, looking straight at it.
+DISTANCE = 10.0
+CAMERA = Camera(position=(0.0, 1.0, -DISTANCE - 0.25), rotation=(0.0, 0.0, 0.0), fov=45.0)
+
+# A triangle without an area: a body must be there, but nothing of it is drawn.
+NOTHING = Mesh(np.zeros((3, 9), np.float32), np.arange(3, dtype=np.uint32))
+
+# Two triangles a square, once in each winding, one of which is culled.
+SQUARE = np.array([0, 1, 2, 0, 2, 3, 2, 1, 0, 3, 2, 0], np.uint32)
+
+
+def screen(image: NDArray[Any], frame: tuple[int, int]) -> Scene:
+    """Return a scene whose glow, at time 0, is the image over a whole frame of that aspect.
+
+    Bloom buffers of the image's size get its very pixels; larger ones see them as squares. Black
+    pixels are left out, which looks the same and is quicker.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, 3)
+        Linear colours, 0 or more.
+    frame : (int, int)
+        Width and height of the frame that the scene is for.
+    """
+    height, width, _ = image.shape
+    top = DISTANCE * math.tan(math.radians(CAMERA.fov / 2))
+    right = top * frame[0] / frame[1]
+    xs, ys = np.linspace(-right, right, width + 1), np.linspace(-top, top, height + 1)
+    rows, columns = np.nonzero(image.any(axis=2))
+    vertices = np.zeros((len(rows), 4, 9), np.float32)
+    for corner, (down, across) in enumerate([(0, 0), (0, 1), (1, 1), (1, 0)]):
+        vertices[:, corner, 0] = xs[columns + across]
+        vertices[:, corner, 1] = ys[rows + down]
+    vertices[:, :, 5] = 1.0
+    vertices[:, :, 6:] = image[rows, columns][:, np.newaxis]
+    indices = np.arange(len(rows), dtype=np.uint32)[:, np.newaxis] * 4 + SQUARE
+    return Scene(body=NOTHING, glow=Mesh(vertices.reshape(-1, 9), indices.ravel()), camera=CAMERA)
+
+
+def noise(size: tuple[int, int], highest: float = 1.0) -> NDArray[np.float64]:
+    """Return random colours of (width, height), half of the pixels black, 0 to `highest`."""
+    generator = np.random.default_rng(size)
+    colours = generator.random((size[1], size[0], 3)) * highest
+    colours[generator.random(colours.shape[:2]) < 0.5] = 0.0
+    # Never all black: a mesh needs a triangle.
+    colours[0, 0] = highest
+    return colours
