@@ -223,17 +223,33 @@ bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)
                             &camera->fov, &camera->near, &camera->far);
 }
 
+// The buffer protocol's code of the element type; 0 for anything but one number in this machine's
+// byte order. NumPy marks unaligned arrays with a prefix.
+static char element_code(const Py_buffer *view)
+{
+    const char *format = view->format ? view->format : "B";
+
+    if (*format == '@' || *format == '=')
+        ++format;
+    return strlen(format) == 1 ? *format : 0;
+}
+
+static bool has_element(const Py_buffer *view, const char *codes)
+{
+    char code = element_code(view);
+    return code && strchr(codes, code);
+}
+
 // A contiguous array of at least one element, held in the scene; NULL with an exception set.
 static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, const char *what,
-                             const char *formats)
+                             const char *codes)
 {
     Py_buffer *view = &scene->views[scene->view_count];
 
     if (PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0)
         return NULL;
     ++scene->view_count;
-    if (view->len > 0 && view->format && strlen(view->format) == 1
-        && strchr(formats, view->format[0]))
+    if (view->len > 0 && has_element(view, codes))
         return view;
     PyErr_Format(PyExc_TypeError, "scene: %s is an array of the wrong type", what);
     return NULL;
@@ -287,13 +303,13 @@ static bool read_sky(struct vkb_held_scene *scene, PyObject *levels)
         if (!view)
             return false;
         if (i == 0) {
-            sky->format = pixel_format(view->format[0]);
+            sky->format = pixel_format(element_code(view));
             sky->size = view->ndim == 4 ? (uint32_t)view->shape[1] : 0;
         }
         uint32_t size = sky->size >> i ? sky->size >> i : 1;
         size_t expected = 6 * (size_t)size * size * vkb_pixel_size(sky->format);
         if (sky->size == 0 || (size_t)view->len != expected
-            || pixel_format(view->format[0]) != sky->format) {
+            || pixel_format(element_code(view)) != sky->format) {
             PyErr_Format(PyExc_ValueError, "skybox: level %zd is not six faces of %u x %u", i, size,
                          size);
             return false;
@@ -330,7 +346,7 @@ bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
     if (PyObject_GetBuffer(array, view, PyBUF_STRIDES | PyBUF_FORMAT) < 0)
         return false;
     image->held = true;
-    if (!view->format || strlen(view->format) != 1 || !strchr("Bef", view->format[0])) {
+    if (!has_element(view, "Bef")) {
         PyErr_SetString(PyExc_TypeError, "image: an array of uint8, float16 or float32 is needed");
         return false;
     }
@@ -345,7 +361,7 @@ bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
         .row_stride = view->strides[0],
         .pixel_stride = view->strides[1],
         .channel_stride = view->strides[2],
-        .format = pixel_format(view->format[0]),
+        .format = pixel_format(element_code(view)),
         .width = (uint32_t)view->shape[1],
         .height = (uint32_t)view->shape[0],
         .channels = (uint32_t)view->shape[2],

@@ -17,18 +17,17 @@ static bool add_extract(const struct vkb_settings *settings, uint32_t image,
     if (!vkb_graph_add_image(graph, &target, glow, error))
         return false;
     struct vkb_pass_row row = vkb_fullscreen_row("glow", VKB_SHADER_extract_frag, *glow);
-    const struct vkb_sampling sampling = vkb_sampling_between(graph, image, *glow);
-    const bool whole = sampling.ratio_x == 1.0f && sampling.ratio_y == 1.0f;
+    const struct vkb_sampling sampling = vkb_sampling_into(graph, *glow);
     row.constants[0] = vkb_threshold_mode(settings);
     // Never the sampler's filter: it would spread NaN, and a threshold magnifies what it rounds.
-    row.constants[1] = whole ? SAMPLING_WHOLE : SAMPLING_FETCH;
+    row.constants[1] = vkb_same_size(graph, image, *glow) ? SAMPLING_WHOLE : SAMPLING_FETCH;
     row.constant_count = 2;
     row.reads[0] = image;
     row.read_count = 1;
     row.block = VKB_BLOCK_extract;
     row.params.extract = (struct vkb_extract_params){
-        .ratio_x = sampling.ratio_x,
-        .ratio_y = sampling.ratio_y,
+        .target_width = sampling.width,
+        .target_height = sampling.height,
         .limit = sampling.limit,
     };
     if (settings->thresholded) {

@@ -57,16 +57,21 @@ bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_s
     return methods[settings->method](settings, source, graph, bloom, error);
 }
 
-struct vkb_sampling vkb_sampling_between(const struct vkb_graph *graph, uint32_t source,
-                                         uint32_t target)
+struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target)
 {
-    const struct vkb_image_row *from = &graph->images[source], *to = &graph->images[target];
+    const struct vkb_image_row *row = &graph->images[target];
 
     return (struct vkb_sampling){
-        .ratio_x = (float)((double)from->width / to->width),
-        .ratio_y = (float)((double)from->height / to->height),
-        .limit = vkb_formats[to->format].limit,
+        .width = (int)row->width,
+        .height = (int)row->height,
+        .limit = vkb_formats[row->format].limit,
     };
+}
+
+bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)
+{
+    const struct vkb_image_row *first = &graph->images[a], *second = &graph->images[b];
+    return first->width == second->width && first->height == second->height;
 }
 
 bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,

@@ -57,12 +57,14 @@ enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
 // The bloom buffers' size: fixed, or a floored part of the frame, never under 1 a side.
 struct vkb_size vkb_bloom_size(const struct vkb_settings *settings, struct vkb_size frame);
 
-// Source texels a target pixel, and the largest value that the target holds.
+// What SAMPLING_ROWS hold for a pass that writes `target`.
 struct vkb_sampling {
-    float ratio_x, ratio_y, limit;
+    int width, height;
+    float limit;
 };
-struct vkb_sampling vkb_sampling_between(const struct vkb_graph *graph, uint32_t source,
-                                         uint32_t target);
+struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target);
+
+bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
 // A row with the defaults of a fullscreen pass; the caller fills in the rest.
 struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target);

@@ -51,7 +51,7 @@ static struct vkb_pass_row chain_row(const struct chain *chain, uint32_t from, u
                                      enum vkb_shader pyramid, enum vkb_shader kawase)
 {
     const struct vkb_settings *settings = chain->settings;
-    const struct vkb_sampling sampling = vkb_sampling_between(chain->graph, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_into(chain->graph, to);
     const bool is_pyramid = settings->method == VKB_METHOD_PYRAMID;
     struct vkb_pass_row row =
         vkb_fullscreen_row(chain->graph->images[to].name, is_pyramid ? pyramid : kawase, to);
@@ -65,16 +65,16 @@ static struct vkb_pass_row chain_row(const struct chain *chain, uint32_t from, u
         row.block = VKB_BLOCK_pyramid;
         row.params.pyramid = (struct vkb_pyramid_params){
             .radius = settings->values.pyramid.radius,
-            .ratio_x = sampling.ratio_x,
-            .ratio_y = sampling.ratio_y,
+            .target_width = sampling.width,
+            .target_height = sampling.height,
             .limit = sampling.limit,
         };
     } else {
         row.block = VKB_BLOCK_kawase;
         row.params.kawase = (struct vkb_kawase_params){
             .offset = settings->values.kawase.offset,
-            .ratio_x = sampling.ratio_x,
-            .ratio_y = sampling.ratio_y,
+            .target_width = sampling.width,
+            .target_height = sampling.height,
             .limit = sampling.limit,
         };
     }

@@ -16,16 +16,13 @@ static int choose_sampling(const struct vkb_graph *graph, const struct vkb_bloom
                            const struct vkb_pass_row *row, enum vkb_mode direction,
                            enum vkb_texel texel)
 {
-    const struct vkb_image_row *from = &graph->images[row->reads[0]];
-    const struct vkb_image_row *to = &graph->images[row->targets[0]];
     const struct vkb_blur_params *params = &row->params.blur;
     const double across = (double)params->blur_scale * params->layer_scale;
     const double down = texel == TEXEL_X ? across * params->step_ratio : across;
-    bool fetchable = from->width == to->width && from->height == to->height;
 
-    fetchable = fetchable && (direction == DIRECTION_VERTICAL || whole(across))
-             && (direction == DIRECTION_HORIZONTAL || whole(down));
-    if (fetchable)
+    if (vkb_same_size(graph, row->reads[0], row->targets[0])
+        && (direction == DIRECTION_VERTICAL || whole(across))
+        && (direction == DIRECTION_HORIZONTAL || whole(down)))
         return SAMPLING_WHOLE;
     return source->format == VKB_FORMAT_RGBA8_UNORM ? SAMPLING_FILTER : SAMPLING_FETCH;
 }
@@ -36,7 +33,7 @@ static bool add_blur(const struct vkb_settings *settings, const struct vkb_bloom
 {
     struct vkb_pass_row row = vkb_fullscreen_row(name, VKB_SHADER_blur_frag, to);
     const struct vkb_image_row *source_row = &graph->images[from];
-    const struct vkb_sampling sampling = vkb_sampling_between(graph, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
     const enum vkb_texel texel = (enum vkb_texel)settings->choices[VKB_CHOICE_texel];
     struct vkb_blur_params *params = &row.params.blur;
 
@@ -47,8 +44,8 @@ static bool add_blur(const struct vkb_settings *settings, const struct vkb_bloom
     params->blur_strength = settings->values.blur.blur_strength;
     params->layer_scale = settings->layers[layer].scale;
     params->layer_strength = 1.0f;
-    params->ratio_x = sampling.ratio_x;
-    params->ratio_y = sampling.ratio_y;
+    params->target_width = sampling.width;
+    params->target_height = sampling.height;
     params->limit = sampling.limit;
     params->step_ratio = (float)((double)source_row->height / source_row->width);
     for (uint32_t i = 0; i < settings->weight_count; ++i)

@@ -32,37 +32,38 @@ float coefficient(int tap)
     return weight(0) * (FIRST_TAP == 0 ? 1.0 + 2.0 * params.blur_strength : 1.0);
 }
 
-vec3 tap_pair(vec2 position, vec2 offset)
+vec3 tap_pair(Place place, vec2 centre, vec2 offset)
 {
-    return sample_at(source, position + offset, SAMPLING).rgb
-         + sample_at(source, position - offset, SAMPLING).rgb;
+    return sample_at(source, place, centre + offset, SAMPLING).rgb
+         + sample_at(source, place, centre - offset, SAMPLING).rgb;
 }
 
-vec3 blur_line(vec2 position, vec2 tap_step)
+vec3 blur_line(Place place, vec2 centre, vec2 tap_step)
 {
-    vec3 sum = coefficient(0) * sample_at(source, position, SAMPLING).rgb;
+    vec3 sum = coefficient(0) * sample_at(source, place, centre, SAMPLING).rgb;
     for (int tap = 1; tap <= RADIUS; ++tap)
-        sum += coefficient(tap) * tap_pair(position, float(tap) * tap_step);
+        sum += coefficient(tap) * tap_pair(place, centre, float(tap) * tap_step);
     return sum;
 }
 
 void main()
 {
     float scale = params.blur_scale * params.layer_scale;
-    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    Place place = place_in(source, ivec2(gl_FragCoord.xy),
+                           ivec2(params.target_width, params.target_height));
     vec2 across = vec2(scale, 0.0);
     // In texels of the height, one texel of the width is height / width (`step_ratio`).
     vec2 down = vec2(0.0, STEP_TEXEL == TEXEL_X ? scale * params.step_ratio : scale);
     vec3 sum;
     if (DIRECTION == DIRECTION_VERTICAL) {
-        sum = blur_line(position, down);
+        sum = blur_line(place, vec2(0.0), down);
     } else if (DIRECTION == DIRECTION_HORIZONTAL) {
-        sum = blur_line(position, across);
+        sum = blur_line(place, vec2(0.0), across);
     } else {
-        sum = coefficient(0) * blur_line(position, across);
+        sum = coefficient(0) * blur_line(place, vec2(0.0), across);
         for (int tap = 1; tap <= RADIUS; ++tap)
-            sum += coefficient(tap) * (blur_line(position + float(tap) * down, across)
-                                     + blur_line(position - float(tap) * down, across));
+            sum += coefficient(tap) * (blur_line(place, float(tap) * down, across)
+                                       + blur_line(place, -float(tap) * down, across));
     }
     colour = vec4(storable(params.layer_strength * sum), 1.0);
 }

@@ -21,8 +21,9 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
-    vec3 reduced = sample_at(image, position, SAMPLING).rgb;
+    Place place = place_in(image, ivec2(gl_FragCoord.xy),
+                           ivec2(params.target_width, params.target_height));
+    vec3 reduced = sample_at(image, place, vec2(0.0), SAMPLING).rgb;
     vec3 bright = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
     colour = vec4(storable(bright), 1.0);
 }

@@ -16,12 +16,13 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    Place place = place_in(source, ivec2(gl_FragCoord.xy),
+                           ivec2(params.target_width, params.target_height));
     vec2 diagonal = vec2(0.5, -0.5) * params.offset;
-    vec3 sum = 4.0 * sample_at(source, position, SAMPLING).rgb;
-    sum += sample_at(source, position + diagonal.xx, SAMPLING).rgb;
-    sum += sample_at(source, position + diagonal.xy, SAMPLING).rgb;
-    sum += sample_at(source, position + diagonal.yx, SAMPLING).rgb;
-    sum += sample_at(source, position + diagonal.yy, SAMPLING).rgb;
+    vec3 sum = 4.0 * sample_at(source, place, vec2(0.0), SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.xx, SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.xy, SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.yx, SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.yy, SAMPLING).rgb;
     colour = vec4(storable(sum / 8.0), 1.0);
 }

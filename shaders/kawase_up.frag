@@ -16,16 +16,17 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    Place place = place_in(smaller, ivec2(gl_FragCoord.xy),
+                           ivec2(params.target_width, params.target_height));
     vec2 axial = vec2(params.offset, 0.0);
     vec2 diagonal = vec2(0.5, -0.5) * params.offset;
-    vec3 sum = sample_at(smaller, position + axial.xy, SAMPLING).rgb;
-    sum += sample_at(smaller, position - axial.xy, SAMPLING).rgb;
-    sum += sample_at(smaller, position + axial.yx, SAMPLING).rgb;
-    sum += sample_at(smaller, position - axial.yx, SAMPLING).rgb;
-    vec3 diagonals = sample_at(smaller, position + diagonal.xx, SAMPLING).rgb;
-    diagonals += sample_at(smaller, position + diagonal.xy, SAMPLING).rgb;
-    diagonals += sample_at(smaller, position + diagonal.yx, SAMPLING).rgb;
-    diagonals += sample_at(smaller, position + diagonal.yy, SAMPLING).rgb;
+    vec3 sum = sample_at(smaller, place, axial.xy, SAMPLING).rgb;
+    sum += sample_at(smaller, place, -axial.xy, SAMPLING).rgb;
+    sum += sample_at(smaller, place, axial.yx, SAMPLING).rgb;
+    sum += sample_at(smaller, place, -axial.yx, SAMPLING).rgb;
+    vec3 diagonals = sample_at(smaller, place, diagonal.xx, SAMPLING).rgb;
+    diagonals += sample_at(smaller, place, diagonal.xy, SAMPLING).rgb;
+    diagonals += sample_at(smaller, place, diagonal.yx, SAMPLING).rgb;
+    diagonals += sample_at(smaller, place, diagonal.yy, SAMPLING).rgb;
     colour = vec4(storable((sum + 2.0 * diagonals) / 12.0), 1.0);
 }

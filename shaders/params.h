@@ -8,11 +8,11 @@
 //   INPUT(B, type, name)                  a float or int that the core fills in for each pass
 //   VEC4S(B, name, count)                 an array of vec4 that the core fills in for each pass
 
-// Of a pass that reads another image: texels of the source a pixel of the target, and the largest
-// value that the target's format holds.
+// Of a pass that reads an image of another size: the size of its own target, and the largest value
+// that the target's format holds.
 #define SAMPLING_ROWS(B, INPUT) \
-    INPUT(B, float, ratio_x) \
-    INPUT(B, float, ratio_y) \
+    INPUT(B, int, target_width) \
+    INPUT(B, int, target_height) \
     INPUT(B, float, limit)
 
 #define THRESHOLD_ROWS(B, SETTING) \

@@ -16,9 +16,9 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 layout(location = 0) out vec4 colour;
 
-vec3 tap(vec2 position, float x, float y)
+vec3 tap(Place place, float x, float y)
 {
-    return sample_at(source, position + vec2(x, y), SAMPLING).rgb;
+    return sample_at(source, place, vec2(x, y), SAMPLING).rgb;
 }
 
 // What a group counts: less the brighter it is where fireflies are filtered (Karis 2013).
@@ -31,13 +31,14 @@ float group_share(vec3 mean, float share)
 
 void main()
 {
-    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
+    Place place = place_in(source, ivec2(gl_FragCoord.xy),
+                           ivec2(params.target_width, params.target_height));
     // Rows of taps at -2, 0, 2, left to right; then the four inner ones.
-    vec3 a = tap(position, -2.0, -2.0), b = tap(position, 0.0, -2.0), c = tap(position, 2.0, -2.0);
-    vec3 d = tap(position, -2.0, 0.0), e = tap(position, 0.0, 0.0), f = tap(position, 2.0, 0.0);
-    vec3 g = tap(position, -2.0, 2.0), h = tap(position, 0.0, 2.0), i = tap(position, 2.0, 2.0);
-    vec3 inner = tap(position, -1.0, -1.0) + tap(position, 1.0, -1.0) + tap(position, -1.0, 1.0)
-               + tap(position, 1.0, 1.0);
+    vec3 a = tap(place, -2.0, -2.0), b = tap(place, 0.0, -2.0), c = tap(place, 2.0, -2.0);
+    vec3 d = tap(place, -2.0, 0.0), e = tap(place, 0.0, 0.0), f = tap(place, 2.0, 0.0);
+    vec3 g = tap(place, -2.0, 2.0), h = tap(place, 0.0, 2.0), i = tap(place, 2.0, 2.0);
+    vec3 inner = tap(place, -1.0, -1.0) + tap(place, 1.0, -1.0) + tap(place, -1.0, 1.0)
+               + tap(place, 1.0, 1.0);
     vec3 means[5] = vec3[](0.25 * inner, 0.25 * (a + b + d + e), 0.25 * (b + c + e + f),
                            0.25 * (d + e + g + h), 0.25 * (e + f + h + i));
     vec3 sum = vec3(0.0);

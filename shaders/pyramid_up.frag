@@ -16,22 +16,23 @@ layout(set = 0, binding = 2) uniform sampler2D own;
 
 layout(location = 0) out vec4 colour;
 
-vec3 tent(vec2 position)
+vec3 tent(Place place)
 {
     vec3 sum = vec3(0.0);
     for (int y = -1; y <= 1; ++y)
         for (int x = -1; x <= 1; ++x) {
             vec2 offset = params.radius * vec2(x, y);
             float weight = (2.0 - abs(float(x))) * (2.0 - abs(float(y))) / 16.0;
-            sum += weight * sample_at(smaller, position + offset, SAMPLING).rgb;
+            sum += weight * sample_at(smaller, place, offset, SAMPLING).rgb;
         }
     return sum;
 }
 
 void main()
 {
-    vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
-    vec3 sum = params.coarse * tent(position);
+    Place place = place_in(smaller, ivec2(gl_FragCoord.xy),
+                           ivec2(params.target_width, params.target_height));
+    vec3 sum = params.coarse * tent(place);
     if (ADD_OWN != 0)
         sum += params.own * texelFetch(own, ivec2(gl_FragCoord.xy), 0).rgb;
     colour = vec4(storable(sum), 1.0);

@@ -1,32 +1,51 @@
-// Samples at positions in texels (the first texel's centre is 0.5), clamped to the edge. A shader
-// that includes this may define TEXEL to change what is read of a texel.
+// Samples around the places in a source that the pixels of a target of another size fall on, clamped
+// to the edge. A shader that includes this may define TEXEL to change what is read of a texel.
 
 #ifndef TEXEL
 #define TEXEL(value) (value)
 #endif
 
-vec4 fetch_clamped(sampler2D image, ivec2 texel)
+// A texel, and how far beyond its centre the place lies, 0 to 1 texels.
+struct Place {
+    ivec2 texel;
+    vec2 part;
+};
+
+// Where the centre of a target's pixel falls. In whole numbers: a float position at the far end of a
+// large image is off by so much that filtered values of neighbouring texels would show it.
+Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
 {
-    return TEXEL(texelFetch(image, clamp(texel, ivec2(0), textureSize(image, 0) - 1), 0));
+    ivec2 divisor = 2 * target_size;
+    // One texel is added so that the division has no negative numbers, and taken away after it.
+    ivec2 number = (2 * pixel + 1) * textureSize(source, 0) - target_size + divisor;
+    ivec2 texel = number / divisor;
+    return Place(texel - 1, vec2(number - texel * divisor) / vec2(divisor));
+}
+
+vec4 fetch_clamped(sampler2D source, ivec2 texel)
+{
+    return TEXEL(texelFetch(source, clamp(texel, ivec2(0), textureSize(source, 0) - 1), 0));
 }
 
 // Bilinear in full float precision: hardware filters have 8 bits of position, or fewer.
-vec4 fetch_bilinear(sampler2D image, vec2 position)
+vec4 fetch_bilinear(sampler2D source, ivec2 texel, vec2 part)
 {
-    vec2 base = floor(position - 0.5);
-    vec2 part = position - 0.5 - base;
-    ivec2 texel = ivec2(base);
-    vec4 top = mix(fetch_clamped(image, texel), fetch_clamped(image, texel + ivec2(1, 0)), part.x);
-    vec4 bottom = mix(fetch_clamped(image, texel + ivec2(0, 1)),
-                      fetch_clamped(image, texel + ivec2(1, 1)), part.x);
+    vec4 top = mix(fetch_clamped(source, texel), fetch_clamped(source, texel + ivec2(1, 0)),
+                   part.x);
+    vec4 bottom = mix(fetch_clamped(source, texel + ivec2(0, 1)),
+                      fetch_clamped(source, texel + ivec2(1, 1)), part.x);
     return mix(top, bottom, part.y);
 }
 
-vec4 sample_at(sampler2D image, vec2 position, int sampling)
+// The source at an offset, in texels, from a place.
+vec4 sample_at(sampler2D source, Place place, vec2 offset, int sampling)
 {
     if (sampling == SAMPLING_WHOLE)
-        return fetch_clamped(image, ivec2(floor(position)));
-    if (sampling == SAMPLING_FETCH)
-        return fetch_bilinear(image, position);
-    return texture(image, position / vec2(textureSize(image, 0)));
+        return fetch_clamped(source, place.texel + ivec2(offset));
+    vec2 moved = place.part + offset;
+    if (sampling == SAMPLING_FETCH) {
+        vec2 whole = floor(moved);
+        return fetch_bilinear(source, place.texel + ivec2(whole), moved - whole);
+    }
+    return texture(source, (vec2(place.texel) + 0.5 + moved) / vec2(textureSize(source, 0)));
 }

@@ -9,6 +9,8 @@ vec3 tonemap_reinhard(vec3 c)
 // The fit to the ACES reference curve by Narkowicz, 2015.
 vec3 tonemap_aces(vec3 c)
 {
+    // Beyond this the curve is past 1 at both ends, and its squares would overflow.
+    c = clamp(c, -65504.0, 65504.0);
     return clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0);
 }
 
@@ -67,6 +69,10 @@ vec3 tonemap_agx(vec3 c)
 
 vec3 apply_tonemap(vec3 c, int tonemap)
 {
+    if (tonemap == TONEMAP_NONE)
+        return c;
+    // An exposure may have made infinity of it, and huge divisors are not exact on every device.
+    c = clamp(c, -1e30, 1e30);
     if (tonemap == TONEMAP_REINHARD)
         return tonemap_reinhard(c);
     if (tonemap == TONEMAP_ACES)
@@ -75,9 +81,7 @@ vec3 apply_tonemap(vec3 c, int tonemap)
         return tonemap_exponential(c);
     if (tonemap == TONEMAP_KHRONOS_NEUTRAL)
         return tonemap_khronos_neutral(c);
-    if (tonemap == TONEMAP_AGX)
-        return tonemap_agx(c);
-    return c;
+    return tonemap_agx(c);
 }
 
 vec3 apply_encoding(vec3 c, int encoding)

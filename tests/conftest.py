@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from vkbloom import Renderer, Scene, Settings
+
+#: What the tests run on; a GPU is tested by hand, with VKBLOOM_TEST_ADAPTER=hardware.
+ADAPTER = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -39,7 +43,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="session")
 def renderer(environment: None) -> Iterator[Renderer]:
     """A renderer whose first validation message raises, at the latest when it is closed."""
-    with Renderer("software", validation=True) as opened:
+    with Renderer(ADAPTER, validation=True) as opened:
         yield opened
 
 
@@ -49,7 +53,7 @@ def new_renderer() -> Iterator[Callable[[], Renderer]]:
     opened: list[Renderer] = []
 
     def open_one() -> Renderer:
-        opened.append(Renderer("software", validation=True))
+        opened.append(Renderer(ADAPTER, validation=True))
         return opened[-1]
 
     yield open_one

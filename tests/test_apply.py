@@ -318,9 +318,7 @@ def test_huge_exposure(renderer: Renderer, dtype: str, tonemap: Any) -> None:
     assert_composite_without_bloom(renderer, image, settings)
 
 
-def assert_composite_without_bloom(
-    renderer: Renderer, image: Image, settings: Settings
-) -> None:
+def assert_composite_without_bloom(renderer: Renderer, image: Image, settings: Settings) -> None:
     frames = renderer.apply(image, settings)
     largest = float(np.finfo(image.dtype).max)
     # The reference has no end in float32; the device's numbers do.

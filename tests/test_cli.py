@@ -284,6 +284,16 @@ def test_the_help_of_an_option_is_the_fields_docstring() -> None:
     ]
 
 
+def test_none_that_is_given_is_not_the_default() -> None:
+    @dataclasses.dataclass
+    class Cut:
+        level: float | None = 1.0
+
+    command = click.command(fields.options({"": Cut}, "cut")(lambda cut: cut))
+    assert command.main(["--level", "none"], standalone_mode=False) == {"level": None}
+    assert command.main([], standalone_mode=False) == {}
+
+
 def test_a_field_that_no_option_can_give_is_refused() -> None:
     @dataclasses.dataclass
     class Odd:

@@ -9,7 +9,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
-from tolerance import assert_matches_reference
+from tolerance import assert_close, assert_matches_reference, tolerance
 
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference
 
@@ -22,7 +22,9 @@ METHODS: dict[str, Settings] = {
     "separable": Separable(threshold=1.0),
     "loops": Separable(threshold=1.0, blur_scale=1.5, blur_strength=1.0, loops=3),
     "direct": Separable(threshold=1.0, direct=True),
-    "half-size": Separable(threshold=1.0, bloom_scale=0.5),
+    # At the default strength the taps beside the centre weigh more than it does: at half size the
+    # cross-correlation then has a peak to each side.
+    "half-size": Separable(threshold=1.0, bloom_scale=0.5, blur_strength=1.0),
     "pyramid": Pyramid(threshold=1.0),
     "firefly": Pyramid(threshold=1.0, firefly_filter=True),
     "dual-kawase": DualKawase(threshold=1.0),
@@ -41,11 +43,6 @@ def picture(request: pytest.FixtureRequest, shared_data: Path) -> Image:
     return image
 
 
-@pytest.fixture(params=METHODS)
-def settings(request: pytest.FixtureRequest) -> Settings:
-    return METHODS[request.param]
-
-
 def apply(renderer: Renderer, image: Image, settings: Settings) -> dict[str, Array]:
     """Return the colours of all framebuffers as float64."""
     frames = renderer.apply(image, settings)
@@ -53,7 +50,9 @@ def apply(renderer: Renderer, image: Image, settings: Settings) -> dict[str, Arr
 
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
-def test_reference(renderer: Renderer, picture: Image, settings: Settings, dtype: str) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_reference(renderer: Renderer, picture: Image, method: str, dtype: str) -> None:
+    settings = METHODS[method]
     image = picture.astype(dtype)
     frames = renderer.apply(image, settings)
     # The files hold neither NaN nor infinity, and none comes in.
@@ -66,69 +65,83 @@ def test_reference_tone_mapped(renderer: Renderer, picture: Image, tonemap: Any)
     settings = Pyramid(
         threshold=1.0, composite="mix", intensity=0.2, tonemap=tonemap, encoding="srgb"
     )
-    assert_matches_reference(renderer.apply(picture, settings), picture, settings)
+    frames = renderer.apply(picture, settings, attachments=("bloom", "final"))
+    expected = reference.composite(picture, frames["bloom"], settings)
+    assert_close("final", frames["final"], expected, tolerance(picture.dtype, expected))
 
 
-def displacement(image: Array, other: Array) -> tuple[float, float]:
-    """Return (y, x) of the largest cross-correlation, to a part of a pixel."""
+def displacement(image: Array, other: Array) -> Array:
+    """Return (y, x) from one grey image to another: of the peak of their cross-correlation."""
+    # Twice the size, so that what leaves the picture does not come in on the other side.
     sizes = [2 * side for side in image.shape]
     spectrum = np.conj(np.fft.rfft2(image, sizes)) * np.fft.rfft2(other, sizes)
-    correlation = np.fft.irfft2(spectrum, sizes)
-    peak = np.unravel_index(int(correlation.argmax()), correlation.shape)
-    place = []
-    for axis, at in enumerate(map(int, peak)):
-        before, top, after = (
-            float(np.roll(correlation, 1 - at, axis)[tuple(
-                i if a == axis else int(p) for a, p in enumerate(peak)
-            )])
-            for i in range(3)
-        )
-        # The top of the parabola through the peak and its neighbours.
-        part = (before - after) / (2 * (before - 2 * top + after))
-        side = sizes[axis]
-        place.append((at + side // 2) % side - side // 2 + part)
-    return place[0], place[1]
+    correlation = np.fft.fftshift(np.fft.irfft2(spectrum, sizes))
+    y, x = map(int, np.unravel_index(int(correlation.argmax()), correlation.shape))
+    lines = (correlation[y - 1 : y + 2, x], correlation[y, x - 1 : x + 2])
+    # The top of the parabola through the peak and its neighbours.
+    parts = [(low - high) / (2 * (low - 2 * top + high)) for low, top, high in lines]
+    place: Array = np.array([y - sizes[0] // 2, x - sizes[1] // 2]) + parts
+    return place
 
 
-def test_no_shift(renderer: Renderer, picture: Image, settings: Settings) -> None:
-    frames = apply(renderer, np.maximum(picture, 0), settings)
-    moved = displacement(frames["glow"].sum(axis=-1), frames["bloom"].sum(axis=-1))
-    assert np.abs(moved).max() < 0.1
+# Pixels. Dual Kawase halves by means of 2 x 2, so that a point goes to the middle of its square,
+# and leaves out a strip of odd sides: the formulas themselves move the lamps of the desk, a few
+# pixels wide, by a third of a pixel where a texel of the smallest level is 16 wide.
+SHIFTS = {"dual-kawase": 0.5}
 
 
-def test_no_ringing(renderer: Renderer, picture: Image, settings: Settings) -> None:
-    """Nothing is darker for the bloom beside it, nor brighter than flat white would be."""
+@pytest.mark.parametrize("method", METHODS)
+def test_no_shift(renderer: Renderer, picture: Image, method: str) -> None:
+    frames = apply(renderer, np.maximum(picture, 0), METHODS[method])
+    glow, bloom = frames["glow"].sum(axis=-1), frames["bloom"].sum(axis=-1)
+    # Each texel of a smaller bloom buffer as the square of pixels that it covers.
+    side = bloom.shape[0] // glow.shape[0]
+    moved = displacement(glow.repeat(side, axis=0).repeat(side, axis=1), bloom)
+    assert np.abs(moved).max() < SHIFTS.get(method, 0.1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_ringing(renderer: Renderer, picture: Image, method: str) -> None:
+    """Nothing is darker for the bloom beside it, nor brighter than the gain allows."""
     image = np.maximum(picture, 0)
-    frames = apply(renderer, image, settings)
-    brightest = reference.gain(settings.replace(threshold=None)) * frames["glow"].max()
+    frames = apply(renderer, image, METHODS[method])
+    gain = reference.gain(METHODS[method].replace(threshold=None))
     for name, framebuffer in frames.items():
         assert framebuffer.min() >= 0, name
-    assert frames["bloom"].max() <= brightest * (1 + 1e-5)
+    assert frames["bloom"].max() <= gain * frames["glow"].max() * (1 + 1e-5)
     assert (frames["final"] >= image[..., :3]).all()
 
 
-def border(image: Array, width: int = 4) -> Array:
-    """Return the pixels of a ring along the edges."""
-    inner = np.ones(image.shape[:2], bool)
-    inner[width:-width, width:-width] = False
-    ring: Array = image[inner]
-    return ring
+# Of a chain's small level, the texels beyond the edge are the edge's, and so a mirror of them.
+@pytest.mark.parametrize(
+    ("method", "beyond"),
+    [
+        ("separable", "edge"),
+        ("direct", "edge"),
+        ("pyramid", "symmetric"),
+        ("firefly", "symmetric"),
+        ("dual-kawase", "symmetric"),
+    ],
+)
+def test_no_dark_border(renderer: Renderer, picture: Image, method: str, beyond: Any) -> None:
+    """At the edges the bloom is what it would be if the picture went on beyond them.
 
-
-def test_no_dark_border(renderer: Renderer, picture: Image, settings: Settings) -> None:
-    """The bloom goes on beyond the edge as if the edge's pixels did."""
-    # A multiple of all levels' texels, so that these keep their places.
+    Black beyond the edges would leave 0.6 of a chain's bloom there.
+    """
+    # A whole number of all levels' texels, so that they keep their places.
     pad = 64
-    height, width = (side // 64 * 64 for side in picture.shape[:2])
+    height, width = (side // pad * pad for side in picture.shape[:2])
     image = np.maximum(picture[:height, :width, :3], 0)
-    # The threshold comes before: what is bright at the edge is what goes on.
-    padded = np.pad(image, ((pad, pad), (pad, pad), (0, 0)), mode="edge")
-    frames = apply(renderer, image, settings)
-    larger = apply(renderer, padded, settings)["bloom"][pad:-pad, pad:-pad]
-    assert border(frames["final"]).mean() >= border(image).mean()
-    # Not equal: the level's texels beyond the edge are the edge's one texel, not the picture's
-    # edge seen from there.
-    assert border(frames["bloom"]).mean() >= 0.9 * border(larger).mean()
+    larger = np.pad(image, ((pad, pad), (pad, pad), (0, 0)), mode=beyond)
+    frames = apply(renderer, image, METHODS[method])
+    whole = apply(renderer, larger, METHODS[method])["bloom"][pad:-pad, pad:-pad]
+    ring = np.ones((height, width), bool)
+    ring[4:-4, 4:-4] = False
+    assert frames["final"][ring].mean() >= image[ring].mean()
+    if beyond == "edge":
+        np.testing.assert_allclose(frames["bloom"], whole, rtol=0, atol=1e-5 * whole.max())
+    else:
+        assert frames["bloom"][ring].mean() >= 0.9 * whole[ring].mean()
 
 
 def far_from(lit: NDArray[np.bool_], distance: int) -> NDArray[np.bool_]:
@@ -141,7 +154,6 @@ def far_from(lit: NDArray[np.bool_], distance: int) -> NDArray[np.bool_]:
     return far
 
 
-# Where there is no bloom at all that far away, there is nothing to see.
 @pytest.mark.parametrize("levels", [4, 5, 6])
 @pytest.mark.parametrize("method", [Pyramid, DualKawase])
 def test_no_blocks(renderer: Renderer, picture: Image, method: Any, levels: int) -> None:
@@ -155,7 +167,7 @@ def test_no_blocks(renderer: Renderer, picture: Image, method: Any, levels: int)
     image = np.maximum(picture, 0)
     frames = apply(renderer, image, method(threshold=8.0, levels=levels))
     bloom = frames["bloom"].sum(axis=-1)
-    far = far_from(frames["glow"].any(axis=-1), 2**levels // 2)
+    far = far_from((frames["glow"] > 0).max(axis=-1), 2**levels // 2)
     for axis in (0, 1):
         first, second = np.abs(np.diff(bloom, axis=axis)), np.abs(np.diff(bloom, 2, axis=axis))
         keep = np.moveaxis(far, axis, 0)

@@ -162,7 +162,7 @@ class Comparison:
     def _beyond(self, name: str, limit: float | None, *, is_most: bool) -> list[str]:
         """Return why a figure fails, an empty list if it does not."""
         value = getattr(self, name)
-        label = name.replace("_", " ")
+        label = "percentage of pixels" if name == "percent_over" else name.replace("_", " ")
         if limit is None:
             return []
         if value is None:
@@ -304,18 +304,16 @@ def difference(
     if mismatches:
         raise ValueError(f"there is no difference picture: {'; '.join(mismatches)}")
     pair = _pair(a, b)
+    largest = min(float(pair.error.max()), float(np.finfo(np.float64).max))
     if scale is None:
-        largest = float(pair.error.max())
-        # The inverses of extreme doubles are no numbers to multiply with.
-        limits = np.finfo(np.float64)
-        scale = 1.0 / float(np.clip(largest, limits.tiny, limits.max)) if largest else 1.0
+        scale = 1.0 / largest if largest else 1.0
     colours = 3 if a.shape[2] >= 3 else 1
     picture = np.repeat(pair.error[:, :, :colours], 3 // colours, axis=2)
     if a.shape[2] > colours:
         others = pair.error[:, :, colours:].max(axis=2, keepdims=True)
         picture = np.maximum(picture, others)
-    # The limit first, as the product of large differences would overflow.
-    picture = np.minimum(picture, 1.0 / scale) * scale
+    with np.errstate(over="ignore"):
+        picture = np.minimum(np.minimum(picture, largest) * scale, 1.0)
     picture[pair.unequal.any(axis=2)] = (1.0, 0.0, 1.0)
     return picture.astype(np.float32), scale
 

@@ -100,7 +100,8 @@ def decode_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
     kind = encoded.dtype.type
     # The maximum keeps the power defined where the line is used.
     curve = ((np.maximum(encoded, kind(0.04045)) + kind(0.055)) / kind(1.055)) ** kind(2.4)
-    return np.where(encoded <= kind(0.04045), encoded / kind(12.92), curve)
+    linear: NDArray[Any] = np.where(encoded <= kind(0.04045), encoded / kind(12.92), curve)
+    return linear
 
 
 def encode_srgb(linear: NDArray[Any]) -> NDArray[Any]:
@@ -119,7 +120,8 @@ def encode_srgb(linear: NDArray[Any]) -> NDArray[Any]:
     """
     kind = linear.dtype.type
     curve = kind(1.055) * np.maximum(linear, kind(0.0031308)) ** kind(1 / 2.4) - kind(0.055)
-    return np.where(linear <= kind(0.0031308), linear * kind(12.92), curve)
+    encoded: NDArray[Any] = np.where(linear <= kind(0.0031308), linear * kind(12.92), curve)
+    return encoded
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -418,15 +420,15 @@ def _linear(values: NDArray[Any], encoding: Encoding, has_alpha: bool) -> NDArra
     if values.dtype.kind == "f":
         if encoding == "linear":
             return values
-        decoded = values.astype(np.float32)
+        linear = values.astype(np.float32)
         with np.errstate(over="ignore"):
-            decoded[:, :, :colours] = decode_srgb(decoded[:, :, :colours])
-            return decoded.astype(values.dtype)
+            linear[:, :, :colours] = decode_srgb(linear[:, :, :colours])
+            return linear.astype(values.dtype)
     # By table: exact for each of the few values that there are.
     scale = np.iinfo(values.dtype).max
     plain = np.arange(scale + 1) / scale
     table = (decode_srgb(plain) if encoding == "srgb" else plain).astype(np.float32)
-    decoded = table[values]
+    decoded: NDArray[Any] = table[values]
     if has_alpha:
         decoded[:, :, colours:] = plain.astype(np.float32)[values[:, :, colours:]]
     return decoded
@@ -494,7 +496,7 @@ def save(
     _check_extension(oiio, target.suffix)
     temporary = _reserve(target, [picture.values])
     try:
-        notes = _write(oiio, picture, colour, attributes or {}, temporary, target)
+        notes = _write(oiio, picture, colour, temporary, target, attributes=attributes or {})
         # Not all writers notice that a disk is full.
         if not _is_readable(oiio, temporary):
             raise OSError(errno.EIO, "not written completely; is the disk full?", str(target))
@@ -511,9 +513,10 @@ def _write(
     oiio: ModuleType,
     picture: Picture,
     colour: Colour | None,
-    attributes: Mapping[str, str],
     temporary: Path,
     target: Path,
+    *,
+    attributes: Mapping[str, str],
 ) -> tuple[str, ...]:
     writer = oiio.ImageOutput.create(str(temporary))
     chosen = _chosen_form(oiio, picture, writer, temporary)
@@ -635,7 +638,8 @@ def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
     if dtype.kind == "f":
         return values.astype(dtype, copy=False)
     clipped = np.clip(np.nan_to_num(values.astype(np.float32), nan=0.0), 0.0, 1.0)
-    return np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
+    whole: NDArray[Any] = np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
+    return whole
 
 
 def _describe(

@@ -102,7 +102,7 @@ def command(
         images.check_writable(target)
     picture = _picture(source, subimage, input_colour, raw)
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
-        click.echo(f"Applying on {renderer.info.summary}")
+        click.echo(f"Rendering on {renderer.info.summary}")
         names = [name for name in attachments.split(",") if name != "final"]
         with blaming_the_call():
             frames = renderer.apply(

@@ -89,7 +89,9 @@ def command(
     found = _with_windows(found, a, b)
     failures = found.failures(limits)
     scale = None
-    if diff is not None:
+    if diff is not None and found.max_error is None:
+        note(f"{diff} is not written: there are no differences of single values")
+    elif diff is not None:
         scale = _write_difference(a, b, diff, diff_scale)
     if as_json:
         click.echo(json.dumps(_object(first, second, found, failures, scale), indent=2))
@@ -116,13 +118,10 @@ def _with_windows(found: Comparison, a: images.StoredImage, b: images.StoredImag
 
 def _write_difference(
     a: images.StoredImage, b: images.StoredImage, path: str, scale: float | None
-) -> float | None:
-    """Write the difference picture and return its scale, None where there is no picture."""
-    try:
+) -> float:
+    """Write the difference picture and return its scale."""
+    with blaming_the_call():
         picture, used = difference(a.pixels, b.pixels, scale)
-    except ValueError as error:
-        note(f"{path} is not written: {error}")
-        return None
     for text in images.save(images.Picture.of_values(picture), path):
         note(text)
     return used
@@ -159,8 +158,9 @@ def _lines(
     failures: tuple[str, ...],
 ) -> list[str]:
     """Return the report for people."""
-    height, width, channels = a.pixels.shape
-    lines = [f"{first}: {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}", second]
+    height, width = a.pixels.shape[:2]
+    lines = [f"{first} and {second}"]
+    lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")
     if found.percent_over is not None:
         lines += _figures(found, a.channels)
     for reason in failures:

@@ -1,0 +1,188 @@
+"""Adapters: the list, the choice, and what is said where there is none."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import vkbloom
+from vkbloom import AdapterInfo, AdapterNotFoundError, Renderer, adapters
+
+VK_ERROR_INCOMPATIBLE_DRIVER = -9
+
+TYPES = {"cpu", "integrated", "discrete", "virtual", "other"}
+
+# Prints what a process without adapters, or with another choice of them, sees.
+PROGRAM = """
+import json, vkbloom
+result = {"adapters": [adapter.name for adapter in vkbloom.adapters()]}
+try:
+    with vkbloom.Renderer() as renderer:
+        result["type"] = renderer.info.type
+except vkbloom.AdapterNotFoundError as error:
+    result.update(error=str(error), call=error.vk_call, result=error.vk_result)
+print(json.dumps(result))
+"""
+
+
+def run(**environment: str) -> Any:
+    """Run PROGRAM with these environment variables, and return what it printed."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+def software() -> AdapterInfo:
+    return next(adapter for adapter in adapters() if adapter.type == "cpu")
+
+
+def test_the_list() -> None:
+    found = adapters()
+    assert isinstance(found, tuple)
+    for adapter in found:
+        assert adapter.name
+        assert adapter.type in TYPES
+        assert int(adapter.api_version.split(".")[0]) >= 1
+        for part in (adapter.name, adapter.type, adapter.driver_info, adapter.api_version):
+            assert part in adapter.summary
+        assert "\n" not in adapter.summary
+    assert found == adapters()
+
+
+def test_info_and_repr() -> None:
+    with Renderer("software") as renderer:
+        assert renderer.info == software()
+        assert repr(renderer) == f"<vkbloom.Renderer on {software().summary}>"
+        assert not renderer.closed
+    assert renderer.closed
+    assert repr(renderer) == f"<vkbloom.Renderer on {software().summary}, closed>"
+    assert renderer.info == software()
+
+
+@pytest.mark.parametrize("change", [str, str.upper, str.lower, lambda name: name[2:7]])
+def test_a_part_of_a_name_in_any_case(change: Any) -> None:
+    with Renderer(change(software().name)) as renderer:
+        assert renderer.info.name == software().name
+
+
+def test_auto_prefers_hardware() -> None:
+    order = ["discrete", "integrated", "virtual", "cpu", "other"]
+    best = min((adapter.type for adapter in adapters()), key=order.index)
+    with Renderer() as renderer:
+        assert renderer.info.type == best
+
+
+def test_hardware_is_not_software() -> None:
+    if any(adapter.type != "cpu" for adapter in adapters()):
+        with Renderer("hardware") as renderer:
+            assert renderer.info.type != "cpu"
+    else:
+        with pytest.raises(AdapterNotFoundError, match="hardware"):
+            Renderer("hardware")
+
+
+def test_an_unknown_adapter_lists_what_was_found() -> None:
+    with pytest.raises(AdapterNotFoundError) as caught:
+        Renderer("no such adapter")
+    message = str(caught.value)
+    assert '"no such adapter"' in message
+    for adapter in adapters():
+        assert adapter.name in message
+    assert "apt install" in message
+    assert caught.value.vk_call is None
+    assert caught.value.vk_result is None
+    assert isinstance(caught.value, RuntimeError)
+    assert isinstance(caught.value, vkbloom.Error)
+
+
+def test_a_name_is_text_and_no_format() -> None:
+    with pytest.raises(AdapterNotFoundError, match="%s%n%d"):
+        Renderer("%s%n%d")
+    with pytest.raises(AdapterNotFoundError):
+        Renderer("x" * 100_000)
+    with pytest.raises(ValueError, match="null"):
+        Renderer("lav\0apipe")
+
+
+@pytest.mark.parametrize("adapter", [None, 0, b"software", ["software"]])
+def test_an_adapter_is_a_name(adapter: Any) -> None:
+    with pytest.raises(TypeError, match=r"^adapter: "):
+        Renderer(adapter)
+
+
+def test_the_environment_replaces_auto(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VKBLOOM_ADAPTER", "no such adapter")
+    for arguments in ([], ["auto"]):
+        with pytest.raises(AdapterNotFoundError, match="no such adapter"):
+            Renderer(*arguments)
+    # And nothing else.
+    with Renderer("software") as renderer:
+        assert renderer.info.type == "cpu"
+    monkeypatch.setenv("VKBLOOM_ADAPTER", "")
+    with Renderer() as renderer:
+        assert renderer.info in adapters()
+
+
+def test_the_environment_of_a_process() -> None:
+    result = run(VKBLOOM_ADAPTER="software")
+    assert result["type"] == "cpu"
+    assert result["adapters"] == [adapter.name for adapter in adapters()]
+    assert "nowhere" in run(VKBLOOM_ADAPTER="nowhere")["error"]
+
+
+def test_no_driver_at_all(tmp_path: Path) -> None:
+    nothing = str(tmp_path / "nothing.json")
+    result = run(VK_ICD_FILENAMES=nothing, VK_DRIVER_FILES=nothing)
+    assert result["adapters"] == []
+    assert result["call"] == "vkCreateInstance"
+    assert result["result"] == VK_ERROR_INCOMPATIBLE_DRIVER
+    assert "apt install" in result["error"]
+    assert "mesa-vulkan-drivers" in result["error"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="hides the loader as Linux finds it")
+def test_no_loader(tmp_path: Path) -> None:
+    # Files that are no libraries end the search for libraries of their name.
+    for name in ("libvulkan.so.1", "libvulkan.so"):
+        (tmp_path / name).write_text("no library")
+    result = run(LD_LIBRARY_PATH=str(tmp_path))
+    assert result["adapters"] == []
+    assert result["call"] is None
+    assert "libvulkan.so.1" in result["error"]
+    assert "apt install libvulkan1" in result["error"]
+
+
+def test_validation_without_its_layer(tmp_path: Path) -> None:
+    program = """
+import vkbloom
+try:
+    vkbloom.Renderer("software", validation=True)
+except vkbloom.Error as error:
+    print(type(error).__name__, error)
+"""
+    environment = {
+        name: str(tmp_path)
+        for name in ("VK_LAYER_PATH", "XDG_DATA_DIRS", "XDG_DATA_HOME", "XDG_CONFIG_DIRS")
+    }
+    icds = [str(path) for path in Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json")]
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, **environment, "VK_DRIVER_FILES": ":".join(icds)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.startswith("Error ")
+    assert "VK_LAYER_KHRONOS_validation is not installed" in done.stdout
+    assert "apt install" in done.stdout

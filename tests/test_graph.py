@@ -1,0 +1,177 @@
+"""The forward system's graph: its passes, what they share, and their subpass dependencies."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import pytest
+
+from vkbloom import Separable, _core
+
+EXTERNAL = -1
+
+# VkPipelineStageFlagBits, VkAccessFlagBits and VkDependencyFlagBits of the Vulkan specification.
+DEPTH_TESTS = 0x100 | 0x200
+FRAGMENT_SHADER = 0x80
+COLOR_OUTPUT = 0x400
+TRANSFER = 0x1000
+SHADER_READ = 0x20
+COLOR_READ, COLOR_WRITE = 0x80, 0x100
+DEPTH_READ, DEPTH_WRITE = 0x200, 0x400
+TRANSFER_READ = 0x800
+BY_REGION = 1
+
+DEPTH_BEFORE_DEPTH = (
+    EXTERNAL,
+    0,
+    DEPTH_TESTS,
+    DEPTH_TESTS,
+    DEPTH_WRITE,
+    DEPTH_READ | DEPTH_WRITE,
+    BY_REGION,
+)
+READ_BEFORE_WRITE = (
+    EXTERNAL,
+    0,
+    FRAGMENT_SHADER,
+    COLOR_OUTPUT,
+    SHADER_READ,
+    COLOR_WRITE,
+    0,
+)
+WRITE_BEFORE_READ = (
+    0,
+    EXTERNAL,
+    COLOR_OUTPUT,
+    FRAGMENT_SHADER,
+    COLOR_WRITE,
+    SHADER_READ,
+    0,
+)
+
+
+def describe(settings: Separable, has_sky: bool = True) -> dict[str, Any]:
+    return _core.describe(settings, (1280, 720), has_sky)
+
+
+def names(graph: dict[str, Any]) -> list[str]:
+    return [row["name"] for row in graph["passes"]]
+
+
+def dependencies(graph: dict[str, Any], name: str) -> list[tuple[int, ...]]:
+    """Return those of the render pass that the pass of that name is in."""
+    (number,) = (row["render_pass"] for row in graph["passes"] if row["name"] == name)
+    return [tuple(row) for row in graph["dependencies"][number]]
+
+
+def test_the_three_dependencies_of_the_offscreen_render_pass() -> None:
+    # The order of the seed's page. The second and third are not by region: a blur reads the
+    # neighbours of its pixel, so it must wait for all of the image.
+    assert dependencies(describe(Separable()), "glow") == [
+        DEPTH_BEFORE_DEPTH,
+        READ_BEFORE_WRITE,
+        WRITE_BEFORE_READ,
+    ]
+
+
+@pytest.mark.parametrize("name", ["blur_vertical", "bloom"])
+def test_the_blurs_wait_for_readers_and_are_waited_for(name: str) -> None:
+    assert dependencies(describe(Separable()), name) == [READ_BEFORE_WRITE, WRITE_BEFORE_READ]
+
+
+def test_the_scene_is_read_by_the_last_pass() -> None:
+    assert dependencies(describe(Separable()), "scene") == [
+        DEPTH_BEFORE_DEPTH,
+        READ_BEFORE_WRITE,
+        WRITE_BEFORE_READ,
+    ]
+
+
+def test_the_last_pass_is_followed_by_the_readback() -> None:
+    copied = [
+        (EXTERNAL, 0, TRANSFER, COLOR_OUTPUT, TRANSFER_READ, COLOR_WRITE, 0),
+        (0, EXTERNAL, COLOR_OUTPUT, TRANSFER, COLOR_WRITE, TRANSFER_READ, 0),
+    ]
+    graph = describe(Separable())
+    assert dependencies(graph, names(graph)[-1]) == copied
+
+
+def test_layers_blend_in_one_render_pass() -> None:
+    graph = describe(Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25))))
+    layers = [row for row in graph["passes"] if row["targets"] == ["bloom"]]
+    assert len(layers) == 3
+    assert len({row["render_pass"] for row in layers}) == 1
+    blended = COLOR_READ | COLOR_WRITE
+    assert dependencies(graph, layers[0]["name"]) == [
+        (EXTERNAL, 0, FRAGMENT_SHADER, COLOR_OUTPUT, SHADER_READ, blended, 0),
+        WRITE_BEFORE_READ,
+    ]
+
+
+def test_the_passes_of_the_forward_system() -> None:
+    passes = describe(Separable())["passes"]
+    assert [(row["reads"], row["targets"]) for row in passes] == [
+        ([], ["glow", "glow_depth"]),
+        (["glow"], ["blur_vertical"]),
+        (["blur_vertical"], ["bloom"]),
+        ([], ["scene", "depth"]),
+        ([], ["scene", "depth"]),
+        (["scene", "bloom"], ["final"]),
+    ]
+    assert [row["name"] for row in passes[:5]] == [
+        "glow",
+        "blur_vertical",
+        "bloom",
+        "skybox",
+        "scene",
+    ]
+    # The sky and the body are drawn into the same targets, all others have their own.
+    assert [row["render_pass"] for row in passes] == [0, 1, 2, 3, 3, 4]
+    assert len(describe(Separable())["dependencies"]) == 5
+
+
+def test_without_a_sky() -> None:
+    assert names(describe(Separable(), has_sky=False))[3:4] == ["scene"]
+    assert "skybox" not in names(describe(Separable(), has_sky=False))
+
+
+def test_without_bloom() -> None:
+    passes = describe(Separable(bloom=False))["passes"]
+    assert [(set(row["reads"]), row["targets"]) for row in passes] == [
+        (set(), ["scene", "depth"]),
+        (set(), ["scene", "depth"]),
+        ({"scene"}, ["final"]),
+    ]
+
+
+def test_loops_follow_each_other() -> None:
+    passes = describe(Separable(loops=3))["passes"][:7]
+    # Each blur reads what the one before it wrote; only the last vertical one has a public name.
+    for before, after in itertools.pairwise(passes):
+        assert after["reads"] == before["targets"][:1]
+    assert [row["targets"][0] for row in passes].index("blur_vertical") == 5
+    assert passes[-1]["targets"] == ["bloom"]
+
+
+def test_direct_is_one_pass_a_loop() -> None:
+    passes = describe(Separable(direct=True, loops=2))["passes"][:3]
+    assert [row["reads"] for row in passes[1:]] == [["glow"], passes[1]["targets"]]
+    assert passes[-1]["targets"] == ["bloom"]
+
+
+def test_no_image_is_written_by_two_render_passes() -> None:
+    layers = ((1.0, 1.0), (2.0, 0.5))
+    for settings in (Separable(), Separable(loops=4, layers=layers), Separable(direct=True)):
+        writers: dict[str, int] = {}
+        for row in describe(settings)["passes"]:
+            for target in row["targets"]:
+                assert writers.setdefault(target, row["render_pass"]) == row["render_pass"]
+            assert set(row["reads"]) <= writers.keys()
+            assert not set(row["reads"]) & set(row["targets"])
+
+
+@pytest.mark.parametrize("size", [(0, 1), (1, 0)])
+def test_an_image_without_pixels_is_refused(size: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match="out of this adapter's range"):
+        _core.describe(Separable(), size, True)

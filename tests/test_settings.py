@@ -1,0 +1,312 @@
+"""Settings: defaults, ranges, what they store, and the kernels and presets made for them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from vkbloom import TUTORIAL, Separable, Settings, gaussian_weights, presets
+
+DEFAULTS = {
+    "bloom": True,
+    "threshold": None,
+    "knee": 0.0,
+    "composite": "add",
+    "intensity": 1.0,
+    "tonemap": "none",
+    "exposure": 0.0,
+    "encoding": "none",
+    "bloom_size": None,
+    "bloom_scale": 1.0,
+    "format": None,
+    "blur_scale": 1.0,
+    "blur_strength": 1.5,
+    "weights": (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216),
+    "loops": 1,
+    "layers": ((1.0, 1.0),),
+    "first_tap": 1,
+    "texel": "own",
+    "direct": False,
+}
+
+
+def make(**fields: Any) -> Separable:
+    """Make settings of fields that may have wrong types."""
+    return Separable(**fields)
+
+
+def test_defaults() -> None:
+    settings = Separable()
+    fields = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    assert fields == DEFAULTS
+    # 1 == True and 1 == 1.0, so the types are a matter of their own.
+    assert {n: type(v) for n, v in fields.items()} == {n: type(v) for n, v in DEFAULTS.items()}
+    assert DEFAULTS["weights"] == TUTORIAL
+
+
+def test_frozen_keyword_only_and_hashable() -> None:
+    settings = Separable(blur_scale=2.0)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        settings.blur_scale = 3.0  # type: ignore[misc]
+    with pytest.raises(TypeError):
+        Separable(True)  # type: ignore[call-arg]
+    same = Separable(blur_scale=2)
+    assert settings == same
+    assert hash(settings) == hash(same)
+    assert settings != Separable()
+    assert len({settings, same, Separable()}) == 2
+    assert eval(repr(settings), {"Separable": Separable}) == settings
+    assert pickle.loads(pickle.dumps(settings)) == settings
+
+
+def test_the_base_is_abstract() -> None:
+    with pytest.raises(TypeError, match="Settings"):
+        Settings()
+
+
+def test_replace() -> None:
+    settings = Separable(blur_scale=2.0).replace(loops=3)
+    assert settings == Separable(blur_scale=2.0, loops=3)
+    with pytest.raises(ValueError, match="loops"):
+        settings.replace(loops=17)
+    with pytest.raises(TypeError, match="levels_of_bloom"):
+        settings.replace(levels_of_bloom=3)
+
+
+def test_as_dict_is_plain() -> None:
+    settings = make(
+        blur_scale=np.float32(0.5),
+        loops=np.int64(2),
+        bloom=np.True_,
+        bloom_size=np.array([4, 5]),
+        weights=np.array([0.5, 0.25], np.float32),
+        layers=np.array([[1.0, 0.5], [2.0, 0.25]]),
+    )
+    values = settings.as_dict()
+    assert values["method"] == "separable"
+    again = json.loads(json.dumps(values))
+    assert again.pop("method") == "separable"
+    again["layers"] = tuple(map(tuple, again["layers"]))
+    assert make(**again) == settings
+    assert settings == Separable(
+        blur_scale=0.5,
+        loops=2,
+        bloom_size=(4, 5),
+        weights=(0.5, 0.25),
+        layers=((1.0, 0.5), (2.0, 0.25)),
+    )
+    assert type(settings.loops) is int
+    assert type(settings.bloom) is bool
+    assert hash(settings) == hash(make(**again))
+
+
+# Ranges
+
+EDGES: list[tuple[str, Any, Any]] = [
+    ("knee", 0.0, 1.0),
+    ("threshold", 0.0, 65504.0),
+    ("intensity", 0.0, 65504.0),
+    ("exposure", -32.0, 32.0),
+    ("bloom_scale", 0.001, 4.0),
+    ("blur_scale", 0.0, 16.0),
+    ("blur_strength", 0.0, 16.0),
+    ("loops", 1, 16),
+    ("first_tap", 0, 1),
+]
+
+
+@pytest.mark.parametrize(("name", "low", "high"), EDGES)
+def test_the_edges_of_a_range_are_in_it(name: str, low: Any, high: Any) -> None:
+    for value in (low, high):
+        assert getattr(make(**{name: value}), name) == value
+    below = low - 1 if isinstance(low, int) else math.nextafter(low, -math.inf)
+    above = high + 1 if isinstance(high, int) else math.nextafter(high, math.inf)
+    for value in (below, above, math.nan, math.inf, -math.inf, 10**400):
+        with pytest.raises(ValueError, match=rf"^{name}: .* {low:g} to {high:g}$") as caught:
+            make(**{name: value})
+        assert repr(value) in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [name for name, _, _ in EDGES] + ["bloom", "direct"])
+@pytest.mark.parametrize("value", ["1", 1j, [1.0], (), object()])
+def test_a_number_is_needed(name: str, value: object) -> None:
+    with pytest.raises(TypeError, match=rf"^{name}: "):
+        make(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["loops", "first_tap", "bloom", "direct"])
+def test_a_whole_number_is_needed(name: str) -> None:
+    low = 1 if name == "loops" else 0
+    with pytest.raises(ValueError, match=rf"^{name}: {low + 0.5}"):
+        make(**{name: low + 0.5})
+
+
+@pytest.mark.parametrize("name", ["composite", "tonemap", "encoding", "texel", "format"])
+@pytest.mark.parametrize("value", ["None", "ADD", "", 0, ["add"], b"add"])
+def test_a_name_is_one_of_a_list(name: str, value: object) -> None:
+    with pytest.raises((TypeError, ValueError), match=rf"^{name}: ") as caught:
+        make(**{name: value})
+    assert repr(value) in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["composite", "tonemap", "encoding", "texel"])
+def test_a_choice_cannot_be_none(name: str) -> None:
+    with pytest.raises((TypeError, ValueError), match=rf"^{name}: "):
+        make(**{name: None})
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("composite", ["add", "mix", "screen"]),
+        ("tonemap", ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]),
+        ("encoding", ["none", "gamma22", "srgb"]),
+        ("texel", ["own", "x"]),
+        ("format", [None, "rgba8unorm", "rgba16float", "rgba32float"]),
+    ],
+)
+def test_choices(name: str, values: list[str]) -> None:
+    for value in values:
+        assert getattr(make(**{name: value}), name) == value
+
+
+@pytest.mark.parametrize(
+    "size",
+    [(0, 1), (1, 0), (-1, 5), (1.5, 2), (math.inf, 1), (math.nan, 1), (1,), (1, 2, 3), 5, "ab"],
+    ids=str,
+)
+def test_wrong_bloom_sizes(size: Any) -> None:
+    with pytest.raises((TypeError, ValueError), match=r"^bloom_size: "):
+        make(bloom_size=size)
+
+
+# Kernels and layers
+
+
+def test_the_number_of_weights() -> None:
+    assert len(Separable(weights=(0.1,) * 65).weights) == 65
+    assert make(weights=[0.5]).weights == (0.5,)
+    for count in (0, 66):
+        with pytest.raises(ValueError, match=rf"^weights: {count}\b.* 1 to 65"):
+            Separable(weights=(0.1,) * count)
+
+
+@pytest.mark.parametrize(
+    "weights",
+    [
+        5,
+        None,
+        "abc",
+        (1.0, "x"),
+        (1.0, None),
+        ((1.0, 2.0),),
+        (math.nan,),
+        (1.0, math.inf),
+        (10**400,),
+        # Finite here, infinite in the 32 bits that the device has.
+        (1e39,),
+    ],
+    ids=str,
+)
+def test_wrong_weights(weights: Any) -> None:
+    with pytest.raises((TypeError, ValueError), match=r"^weights: "):
+        make(weights=weights)
+
+
+def test_the_number_of_layers() -> None:
+    assert len(Separable(layers=((1.0, 1.0),) * 8).layers) == 8
+    for count in (0, 9):
+        with pytest.raises(ValueError, match=rf"^layers: {count}\b.* 1 to 8"):
+            Separable(layers=((1.0, 1.0),) * count)
+
+
+@pytest.mark.parametrize(
+    "layers",
+    [
+        5,
+        None,
+        "abc",
+        (1.0, 1.0),
+        ((1.0,),),
+        ((1.0, 1.0, 1.0),),
+        ((1.0, "x"),),
+        ((math.nan, 1.0),),
+        ((1.0, math.inf),),
+        ((1.0, 1e39),),
+        ((-0.1, 1.0),),
+        ((16.1, 1.0),),
+    ],
+    ids=str,
+)
+def test_wrong_layers(layers: Any) -> None:
+    with pytest.raises((TypeError, ValueError), match=r"^layers: "):
+        make(layers=layers)
+
+
+def test_gaussian_weights() -> None:
+    weights = gaussian_weights(1.5)
+    # ceil(3 sigma) taps to each side, and the whole kernel sums to 1.
+    assert len(weights) == 6
+    assert weights[0] + 2 * sum(weights[1:]) == pytest.approx(1, abs=1e-12)
+    ratios = [weight / weights[0] for weight in weights]
+    assert ratios == pytest.approx([math.exp(-(i**2) / (2 * 1.5**2)) for i in range(6)])
+
+
+@pytest.mark.parametrize(
+    ("sigma", "radius", "count"),
+    [
+        (0.1, None, 2),
+        (1.0, None, 4),
+        (21.3, None, 65),
+        (1000.0, None, 65),
+        (5.0, 0, 1),
+        (2, 64, 65),
+    ],
+)
+def test_the_radius_of_gaussian_weights(sigma: float, radius: int | None, count: int) -> None:
+    weights = gaussian_weights(sigma, radius)
+    assert len(weights) == count
+    assert weights[0] + 2 * sum(weights[1:]) == pytest.approx(1, abs=1e-12)
+    Separable(weights=weights)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "radius", "name"),
+    [
+        (0.0, None, "sigma"),
+        (-1.0, None, "sigma"),
+        (math.nan, None, "sigma"),
+        (math.inf, None, "sigma"),
+        (1.0, -1, "radius"),
+        (1.0, 65, "radius"),
+    ],
+)
+def test_wrong_gaussian_weights(sigma: float, radius: int | None, name: str) -> None:
+    with pytest.raises(ValueError, match=rf"^{name}: "):
+        gaussian_weights(sigma, radius)
+
+
+# Presets
+
+
+def test_presets() -> None:
+    assert presets["tutorial"] == Separable()
+    assert presets["outline"] == Separable(first_tap=0, texel="x")
+    with pytest.raises(TypeError):
+        presets["tutorial"] = Separable()  # type: ignore[index]
+    for settings in presets.values():
+        assert isinstance(settings, Settings)
+
+
+def test_the_outlines_gain() -> None:
+    # The loop begins at the centre, which so gets w0 (1 + 2 strength).
+    centre, *sides = TUTORIAL
+    one_way = centre * (1 + 2 * 1.5) + 2 * 1.5 * sum(sides)
+    assert vkbloom.reference.gain(presets["outline"]) == pytest.approx(one_way**2)
