@@ -108,7 +108,7 @@ static uint32_t target_slots(const struct run *run, const struct vkb_pass_row *p
     return count;
 }
 
-// Copies the pass's parameters to the uniform buffer; they start on `aligned` bytes there.
+// Copies the pass's parameters to the uniform buffer; returns where they lie in it.
 static VkDeviceSize write_params(struct run *run, const struct vkb_pass_row *pass)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;

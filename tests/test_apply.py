@@ -249,6 +249,17 @@ def test_composite_tonemap_and_encoding(
     assert_composite(renderer, bright(dtype), settings)
 
 
+@pytest.mark.parametrize("composite", COMPOSITES)
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_composite_beyond_white_and_black(
+    renderer: Renderer, dtype: str, composite: Any
+) -> None:
+    image = picture(14, 19, 4, dtype)
+    assert image.min() < -0.4
+    assert image.max() > 6
+    assert_composite(renderer, image, Separable(composite=composite, intensity=0.7))
+
+
 @pytest.mark.parametrize("exposure", [-32.0, -3.5, 0.0, 1.0, 8.0, 32.0])
 @pytest.mark.parametrize("tonemap", TONEMAPS)
 @pytest.mark.parametrize("dtype", DTYPES)

@@ -619,6 +619,15 @@ class TestSave:
         assert target.read_bytes() == b"before"
         assert only_in(tmp_path) == [name]
 
+    def test_readers_keep_what_they_opened(self, tmp_path: Path) -> None:
+        # A file that is renamed into place leaves the old one to those who are reading it.
+        target = tmp_path / "b.png"
+        target.write_bytes(b"before")
+        with target.open("rb") as opened:
+            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
+            assert opened.read() == b"before"
+        assert load(target).pixels.shape == (2, 2, 3)
+
     def test_a_folder_in_its_place(self, tmp_path: Path) -> None:
         (tmp_path / "b.png").mkdir()
         with pytest.raises(OSError, match=r"b\.png") as caught:

@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 import click
+from rich.console import Console
 
 from vkbloom import images
 from vkbloom.cli import fields
@@ -78,7 +79,8 @@ def command(
     if diff is None and diff_scale is not None:
         raise click.UsageError("--diff-scale is for --diff")
     a, b = read(first, subimage), read(second, subimage)
-    with blaming_the_call():
+    # FLIP of a large picture of floats takes half a minute.
+    with blaming_the_call(), Console(stderr=True).status("Comparing"):
         found = compare(
             a.pixels,
             b.pixels,
