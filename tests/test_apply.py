@@ -251,9 +251,7 @@ def test_composite_tonemap_and_encoding(
 
 @pytest.mark.parametrize("composite", COMPOSITES)
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
-def test_composite_beyond_white_and_black(
-    renderer: Renderer, dtype: str, composite: Any
-) -> None:
+def test_composite_beyond_white_and_black(renderer: Renderer, dtype: str, composite: Any) -> None:
     image = picture(14, 19, 4, dtype)
     assert image.min() < -0.4
     assert image.max() > 6
