@@ -134,6 +134,10 @@ bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_blo
             return false;
         struct vkb_pass_row *pass = &graph->passes[graph->pass_count - 1];
         pass->params.blur.layer_strength = settings->layers[layer].strength;
+        // Blending does not clamp: sums of the largest floats must not overflow. (Half floats keep
+        // their whole range; what overflows there, the composite clamps.)
+        if (source->format == VKB_FORMAT_RGBA32_FLOAT)
+            pass->params.blur.limit /= (float)settings->layer_count;
         pass->blend = layer ? VKB_BLEND_ADD : VKB_BLEND_NONE;
     }
     return true;
