@@ -1,11 +1,14 @@
-"""Settings under the names of where they were published."""
+"""Settings under the names of where they were published.
+
+``docs/presets.md`` gives the source of each, its formula and what differs from it.
+"""
 
 from __future__ import annotations
 
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.settings import Separable
+from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,9 +20,20 @@ if TYPE_CHECKING:
 #: - ``"tutorial"``: the forward system, 256 x 256 bloom buffers, nine taps.
 #: - ``"outline"``: the same passes with a loop that starts at the centre and a vertical step of
 #:   one texel of the width.
+#: - ``"jimenez2014"``: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced
+#:   Warfare", SIGGRAPH 2014; six levels as in LearnOpenGL's guest article on it
+#:   (JoeyDeVries/LearnOpenGL @ a545a703f958), mixed in with the talk's 0.04.
+#: - ``"dual_kawase"``: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015, with the
+#:   iterations and the offset of KWin's tenth strength (KDE/kwin @ 00a2faf64fbf,
+#:   src/plugins/blur/blur.cpp).
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
         "outline": Separable(first_tap=0, texel="x"),
+        "jimenez2014": Pyramid(
+            levels=6, radius=1.0, firefly_filter=True, composite="mix", intensity=0.04
+        ),
+        # KWin spreads six strengths of four iterations evenly over the offsets 3 to 8.
+        "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
     }
 )
