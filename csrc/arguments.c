@@ -127,6 +127,7 @@ static bool read_method(PyObject *object, enum vkb_method *method)
         [VKB_METHOD_SEPARABLE] = "separable",
         [VKB_METHOD_PYRAMID] = "pyramid",
         [VKB_METHOD_DUAL_KAWASE] = "dual_kawase",
+        [VKB_METHOD_BEVY] = "bevy",
     };
     PyObject *value = PyObject_GetAttrString(object, "method");
 

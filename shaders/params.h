@@ -41,12 +41,20 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, SETTING)
 
-// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below.
+// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
+// the steps the distance of the tent's taps in texels of the smaller level.
 #define PYRAMID_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, radius, 1.0, 0.0, 16.0) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, own) \
-    INPUT(B, float, coarse)
+    INPUT(B, float, coarse) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y)
+
+// The first pass of a published method, from the frame.
+#define PREFILTER_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    THRESHOLD_ROWS(B, SETTING)
 
 #define KAWASE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, offset, 1.0, 0.0, 16.0) \
@@ -62,6 +70,7 @@
     BLOCK(extract, EXTRACT_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
+    BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK)
 
@@ -73,11 +82,15 @@
     COUNT(first_tap, 1, 0, 1) \
     COUNT(direct, 0, 0, 1) \
     COUNT(levels, 6, 1, 16) \
-    COUNT(firefly_filter, 0, 0, 1)
+    COUNT(firefly_filter, 0, 0, 1) \
+    COUNT(max_mip_dimension, 512, 4, 4096)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \
-    REAL(bloom_scale, 1.0, 0.001, 4.0)
+    REAL(bloom_scale, 1.0, 0.001, 4.0) \
+    REAL(low_frequency_boost, 0.7, 0.0, 1.0) \
+    REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
+    REAL(high_pass_frequency, 1.0, 0.001, 1.0)
 
 // The largest half float.
 #define HALF_LIMIT 65504.0
@@ -126,4 +139,7 @@
     NAME(DIRECTION_BOTH, 2, both) \
     NAME(SAMPLING_WHOLE, 0, whole) \
     NAME(SAMPLING_FILTER, 1, filter) \
-    NAME(SAMPLING_FETCH, 2, fetch)
+    NAME(SAMPLING_FETCH, 2, fetch) \
+    NAME(UPSAMPLE_TENT, 0, tent) \
+    NAME(UPSAMPLE_LINEAR, 1, linear) \
+    NAME(UPSAMPLE_CUBIC, 2, cubic)

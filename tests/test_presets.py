@@ -10,12 +10,21 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from vkbloom import Renderer, Settings, presets, reference
+from vkbloom import (
+    BevyBloom,
+    DualKawase,
+    Pyramid,
+    Renderer,
+    Scene,
+    Settings,
+    presets,
+    reference,
+)
 
 Array = NDArray[Any]
 
 # (width, height): odd, even, tall, wide, smaller than the chains are long.
-SIZES = [(1, 1), (7, 1), (5, 13), (64, 48), (101, 67), (333, 217)]
+SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (333, 217)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 PUBLISHED = sorted(set(presets) - {"tutorial", "outline"})
 
@@ -100,3 +109,70 @@ def test_nan_and_infinity_are_not_spread(preset_renderer: Renderer, name: str) -
     for framebuffer in set(frames) - {"final"}:
         assert np.array_equal(frames[framebuffer], expected[framebuffer]), framebuffer
     assert np.array_equal(np.isfinite(frames["final"]), np.isfinite(image))
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_scene_is_blurred_as_an_image_is(preset_renderer: Renderer, name: str) -> None:
+    settings = presets[name]
+    frames = preset_renderer.render(Scene.ufo(), settings, (160, 90))
+    format = settings.format or "rgba8unorm"
+    if type(settings) not in (Pyramid, DualKawase):
+        assert frames["glow"].shape == (90, 160, 4)
+    expected = reference.passes(frames["glow"], settings, (160, 90), format)
+    for framebuffer, values in expected.items():
+        largest = tolerance(framebuffer, values, format)
+        assert_allclose(real(frames[framebuffer]), values, rtol=0, atol=largest)
+    final = reference.composite(frames["scene"], real(frames["bloom"]), settings)
+    assert_allclose(real(frames["final"]), final, rtol=0, atol=1.01 / 255)
+
+
+# --- Bevy ---
+
+
+def test_bevys_shares_are_the_published_ones() -> None:
+    """f_0..f_7 and each level's share, worked out from the formula in settings.rs."""
+    factors = [0.15, 0.717737, 0.744289, 0.744992, 0.745, 0.745, 0.745, 0.745]
+    shares = [0.28226, 0.18353, 0.13623, 0.10148, 0.07561, 0.05633, 0.04196, 0.12260]
+    rest = 1.0
+    for factor, share in zip([*factors[1:], 0.0], shares, strict=True):
+        assert rest * (1 - factor) == pytest.approx(share, abs=1e-5)
+        rest *= factor
+    own, coarse = reference.bevy._shares(BevyBloom())
+    assert_allclose(coarse, factors[1:], atol=1e-6)
+    assert_allclose(np.add(own, coarse), 1, rtol=1e-12)
+
+
+def test_bevys_sizes(preset_renderer: Renderer) -> None:
+    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["bevy_natural"])
+    sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
+    assert sizes[:3] == [(910, 512), (455, 256), (227, 128)]
+    assert sizes[-1] == (7, 4)
+    assert len(sizes) == 8
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        # Bloom::OLD_SCHOOL and Bloom::SCREEN_BLUR
+        BevyBloom(intensity=0.05, threshold=0.6, knee=0.2, composite="add"),
+        BevyBloom(
+            intensity=1.0,
+            low_frequency_boost=0.0,
+            low_frequency_boost_curvature=0.0,
+            high_pass_frequency=1 / 3,
+        ),
+        BevyBloom(max_mip_dimension=100, threshold=0.3),
+        BevyBloom(max_mip_dimension=5, composite="add"),
+    ],
+    ids=["old-school", "screen-blur", "100-high", "two-levels"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_bevys_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(preset_renderer, lights((91, 53), "float32"), settings.replace(format=format))
+
+
+def test_bevy_has_no_screen_and_ends_at_1() -> None:
+    with pytest.raises(ValueError, match="composite: 'screen' is not one of mix, add"):
+        BevyBloom(composite="screen")
+    with pytest.raises(ValueError, match=r"intensity: 1\.5 is out of range, 0 to 1"):
+        BevyBloom(intensity=1.5)

@@ -20,6 +20,7 @@ from vkbloom._core import (
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
 from vkbloom.presets import presets
+from vkbloom.published import BevyBloom
 from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Scene
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
@@ -30,6 +31,7 @@ __all__ = [
     "TUTORIAL",
     "AdapterInfo",
     "AdapterNotFoundError",
+    "BevyBloom",
     "Camera",
     "DeviceLostError",
     "DualKawase",

@@ -8,6 +8,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from vkbloom.published import BevyBloom
 from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 #: - ``"dual_kawase"``: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015, with the
 #:   iterations and the offset of KWin's tenth strength (KDE/kwin @ 00a2faf64fbf,
 #:   src/plugins/blur/blur.cpp).
+#: - ``"bevy_natural"``: ``Bloom::NATURAL`` of bevyengine/bevy, tag v0.19.1 (b56fc29d3016),
+#:   crates/bevy_post_process/src/bloom/settings.rs.
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
@@ -35,5 +38,6 @@ presets: Mapping[str, Settings] = MappingProxyType(
         ),
         # KWin spreads six strengths of four iterations evenly over the offsets 3 to 8.
         "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
+        "bevy_natural": BevyBloom(),
     }
 )

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import dual_kawase, pyramid, separable
+from . import bevy, dual_kawase, pyramid, separable
 from .compositing import CompositeSettings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
@@ -39,12 +39,15 @@ class _Method(NamedTuple):
     # (glow, settings, size of the bloom, storing) -> framebuffers after the glow
     passes: Callable[[Array, Any, tuple[int, int], Storage], dict[str, Array]]
     gain: Callable[[Any], float]
+    # Reduces and thresholds the frame in its own way, which its passes begin with.
+    published: bool = False
 
 
 _METHODS = {
     "separable": _Method(separable.passes, separable.gain),
     "pyramid": _Method(pyramid.passes, pyramid.gain),
     "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
+    "bevy": _Method(bevy.passes, bevy.gain, published=True),
 }
 
 
@@ -88,8 +91,10 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     height, width, _ = scene.shape
     store = storage(format_of(image, settings.format))
     reduced = sample(finite(scene[..., :3]), _bloom_size(settings, (width, height)))
-    glow = store(extract(reduced, settings.threshold, settings.knee))
-    blurred = _method(settings).passes(glow, settings, (width, height), store)
+    method = _method(settings)
+    threshold = None if method.published else settings.threshold
+    glow = store(extract(reduced, threshold, settings.knee))
+    blurred = method.passes(glow, settings, (width, height), store)
     framebuffers = {name: _with_alpha(rgb) for name, rgb in {"glow": glow, **blurred}.items()}
     framebuffers["final"] = composite(scene, framebuffers["bloom"], settings, dtype)
     return framebuffers
@@ -182,8 +187,10 @@ def gain(settings: Settings) -> float:
     -------
     float
     """
-    glow = float(extract(np.ones((1, 1, 3)), settings.threshold, settings.knee)[0, 0, 0])
-    return glow * _method(settings).gain(settings)
+    method = _method(settings)
+    threshold = None if method.published else settings.threshold
+    glow = float(extract(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
+    return glow * method.gain(settings)
 
 
 def _method(settings: Settings) -> _Method:

@@ -6,7 +6,7 @@ import numpy as np
 
 from .sampling import Array
 
-__all__ = ["extract", "luminance"]
+__all__ = ["extract", "luminance", "soften"]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -53,6 +53,22 @@ def extract(rgb: Array, threshold: float | None, knee: float) -> Array:
         return rgb
     if knee == 0:
         return np.where(luminance(rgb) > threshold, rgb, 0.0)
+    return soften(rgb, threshold, knee)
+
+
+def soften(rgb: Array, threshold: float, knee: float) -> Array:
+    """Apply the soft threshold, also where the knee is 0: colours lose `threshold` there.
+
+    Parameters
+    ----------
+    rgb : ndarray of float64, shape (..., C)
+    threshold, knee : float
+        As for `extract`.
+
+    Returns
+    -------
+    ndarray of float64, shape (..., C)
+    """
     brightness = rgb.max(axis=-1, keepdims=True)
     half_width = threshold * knee
     soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2

@@ -1,0 +1,160 @@
+#include "levels.h"
+
+#include <stdio.h>
+
+struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse)
+{
+    struct vkb_combination combination = {
+        .kernel = kernel,
+        .last_kernel = kernel,
+        .radius = 1.0,
+        .gain = 1.0,
+    };
+
+    for (int level = 0; level < VKB_MAX_LEVELS; ++level) {
+        combination.own[level] = own;
+        combination.coarse[level] = coarse;
+    }
+    return combination;
+}
+
+static uint32_t half(uint32_t side)
+{
+    return side > 1 ? side / 2 : 1;
+}
+
+struct vkb_size vkb_halved(struct vkb_size size)
+{
+    return (struct vkb_size){half(size.width), half(size.height)};
+}
+
+void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count)
+{
+    struct vkb_size size = above;
+
+    while (levels->count < count) {
+        size = vkb_halved(size);
+        if (levels->count > 0 && size.width == 1 && size.height == 1)
+            break;
+        levels->sizes[levels->count++] = size;
+    }
+}
+
+static bool add_image(const struct vkb_levels *levels, const char *name, uint32_t number,
+                      struct vkb_size size, bool framebuffer, uint32_t *image,
+                      struct vkb_error *error)
+{
+    struct vkb_image_row row = {
+        .format = levels->source->format,
+        .width = size.width,
+        .height = size.height,
+        .framebuffer = framebuffer,
+    };
+
+    snprintf(row.name, sizeof row.name, name, number);
+    return vkb_graph_add_image(levels->graph, &row, image, error);
+}
+
+bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
+                      struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    return add_image(levels, name, number, size, true, image, error);
+}
+
+bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
+                     struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    return add_image(levels, name, number, size, false, image, error);
+}
+
+static struct vkb_pass_row fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                        uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_fullscreen_row(levels->graph->images[to].name, fragment, to);
+
+    row.reads[0] = from;
+    row.read_count = 1;
+    // Never the sampler's filter: lavapipe's is good to 8 bits, and the errors of a chain add up.
+    row.constants[0] = SAMPLING_FETCH;
+    row.constant_count = 1;
+    return row;
+}
+
+struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                    uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = fetching_row(levels, fragment, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_between(levels->graph, from, to);
+
+    row.block = VKB_BLOCK_pyramid;
+    row.params.pyramid.ratio_x = sampling.ratio_x;
+    row.params.pyramid.ratio_y = sampling.ratio_y;
+    row.params.pyramid.limit = sampling.limit;
+    return row;
+}
+
+struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                      uint32_t from, uint32_t to)
+{
+    const struct vkb_settings *settings = levels->settings;
+    struct vkb_pass_row row = fetching_row(levels, fragment, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_between(levels->graph, from, to);
+
+    row.constants[1] = settings->thresholded;
+    row.constant_count = 2;
+    row.block = VKB_BLOCK_prefilter;
+    row.params.prefilter = settings->values.prefilter;
+    if (!settings->thresholded) {
+        row.params.prefilter.threshold = 0.0f;
+        row.params.prefilter.knee = 0.0f;
+    }
+    row.params.prefilter.ratio_x = sampling.ratio_x;
+    row.params.prefilter.ratio_y = sampling.ratio_y;
+    row.params.prefilter.limit = sampling.limit;
+    return row;
+}
+
+// From the smaller level `from` to `to`, to which the level `own` is added, if there is one.
+static bool add_up(const struct vkb_levels *levels, enum vkb_mode kernel, double radius,
+                   uint32_t from, uint32_t to, uint32_t own, double own_share, double coarse_share,
+                   struct vkb_error *error)
+{
+    struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_up_frag, from, to);
+    struct vkb_pyramid_params *params = &row.params.pyramid;
+
+    row.constants[1] = own != VKB_NO_IMAGE;
+    row.constants[2] = kernel;
+    row.constant_count = 3;
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row.reads[1] = own != VKB_NO_IMAGE ? own : from;
+    row.read_count = 2;
+    params->step_x = radius > 0.0 ? (float)radius : params->ratio_x;
+    params->step_y = radius > 0.0 ? (float)radius : params->ratio_y;
+    params->own = (float)own_share;
+    params->coarse = (float)coarse_share;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+// Sums of levels where the format holds them. In rgba8unorm, which ends at 1, each image holds its
+// sum divided by what a flat 1 becomes there (`whole`), and the bloom is multiplied by it.
+bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
+                        uint32_t *bloom, struct vkb_error *error)
+{
+    const bool means = levels->source->format == VKB_FORMAT_RGBA8_UNORM;
+    uint32_t top = levels->downs[levels->count - 1];
+    double below = 1.0;
+
+    for (uint32_t level = levels->count - 1; level-- > 0;) {
+        const uint32_t from = top;
+        const double own = combination->own[level], coarse = combination->coarse[level];
+        const double whole = means ? own + coarse * below : 1.0;
+        if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &top, error)
+            || !add_up(levels, combination->kernel, combination->radius, from, top,
+                       levels->downs[level], own / whole, coarse * below / whole, error))
+            return false;
+        below = whole;
+    }
+    return vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
+        && add_up(levels, combination->last_kernel, combination->radius, top, *bloom, VKB_NO_IMAGE,
+                  0.0, combination->gain * below, error);
+}

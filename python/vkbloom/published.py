@@ -1,0 +1,84 @@
+"""The settings of bloom as engines publish it: each class is one engine's method.
+
+Their parameters have the names, the defaults and the ranges of their sources, as far as C's table
+of numbers (``shaders/params.h``) can say it. What all of them share: they start from the whole
+frame (``bloom_scale`` 1 in scenes too), reduce it by rules of their own, and threshold where their
+source does, so that ``glow`` is what goes in, not what the threshold lets through. Their buffers
+are half floats unless ``format`` says otherwise, for those of the sources are floats too.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vkbloom.settings import BloomFormat, Composite, Settings, _number, check_number
+
+__all__ = ["BevyBloom"]
+
+
+def _check_composite(settings: Settings, *allowed: Composite) -> None:
+    """Raise ValueError unless the method has the composite."""
+    if settings.composite not in allowed:
+        raise ValueError(
+            f"composite: {settings.composite!r} is not one of {', '.join(allowed)}, "
+            f"which the method {settings.method} has"
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BevyBloom(Settings):
+    """Bevy's bloom, by default its ``Bloom::NATURAL``.
+
+    Parameters
+    ----------
+    low_frequency_boost : float
+        How much the larger blurs count beyond `intensity`, 0 to 1.
+    low_frequency_boost_curvature : float
+        How soon the boost sets in from level to level, 0 to 0.99.
+    high_pass_frequency : float
+        Share of the levels, counted from the smallest blur, that are left in whole, 0.001 to 1.
+    max_mip_dimension : int
+        Height of ``down_0`` in pixels, 4 to 4096.
+    composite : {"mix", "add"}
+        Bevy's "energy conserving" and "additive".
+    intensity : float
+        0 to 1; it counts on the way up, too.
+    threshold, knee : float
+        Bevy's threshold and threshold softness, always with the knee curve.
+    **settings
+        The other fields of `Settings`.
+
+    Notes
+    -----
+    ``down_0`` is `max_mip_dimension` high, as wide as the frame's aspect asks for (rounded). It is
+    the 13 taps of Jimenez in texels of the frame, each of their five groups p, already times its
+    share, divided by 1 + luminance(p) / 4; then at least 0.0001; then the threshold. The
+    N = floor(log2(max_mip_dimension)) - 1 levels, each next the floored half, are plain 13 taps.
+    For level m, with x = m / (N - 1), f_m is
+
+        (intensity + (1 - (1 - x)^(1 / (1 - curvature))) * boost * (1 - intensity))
+        * (1 - clamp((x - high_pass) / high_pass, 0, 1)),
+
+    without the factor 1 - intensity where the composite is "add"; then
+    up_k = (1 - f_k+1) down_k + f_k+1 tent(up_k+1), for "add" down_k + f_k+1 tent(up_k+1), with the
+    tent of `Pyramid` at a radius of 1. Bevy's last step, lerp(scene, tent(up_0), f_0), is the
+    composite, as f_0 is the intensity.
+
+    Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016), crates/bevy_post_process/src/bloom.
+    """
+
+    method: ClassVar[str] = "bevy"
+
+    composite: Composite = "mix"
+    intensity: float = _number("intensity", default=0.15)
+    format: BloomFormat | None = "rgba16float"
+    low_frequency_boost: float = _number("low_frequency_boost")
+    low_frequency_boost_curvature: float = _number("low_frequency_boost_curvature")
+    high_pass_frequency: float = _number("high_pass_frequency")
+    max_mip_dimension: int = _number("max_mip_dimension")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "mix", "add")
+        check_number("intensity", self.intensity, 0, 1)
