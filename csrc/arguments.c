@@ -128,6 +128,7 @@ static bool read_method(PyObject *object, enum vkb_method *method)
         [VKB_METHOD_PYRAMID] = "pyramid",
         [VKB_METHOD_DUAL_KAWASE] = "dual_kawase",
         [VKB_METHOD_BEVY] = "bevy",
+        [VKB_METHOD_KINO] = "kino",
     };
     PyObject *value = PyObject_GetAttrString(object, "method");
 

@@ -115,9 +115,9 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_
 }
 
 // From the smaller level `from` to `to`, to which the level `own` is added, if there is one.
-static bool add_up(const struct vkb_levels *levels, enum vkb_mode kernel, double radius,
-                   uint32_t from, uint32_t to, uint32_t own, double own_share, double coarse_share,
-                   struct vkb_error *error)
+static bool add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
+                   enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
+                   double coarse_share, struct vkb_error *error)
 {
     struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_up_frag, from, to);
     struct vkb_pyramid_params *params = &row.params.pyramid;
@@ -128,8 +128,8 @@ static bool add_up(const struct vkb_levels *levels, enum vkb_mode kernel, double
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = own != VKB_NO_IMAGE ? own : from;
     row.read_count = 2;
-    params->step_x = radius > 0.0 ? (float)radius : params->ratio_x;
-    params->step_y = radius > 0.0 ? (float)radius : params->ratio_y;
+    params->step_x = combination->target_step ? params->ratio_x : (float)combination->radius;
+    params->step_y = combination->target_step ? params->ratio_y : (float)combination->radius;
     params->own = (float)own_share;
     params->coarse = (float)coarse_share;
     return vkb_graph_add_pass(levels->graph, &row, error);
@@ -149,12 +149,12 @@ bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combin
         const double own = combination->own[level], coarse = combination->coarse[level];
         const double whole = means ? own + coarse * below : 1.0;
         if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &top, error)
-            || !add_up(levels, combination->kernel, combination->radius, from, top,
-                       levels->downs[level], own / whole, coarse * below / whole, error))
+            || !add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
+                       own / whole, coarse * below / whole, error))
             return false;
         below = whole;
     }
     return vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
-        && add_up(levels, combination->last_kernel, combination->radius, top, *bloom, VKB_NO_IMAGE,
-                  0.0, combination->gain * below, error);
+        && add_up(levels, combination, combination->last_kernel, top, *bloom, VKB_NO_IMAGE, 0.0,
+                  combination->gain * below, error);
 }

@@ -20,8 +20,8 @@ struct vkb_levels {
 // bloom = gain * V(up_0).
 struct vkb_combination {
     enum vkb_mode kernel, last_kernel;  // U and V, of UPSAMPLE_*
-    double radius;                      // of a tent, in texels of the smaller level; 0: one texel
-                                        // of the larger one
+    double radius;                      // of a tent, in texels of the smaller level
+    bool target_step;                   // instead, one texel of the larger level
     double own[VKB_MAX_LEVELS], coarse[VKB_MAX_LEVELS];
     double gain;
 };

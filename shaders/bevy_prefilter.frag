@@ -29,7 +29,9 @@ void main()
         sum += part / (1.0 + 0.25 * luminance);
     }
     sum = max(sum, vec3(1e-4));
-    if (THRESHOLDED != 0)
-        sum = threshold_knee(sum, params.threshold, params.knee);
+    if (THRESHOLDED != 0) {
+        float width = params.threshold * params.knee;
+        sum = soft_threshold(sum, params.threshold, width, 4.0 * (width + 1e-5), 1e-5);
+    }
     colour = vec4(storable(sum), 1.0);
 }

@@ -83,7 +83,8 @@
     COUNT(direct, 0, 0, 1) \
     COUNT(levels, 6, 1, 16) \
     COUNT(firefly_filter, 0, 0, 1) \
-    COUNT(max_mip_dimension, 512, 4, 4096)
+    COUNT(max_mip_dimension, 512, 4, 4096) \
+    COUNT(anti_flicker, 1, 0, 1)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Draws what each preset makes of one bright point, side by side, for docs/presets.md.
 
-The point is one pixel of 1000 in the middle of a black 640 x 360 frame. Shown is the bloom, cut to
-a square around the point, as log10 of its share of the brightest bloom pixel: white is that one,
-black 10^-5 of it or less.
+The point is 3 x 3 pixels of 1000 in the middle of a black 640 x 360 frame: KinoBloom removes a
+single one. Shown is the bloom, cut to a square around the point, as log10 of its share of the
+brightest bloom pixel: white is that one, black 10^-5 of it or less.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ def spread(renderer: vkbloom.Renderer, settings: vkbloom.Settings) -> NDArray[np
     """Return the bloom of the point, (SIDE, SIDE)."""
     width, height = FRAME
     image = np.zeros((height, width, 3), np.float32)
-    image[height // 2, width // 2] = 1000
+    y, x = height // 2, width // 2
+    image[y - 1 : y + 2, x - 1 : x + 2] = 1000
     bloom = renderer.apply(image, settings.replace(format="rgba32float"))["bloom"]
     top, left = (height - SIDE) // 2, (width - SIDE) // 2
     cut: NDArray[np.float32] = bloom[top : top + SIDE, left : left + SIDE, 0]

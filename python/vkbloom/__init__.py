@@ -20,7 +20,7 @@ from vkbloom._core import (
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
 from vkbloom.presets import presets
-from vkbloom.published import BevyBloom
+from vkbloom.published import BevyBloom, KinoBloom
 from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Scene
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
@@ -37,6 +37,7 @@ __all__ = [
     "DualKawase",
     "Error",
     "Frames",
+    "KinoBloom",
     "OutOfMemoryError",
     "Pyramid",
     "Renderer",

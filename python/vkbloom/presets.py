@@ -8,7 +8,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.published import BevyBloom
+from vkbloom.published import BevyBloom, KinoBloom
 from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 #:   src/plugins/blur/blur.cpp).
 #: - ``"bevy_natural"``: ``Bloom::NATURAL`` of bevyengine/bevy, tag v0.19.1 (b56fc29d3016),
 #:   crates/bevy_post_process/src/bloom/settings.rs.
+#: - ``"kino"``: keijiro/KinoBloom @ 0a04c43fa47d, Assets/Kino/Bloom/Bloom.cs, in high quality.
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
@@ -39,5 +40,6 @@ presets: Mapping[str, Settings] = MappingProxyType(
         # KWin spreads six strengths of four iterations evenly over the offsets 3 to 8.
         "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
         "bevy_natural": BevyBloom(),
+        "kino": KinoBloom(),
     }
 )

@@ -12,9 +12,14 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.settings import BloomFormat, Composite, Settings, _number, check_number
+from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number, check_number
 
-__all__ = ["BevyBloom"]
+__all__ = ["BevyBloom", "KinoBloom"]
+
+
+def _linear(encoded: float) -> float:
+    """Return the linear value of an sRGB one above 0.04045: engines show thresholds as sRGB."""
+    return float(((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def _check_composite(settings: Settings, *allowed: Composite) -> None:
@@ -82,3 +87,50 @@ class BevyBloom(Settings):
         super().__post_init__()
         _check_composite(self, "mix", "add")
         check_number("intensity", self.intensity, 0, 1)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class KinoBloom(Settings):
+    """Keijiro Takahashi's KinoBloom, version 2, in its high quality.
+
+    Parameters
+    ----------
+    radius : float
+        Of the blur, 1 to 7; one more doubles it.
+    anti_flicker : bool
+        A median of five pixels before the threshold, and the first level's four taps weighted by
+        1 / (1 + their brightest channel).
+    threshold : float or None
+        In linear light; KinoBloom shows the default as 0.8 in sRGB.
+    knee : float
+        KinoBloom's "soft knee".
+    composite : {"add"}
+    **settings
+        The other fields of `Settings`.
+
+    Notes
+    -----
+    ``bright`` is, at the frame's size, m = median(median(c, left, right), up, down) past the knee
+    curve with k = threshold * knee + 1e-5 and q = clamp(b - threshold + k, 0, 2k)^2 / (4k).
+    ``down_0`` is its half, each next the floored half, all by four taps of 1/4 one texel to each
+    side. With lg = log2(height) + radius - 8 there are N = clamp(trunc(lg), 1, 16) levels, and the
+    tent's taps are 0.5 + lg - trunc(lg) texels apart: up_k = down_k + tent(up_k+1) and
+    ``bloom`` = tent(up_0), the sum of the levels, not their mean. In "rgba8unorm" the images on
+    the way up hold means, and the bloom is N times as coarse.
+
+    Source: keijiro/KinoBloom @ 0a04c43fa47d (2017), Assets/Kino/Bloom/Bloom.cs, Bloom.cginc.
+    """
+
+    method: ClassVar[str] = "kino"
+
+    threshold: float | None = _linear(0.8)
+    knee: float = _number("knee", default=0.5)
+    intensity: float = _number("intensity", default=0.8)
+    format: BloomFormat | None = "rgba16float"
+    radius: float = _number("radius", default=2.5)
+    anti_flicker: bool = _flag("anti_flicker")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+        check_number("radius", self.radius, 1, 7)

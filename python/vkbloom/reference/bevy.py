@@ -106,7 +106,8 @@ def _prefilter(image: Array, size: tuple[int, int], settings: BevySettings) -> A
 def _threshold(rgb: Array, settings: BevySettings) -> Array:
     if settings.threshold is None:
         return rgb
-    return soften(rgb, settings.threshold, settings.knee)
+    half_width = settings.threshold * settings.knee
+    return soften(rgb, settings.threshold, half_width, 4 * (half_width + 1e-5), 1e-5)
 
 
 def _shares(settings: BevySettings) -> tuple[list[float], list[float]]:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bevy, dual_kawase, pyramid, separable
+from . import bevy, dual_kawase, kino, pyramid, separable
 from .compositing import CompositeSettings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
@@ -38,9 +38,11 @@ class Settings(CompositeSettings, Protocol):
 class _Method(NamedTuple):
     # (glow, settings, size of the bloom, storing) -> framebuffers after the glow
     passes: Callable[[Array, Any, tuple[int, int], Storage], dict[str, Array]]
-    gain: Callable[[Any], float]
+    gain: Callable[..., float]
     # Reduces and thresholds the frame in its own way, which its passes begin with.
     published: bool = False
+    # The number of levels that are added follows from the frame's size, and so does the gain.
+    sized: bool = False
 
 
 _METHODS = {
@@ -48,6 +50,7 @@ _METHODS = {
     "pyramid": _Method(pyramid.passes, pyramid.gain),
     "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
     "bevy": _Method(bevy.passes, bevy.gain, published=True),
+    "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
 }
 
 
@@ -175,13 +178,16 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
-def gain(settings: Settings) -> float:
+def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
     """Return the bloom of a flat image of 1, before any clamp and before the intensity.
 
     Parameters
     ----------
     settings : vkbloom.Separable, Pyramid or DualKawase
         A threshold that they set has its effect: a flat image of 1 passes through it first.
+    size : (int, int), optional
+        Width and height of the image. Counts with `vkbloom.KinoBloom`, which adds more levels
+        the higher the image is.
 
     Returns
     -------
@@ -190,7 +196,7 @@ def gain(settings: Settings) -> float:
     method = _method(settings)
     threshold = None if method.published else settings.threshold
     glow = float(extract(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
-    return glow * method.gain(settings)
+    return glow * (method.gain(settings, size) if method.sized else method.gain(settings))
 
 
 def _method(settings: Settings) -> _Method:
