@@ -13,6 +13,7 @@ enum vkb_method {
     VKB_METHOD_DUAL_KAWASE,
     VKB_METHOD_BEVY,
     VKB_METHOD_KINO,
+    VKB_METHOD_FILAMENT,
     VKB_METHOD_COUNT,
 };
 

@@ -54,7 +54,8 @@
 // The first pass of a published method, from the frame.
 #define PREFILTER_BLOCK(B, SETTING, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
-    THRESHOLD_ROWS(B, SETTING)
+    THRESHOLD_ROWS(B, SETTING) \
+    SETTING(B, highlight, 1000.0, 10.0, 65504.0)
 
 #define KAWASE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, offset, 1.0, 0.0, 16.0) \
@@ -84,7 +85,8 @@
     COUNT(levels, 6, 1, 16) \
     COUNT(firefly_filter, 0, 0, 1) \
     COUNT(max_mip_dimension, 512, 4, 4096) \
-    COUNT(anti_flicker, 1, 0, 1)
+    COUNT(anti_flicker, 1, 0, 1) \
+    COUNT(resolution, 384, 16, 2048)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vkbloom import (
     BevyBloom,
     DualKawase,
+    FilamentBloom,
     KinoBloom,
     Pyramid,
     Renderer,
@@ -100,8 +101,9 @@ def test_a_flat_image_gets_the_gain(preset_renderer: Renderer, name: str) -> Non
     settings = presets[name].replace(format="rgba32float")
     gain = reference.gain(settings, (71, 45))
     bloom = preset_renderer.apply(np.ones((45, 71, 3), np.float32), settings)["bloom"]
-    assert_allclose(bloom[..., :3], gain, rtol=1e-5)
-    assert_allclose(reference.blur(np.ones((45, 71, 3)), settings), gain, rtol=1e-9)
+    # Absolute too: a subtractive threshold of 1 leaves of 1 what its sums were rounded by.
+    assert_allclose(bloom[..., :3], gain, rtol=1e-5, atol=1e-6)
+    assert_allclose(reference.blur(np.ones((45, 71, 3)), settings), gain, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
@@ -222,3 +224,63 @@ def test_kinos_median_removes_a_single_bright_pixel_and_keeps_a_large_light() ->
 @pytest.mark.parametrize("format", FORMATS.values())
 def test_kinos_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
     check(preset_renderer, lights((91, 153), "float32"), settings.replace(format=format))
+
+
+# --- Filament ---
+
+
+def test_filaments_sizes(preset_renderer: Renderer) -> None:
+    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["filament"])
+    sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
+    assert sizes == [(672 >> k, 384 >> k) for k in range(6)]
+
+
+def test_filaments_reduction_is_a_sample_of_the_binomial() -> None:
+    """Without a threshold, level 0 is what a slow loop over the convolved image finds."""
+    image = np.random.default_rng(5).random((5, 7, 1))
+    padded = np.pad(image[..., 0], 2, mode="edge")
+    expected = np.zeros((16, 32))
+    for y in range(16):
+        for x in range(32):
+            at_y, at_x = (y + 0.5) * 5 / 16 - 0.5, (x + 0.5) * 7 / 32 - 0.5
+            top, left = int(np.floor(at_y)), int(np.floor(at_x))
+            for row, row_share in ((top, top + 1 - at_y), (top + 1, at_y - top)):
+                for column, column_share in ((left, left + 1 - at_x), (left + 1, at_x - left)):
+                    around = padded[row + 1 : row + 4, column + 1 : column + 4]
+                    binomial = np.array([1, 2, 1]) @ around @ np.array([1, 2, 1]) / 16
+                    expected[y, x] += row_share * column_share * binomial
+    # 24 / 5 * 7 = 33.6 wide, floored to a multiple of 16
+    settings = FilamentBloom(threshold=None, resolution=24, levels=1)
+    down = reference.passes(image, settings)["down_0"]
+    assert_allclose(down[..., 0], expected, rtol=1e-12)
+
+
+def test_filament_of_a_flat_image(preset_renderer: Renderer) -> None:
+    flat = np.full((300, 1000, 3), 3.0, np.float32)
+    settings = FilamentBloom(format="rgba32float", resolution=50)
+    bloom = preset_renderer.apply(flat, settings)["bloom"][..., :3]
+    assert_allclose(bloom, 2 / (1 + 2 / 1000), rtol=1e-5)
+    bloom = preset_renderer.apply(flat, settings.replace(threshold=None))["bloom"][..., :3]
+    assert_allclose(bloom, 3, rtol=1e-5)
+    assert reference.gain(FilamentBloom(threshold=0.5)) == pytest.approx(0.5 / 1.0005)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        FilamentBloom(threshold=None, levels=1),
+        FilamentBloom(resolution=40, levels=12, highlight=10.0),  # halved first, odd levels
+        FilamentBloom(resolution=112, levels=5, threshold=0.25),
+    ],
+    ids=["one-level", "low-resolution", "low-threshold"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_filaments_other_settings(
+    preset_renderer: Renderer, settings: Settings, format: Any
+) -> None:
+    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
+
+
+def test_filament_has_no_knee() -> None:
+    with pytest.raises(ValueError, match=r"knee: 0\.5 is out of range"):
+        FilamentBloom(knee=0.5)

@@ -20,7 +20,7 @@ from vkbloom._core import (
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
 from vkbloom.presets import presets
-from vkbloom.published import BevyBloom, KinoBloom
+from vkbloom.published import BevyBloom, FilamentBloom, KinoBloom
 from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Scene
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
@@ -36,6 +36,7 @@ __all__ = [
     "DeviceLostError",
     "DualKawase",
     "Error",
+    "FilamentBloom",
     "Frames",
     "KinoBloom",
     "OutOfMemoryError",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.published import BevyBloom, KinoBloom
+from vkbloom.published import BevyBloom, FilamentBloom, KinoBloom
 from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 #: - ``"bevy_natural"``: ``Bloom::NATURAL`` of bevyengine/bevy, tag v0.19.1 (b56fc29d3016),
 #:   crates/bevy_post_process/src/bloom/settings.rs.
 #: - ``"kino"``: keijiro/KinoBloom @ 0a04c43fa47d, Assets/Kino/Bloom/Bloom.cs, in high quality.
+#: - ``"filament"``: google/filament, filament/include/filament/Options.h @ 2fac13e154fb, at its
+#:   low quality; the strength is the intensity.
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
@@ -41,5 +43,6 @@ presets: Mapping[str, Settings] = MappingProxyType(
         "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
         "bevy_natural": BevyBloom(),
         "kino": KinoBloom(),
+        "filament": FilamentBloom(),
     }
 )

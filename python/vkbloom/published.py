@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number, check_number
 
-__all__ = ["BevyBloom", "KinoBloom"]
+__all__ = ["BevyBloom", "FilamentBloom", "KinoBloom"]
 
 
 def _linear(encoded: float) -> float:
@@ -28,6 +28,15 @@ def _check_composite(settings: Settings, *allowed: Composite) -> None:
         raise ValueError(
             f"composite: {settings.composite!r} is not one of {', '.join(allowed)}, "
             f"which the method {settings.method} has"
+        )
+
+
+def _check_no_knee(settings: Settings) -> None:
+    """Raise ValueError where a knee is asked of a method whose threshold has none."""
+    if settings.knee != 0:
+        raise ValueError(
+            f"knee: {settings.knee!r} is out of range, 0, for the threshold of the method "
+            f"{settings.method} has no knee"
         )
 
 
@@ -134,3 +143,58 @@ class KinoBloom(Settings):
         super().__post_init__()
         _check_composite(self, "add")
         check_number("radius", self.radius, 1, 7)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FilamentBloom(Settings):
+    """Filament's bloom at its low quality, the default one.
+
+    Parameters
+    ----------
+    resolution : int
+        Height of ``down_0`` before it is floored to a multiple of 16, 16 to 2048.
+    levels : int
+        Of the chain, 1 to floor(log2(resolution)) + 1, at which a larger number stops; at most 12.
+    highlight : float
+        Brightness towards which bright colours are compressed, 10 to 65504. Counts with a
+        threshold.
+    threshold : float or None
+        Filament's is 1 or off. With one, fireflies are filtered too.
+    composite : {"add"}
+    intensity : float
+        Filament's strength, 0 to 1.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``down_0`` is as wide as the frame's aspect asks for, floored to a multiple of 16. While it is
+    less than half of the frame in width or height, the frame is halved first. All these steps are
+    a bilinear sample of the image convolved with (1 2 1)^2 / 16; the first one has the threshold:
+    its four bilinear taps are weighted by 1 / (1 + their brightest channel), then
+    c = max(0, c - threshold), then c / (1 + brightest channel of c / highlight). Further levels
+    are the floored halves, by 3 x 3 taps 1.761629 texels apart, the outer ones 7.46602 / 32 along
+    an axis, or by the 13 taps of `Pyramid` where a side of the level above is odd. On the way up
+    up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level; ``bloom`` is one
+    bilinear sample of up_0, divided by the number of levels.
+
+    Source: google/filament: bloomDownsample2x.mat @ 9f62dc2f2f53, bloomDownsample9.mat and
+    bloomDownsample.mat @ 523a261b1052, bloomUpsample.mat @ 9f62dc2f2f53,
+    filament/src/PostProcessManager.cpp @ 003e5005713c, include/filament/Options.h @ 2fac13e154fb.
+    """
+
+    method: ClassVar[str] = "filament"
+
+    threshold: float | None = 1.0
+    intensity: float = _number("intensity", default=0.1)
+    format: BloomFormat | None = "rgba16float"
+    levels: int = _number("levels")
+    resolution: int = _number("resolution")
+    highlight: float = _number("highlight")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+        _check_no_knee(self)
+        check_number("intensity", self.intensity, 0, 1)
+        check_number("levels", self.levels, 1, 12)

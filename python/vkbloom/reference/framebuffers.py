@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bevy, dual_kawase, kino, pyramid, separable
+from . import bevy, dual_kawase, filament, kino, pyramid, separable
 from .compositing import CompositeSettings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
@@ -50,6 +50,7 @@ _METHODS = {
     "pyramid": _Method(pyramid.passes, pyramid.gain),
     "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
     "bevy": _Method(bevy.passes, bevy.gain, published=True),
+    "filament": _Method(filament.passes, filament.gain, published=True),
     "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
 }
 
