@@ -114,6 +114,50 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_
     return row;
 }
 
+static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *kernel,
+                     enum vkb_mode direction, double step, uint32_t from, uint32_t to,
+                     struct vkb_error *error)
+{
+    struct vkb_pass_row row = fetching_row(levels, VKB_SHADER_blur_frag, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_between(levels->graph, from, to);
+    struct vkb_blur_params *params = &row.params.blur;
+    const bool whole = sampling.ratio_x == 1.0f && sampling.ratio_y == 1.0f && step == 1.0;
+
+    row.block = VKB_BLOCK_blur;
+    params->blur_scale = (float)step;
+    params->blur_strength = params->layer_scale = params->layer_strength = 1.0f;
+    params->step_ratio = 1.0f;
+    params->ratio_x = sampling.ratio_x;
+    params->ratio_y = sampling.ratio_y;
+    params->limit = sampling.limit;
+    for (uint32_t i = 0; i < kernel->count; ++i)
+        params->weights[i / 4][i % 4] = kernel->weights[i];
+    row.constants[0] = direction;
+    row.constants[1] = (int32_t)kernel->count - 1;
+    row.constants[2] = 1;
+    row.constants[3] = TEXEL_OWN;
+    row.constants[4] = whole ? SAMPLING_WHOLE : SAMPLING_FETCH;
+    row.constant_count = 5;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                     const struct vkb_kernel *kernel, struct vkb_error *error)
+{
+    const struct vkb_size size = levels->sizes[level];
+    const uint32_t width = levels->graph->images[from].width;
+    const uint32_t height = levels->graph->images[from].height;
+    const struct vkb_size middle = {size.width, kernel->whole_rows ? height : size.height};
+    const double across = kernel->across > 0.0 ? kernel->across : (double)width / size.width;
+    const double down = (double)middle.height / size.height;
+    uint32_t step;
+
+    return vkb_levels_step(levels, "down_%u_across", level, middle, &step, error)
+        && add_blur(levels, kernel, DIRECTION_HORIZONTAL, across, from, step, error)
+        && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
+        && add_blur(levels, kernel, DIRECTION_VERTICAL, down, step, levels->downs[level], error);
+}
+
 // From the smaller level `from` to `to`, to which the level `own` is added, if there is one.
 static bool add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
                    enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,

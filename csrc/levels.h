@@ -50,6 +50,19 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_sh
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                       uint32_t from, uint32_t to);
 
+// A separable blur on the way down.
+struct vkb_kernel {
+    const float *weights;  // w0..
+    uint32_t count;
+    double across;  // distance of the taps of the first, horizontal, pass in texels of its source;
+                    // 0: one pixel of the level
+    bool whole_rows;  // the first pass keeps the height of its source, which the second one reduces
+};
+
+// Adds the image down_`level` and the two passes that blur `from` into it.
+bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                     const struct vkb_kernel *kernel, struct vkb_error *error);
+
 // The passes up_N-2 ... up_0 and "bloom".
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
                         uint32_t *bloom, struct vkb_error *error);

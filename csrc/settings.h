@@ -14,6 +14,8 @@ enum vkb_method {
     VKB_METHOD_BEVY,
     VKB_METHOD_KINO,
     VKB_METHOD_FILAMENT,
+    VKB_METHOD_URP,
+    VKB_METHOD_HDRP,
     VKB_METHOD_COUNT,
 };
 

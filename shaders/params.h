@@ -55,7 +55,8 @@
 #define PREFILTER_BLOCK(B, SETTING, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, SETTING) \
-    SETTING(B, highlight, 1000.0, 10.0, 65504.0)
+    SETTING(B, highlight, 1000.0, 10.0, 65504.0) \
+    SETTING(B, clamp_max, 65472.0, 0.0, 65504.0)
 
 #define KAWASE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, offset, 1.0, 0.0, 16.0) \
@@ -86,14 +87,17 @@
     COUNT(firefly_filter, 0, 0, 1) \
     COUNT(max_mip_dimension, 512, 4, 4096) \
     COUNT(anti_flicker, 1, 0, 1) \
-    COUNT(resolution, 384, 16, 2048)
+    COUNT(resolution, 384, 16, 2048) \
+    COUNT(iterations, 6, 2, 8) \
+    COUNT(high_quality_filtering, 1, 0, 1)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \
     REAL(bloom_scale, 1.0, 0.001, 4.0) \
     REAL(low_frequency_boost, 0.7, 0.0, 1.0) \
     REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
-    REAL(high_pass_frequency, 1.0, 0.001, 1.0)
+    REAL(high_pass_frequency, 1.0, 0.001, 1.0) \
+    REAL(scatter, 0.7, 0.0, 1.0)
 
 // The largest half float.
 #define HALF_LIMIT 65504.0

@@ -14,11 +14,13 @@ from vkbloom import (
     BevyBloom,
     DualKawase,
     FilamentBloom,
+    HdrpBloom,
     KinoBloom,
     Pyramid,
     Renderer,
     Scene,
     Settings,
+    UrpBloom,
     presets,
     reference,
 )
@@ -284,3 +286,96 @@ def test_filaments_other_settings(
 def test_filament_has_no_knee() -> None:
     with pytest.raises(ValueError, match=r"knee: 0\.5 is out of range"):
         FilamentBloom(knee=0.5)
+
+
+# --- Unity ---
+
+
+def test_urps_levels_and_shares(preset_renderer: Renderer) -> None:
+    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["unity_urp"])
+    sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
+    assert sizes == [(640, 360), (320, 180), (160, 90), (80, 45), (40, 22), (20, 11)]
+    own, coarse = reference.urp._shares(UrpBloom(), 6)
+    shares = np.cumprod([1, *coarse[:5]]) * [*own[:5], 1]
+    assert_allclose(shares, [0.32, 0.2176, 0.14797, 0.10062, 0.06842, 0.14539], atol=1e-5)
+
+
+def test_urps_threshold_is_0_9_in_srgb() -> None:
+    assert UrpBloom().threshold == pytest.approx(0.787412, abs=1e-6)
+
+
+def test_a_level_of_urp_is_the_tutorials_kernel_at_two_steps() -> None:
+    """Along x the half-kernel two texels apart, along y one pixel of the smaller level apart."""
+    weights = np.array([0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622])
+    weights = np.concatenate([weights[:0:-1], weights])
+    image = np.zeros((64, 64, 1))
+    image[32:34, 32] = 0.5  # one pixel of down_0, half of it
+    image[32:34, 33] = 0.5
+    framebuffers = reference.passes(image, UrpBloom(threshold=None))
+    assert framebuffers["down_0"][16, 16, 0] == 0.5
+    down = framebuffers["down_1"][..., 0]
+    # down_0's pixel 16 lies between the positions of the taps of all pixels: half each.
+    expected = np.zeros((16, 16))
+    for y in range(16):
+        for x in range(16):
+            across = sum(
+                w * max(0, 1 - abs(2 * x + 0.5 + 2 * i - 16))
+                for i, w in enumerate(weights, start=-4)
+            )
+            along = sum(
+                w * max(0, 1 - abs(2 * (y + i) + 0.5 - 16)) for i, w in enumerate(weights, start=-4)
+            )
+            expected[y, x] = 0.5 * across * along
+    assert_allclose(down, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        UrpBloom(scatter=0.0, threshold=None, iterations=2),
+        UrpBloom(scatter=1.0, clamp_max=30.0, iterations=8),
+        HdrpBloom(scatter=0.0),
+        HdrpBloom(scatter=1.0, high_quality_filtering=False),
+    ],
+    ids=["urp-narrow", "urp-wide", "hdrp-narrow", "hdrp-wide"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_unitys_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
+
+
+@pytest.mark.parametrize("size", [(801, 451), (800, 449), (799, 450)])
+@pytest.mark.parametrize("smooth", [True, False])
+def test_hdrps_cubic_filter_is_for_larger_frames(
+    preset_renderer: Renderer, size: tuple[int, int], smooth: bool
+) -> None:
+    settings = HdrpBloom(high_quality_filtering=smooth, format="rgba32float")
+    image = lights(size, "float32")
+    check(preset_renderer, image, settings)
+    same = np.array_equal(
+        reference.passes(image, settings)["up_0"],
+        reference.passes(image, settings.replace(high_quality_filtering=not smooth))["up_0"],
+    )
+    assert same == (min(size[0] - 800, size[1] - 450) < 0)
+
+
+def test_hdrps_sizes_are_rounded_halves_to_even() -> None:
+    image = np.zeros((10, 9, 1))
+    sizes = [a.shape[:2] for a in reference.passes(np.zeros((70, 75, 1)), HdrpBloom()).values()]
+    assert sizes[:4] == [(35, 38), (18, 19), (9, 9), (4, 5)]
+    assert reference.passes(image, HdrpBloom())["down_0"].shape == (5, 4, 1)
+
+
+def test_the_cubic_filter_is_the_b_spline() -> None:
+    """The spline as a function of the distance: 2/3 - t^2 + t^3 / 2, beyond 1 (2 - t)^3 / 6."""
+    image = np.zeros((9, 1, 1))
+    image[4] = 1
+    t = np.abs((np.arange(27) + 0.5) / 3 - 4.5)
+    expected = np.where(t < 1, 2 / 3 - t**2 + t**3 / 2, np.maximum(2 - t, 0) ** 3 / 6)
+    enlarged = reference.upsampling.cubic(image, (1, 27))[:, 0, 0]
+    assert_allclose(enlarged, expected, atol=1e-12)
+
+
+def test_hdrp_has_no_threshold() -> None:
+    with pytest.raises(ValueError, match=r"threshold: 1\.0 is out of range, None"):
+        HdrpBloom(threshold=1.0)

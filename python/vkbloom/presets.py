@@ -8,7 +8,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.published import BevyBloom, FilamentBloom, KinoBloom
+from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UrpBloom
 from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
@@ -32,6 +32,12 @@ if TYPE_CHECKING:
 #: - ``"kino"``: keijiro/KinoBloom @ 0a04c43fa47d, Assets/Kino/Bloom/Bloom.cs, in high quality.
 #: - ``"filament"``: google/filament, filament/include/filament/Options.h @ 2fac13e154fb, at its
 #:   low quality; the strength is the intensity.
+#: - ``"unity_urp"``: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal,
+#:   Runtime/Overrides/Bloom.cs @ a085de35f86e, with an intensity of 1 (Unity's own is 0, off).
+#: - ``"unity_hdrp"``: Unity-Technologies/Graphics,
+#:   Packages/com.unity.render-pipelines.high-definition, Runtime/PostProcessing/Components/Bloom.cs
+#:   @ 2084a9d19159, with an intensity of 0.2 (Unity's own is 0, off; of its i HDRP makes
+#:   2^i - 1).
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
@@ -44,5 +50,7 @@ presets: Mapping[str, Settings] = MappingProxyType(
         "bevy_natural": BevyBloom(),
         "kino": KinoBloom(),
         "filament": FilamentBloom(),
+        "unity_urp": UrpBloom(),
+        "unity_hdrp": HdrpBloom(),
     }
 )

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number, check_number
 
-__all__ = ["BevyBloom", "FilamentBloom", "KinoBloom"]
+__all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UrpBloom"]
 
 
 def _linear(encoded: float) -> float:
@@ -198,3 +198,111 @@ class FilamentBloom(Settings):
         _check_no_knee(self)
         check_number("intensity", self.intensity, 0, 1)
         check_number("levels", self.levels, 1, 12)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class UrpBloom(Settings):
+    """Bloom of Unity's Universal Render Pipeline: the Gaussian filter without high quality.
+
+    Parameters
+    ----------
+    scatter : float
+        Share of the larger blurs, 0 to 1.
+    iterations : int
+        Most levels, 2 to 8.
+    clamp_max : float
+        Brightest value that goes into the bloom, 0 to 65504.
+    threshold : float or None
+        In linear light; Unity shows the default as 0.9 in sRGB.
+    knee : float
+        0.5 in Unity, and no setting there.
+    composite : {"add"}
+    intensity : float
+        0, off, is Unity's default.
+    **settings
+        The other fields of `Settings`.
+
+    Notes
+    -----
+    ``down_0`` is one bilinear tap at the floored half of the frame, clamped and past the knee
+    curve with k = threshold * knee, 4k + 1e-4 and 1e-4. There are clamp(floor(log2(longer side of
+    down_0) - 1), 1, iterations) levels, each next the floored half of the one before by the
+    half-kernel 0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622: horizontally two texels
+    of the level above apart, then vertically one pixel apart. With s = 0.05 + 0.9 scatter,
+    up_k = lerp(down_k, bilinear(up_k+1), s), and ``bloom`` is one bilinear sample of up_0. Dirt
+    and tint are left out.
+
+    Source: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal:
+    Shaders/PostProcessing/Bloom.shader @ 00d472fae509,
+    Runtime/Passes/PostProcess/BloomPostProcessPass.cs @ 13e28e026298,
+    Runtime/Overrides/Bloom.cs @ a085de35f86e.
+    """
+
+    method: ClassVar[str] = "urp"
+
+    threshold: float | None = _linear(0.9)
+    knee: float = _number("knee", default=0.5)
+    format: BloomFormat | None = "rgba16float"
+    scatter: float = _number("scatter")
+    iterations: int = _number("iterations")
+    clamp_max: float = _number("clamp_max")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class HdrpBloom(Settings):
+    """Bloom of Unity's High Definition Render Pipeline, without a threshold, at half resolution.
+
+    Parameters
+    ----------
+    scatter : float
+        Share of the larger blurs, 0 to 1.
+    high_quality_filtering : bool
+        The levels are enlarged by a cubic B-spline instead of bilinearly. Frames under 800 pixels
+        wide or 450 high are bilinear either way.
+    threshold : None
+        HDRP's default. With one HDRP would replace what of the scene is above it, a composite
+        that is not here.
+    composite : {"mix"}
+    intensity : float
+        0 to 1; it is 2^i - 1 of the i that HDRP shows, whose default is 0, off.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    Level k has the size of the frame / 2^(k + 1), rounded, halves to even; there are
+    clamp(floor(log2(longer side of the frame) - 2), 1, 16). Five bilinear taps in texels of the
+    frame, at (0, 0), +-(0.9, -0.4) and +-(0.4, 0.9), weighted by 1 / (1 + luminance), go into an
+    image of the size of ``down_0``. That is blurred into ``down_0``, and each level, read
+    bilinearly at distances of one pixel of the next one, into that, by the binomial 70, 56, 28, 8,
+    1 (/ 256) along both axes. With s = 0.05 + 0.9 scatter, up_k = lerp(down_k, U(up_k+1), s);
+    ``bloom`` is the cubic B-spline of up_0. Dirt, tint and anamorphism are left out.
+
+    Source: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.high-definition/
+    Runtime: PostProcessing/Shaders/BloomPrefilter.compute @ 2309d2c2fde8, BloomBlur.compute and
+    BloomUpsample.compute @ 0e4ca4d79b2c, PostProcessing/Components/Bloom.cs @ 2084a9d19159,
+    RenderPipeline/HDRenderPipeline.PostProcess.cs @ 0148835ea9ba.
+    """
+
+    method: ClassVar[str] = "hdrp"
+
+    composite: Composite = "mix"
+    intensity: float = _number("intensity", default=2**0.2 - 1)
+    format: BloomFormat | None = "rgba16float"
+    scatter: float = _number("scatter")
+    high_quality_filtering: bool = _flag("high_quality_filtering")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "mix")
+        _check_no_knee(self)
+        check_number("intensity", self.intensity, 0, 1)
+        if self.threshold is not None:
+            raise ValueError(
+                f"threshold: {self.threshold!r} is out of range, None, for what HDRP does with a "
+                "threshold is not a composite of the scene and the bloom alone"
+            )

@@ -87,7 +87,7 @@ def gain(settings: BevySettings) -> float:
     The groups' weights darken it to 0.5 / (1 + 0.5 / 4) + 4 * 0.125 / (1 + 0.125 / 4) = 0.929.
     """
     first = _threshold(np.full((1, 1, 3), 0.5 / 1.125 + 0.5 / 1.03125), settings)
-    return float(first[0, 0, 0]) * flat_gain(*_shares(settings), _level_count(settings))
+    return float(first[0, 0, 0]) * flat_gain(*_shares(settings), [1.0] * _level_count(settings))
 
 
 def _level_count(settings: BevySettings) -> int:

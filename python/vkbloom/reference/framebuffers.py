@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bevy, dual_kawase, filament, kino, pyramid, separable
+from . import bevy, dual_kawase, filament, hdrp, kino, pyramid, separable, urp
 from .compositing import CompositeSettings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
@@ -51,6 +51,8 @@ _METHODS = {
     "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
     "bevy": _Method(bevy.passes, bevy.gain, published=True),
     "filament": _Method(filament.passes, filament.gain, published=True),
+    "urp": _Method(urp.passes, urp.gain, published=True, sized=True),
+    "hdrp": _Method(hdrp.passes, hdrp.gain, published=True),
     "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
 }
 

@@ -105,9 +105,9 @@ def combine(
     return framebuffers
 
 
-def flat_gain(own: Sequence[float], coarse: Sequence[float], count: int) -> float:
-    """Return what `combine` makes of `count` levels that are all 1, for a gain of 1."""
-    value = 1.0
-    for k in range(count - 2, -1, -1):
-        value = own[k] + coarse[k] * value
+def flat_gain(own: Sequence[float], coarse: Sequence[float], levels: Sequence[float]) -> float:
+    """Return what `combine` makes of levels that are flat, for a gain of 1."""
+    value = levels[-1]
+    for k in range(len(levels) - 2, -1, -1):
+        value = own[k] * levels[k] + coarse[k] * value
     return value
