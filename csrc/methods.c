@@ -13,6 +13,7 @@ static const struct method {
     [VKB_METHOD_PYRAMID] = {vkb_add_pyramid, false},
     [VKB_METHOD_DUAL_KAWASE] = {vkb_add_dual_kawase, false},
     [VKB_METHOD_BEVY] = {vkb_add_bevy, true},
+    [VKB_METHOD_UNREAL] = {vkb_add_unreal, true},
     [VKB_METHOD_HDRP] = {vkb_add_hdrp, true},
     [VKB_METHOD_URP] = {vkb_add_urp, true},
     [VKB_METHOD_FILAMENT] = {vkb_add_filament, true},

@@ -58,6 +58,8 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
 bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
+bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
 
 // A published method starts from the whole frame: it reduces and thresholds in its own way.
 bool vkb_is_published(const struct vkb_settings *settings);

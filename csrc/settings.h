@@ -16,6 +16,7 @@ enum vkb_method {
     VKB_METHOD_FILAMENT,
     VKB_METHOD_URP,
     VKB_METHOD_HDRP,
+    VKB_METHOD_UNREAL,
     VKB_METHOD_COUNT,
 };
 

@@ -56,7 +56,15 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, SETTING) \
     SETTING(B, highlight, 1000.0, 10.0, 65504.0) \
-    SETTING(B, clamp_max, 65472.0, 0.0, 65504.0)
+    SETTING(B, clamp_max, 65472.0, 0.0, 65504.0) \
+    SETTING(B, smooth_width, 0.01, 0.0001, 65504.0)
+
+// Levels into one image of width x height pixels.
+#define GATHER_BLOCK(B, SETTING, INPUT, VEC4S) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, width) \
+    INPUT(B, float, height) \
+    VEC4S(B, shares, 2)
 
 #define KAWASE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, offset, 1.0, 0.0, 16.0) \
@@ -73,6 +81,7 @@
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
+    BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK)
 
@@ -105,6 +114,9 @@
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
 #define MAX_LAYERS 8
+
+// The most levels that one pass gathers.
+#define MAX_GATHERED 7
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -3,6 +3,7 @@
 // A level of the pyramid on the way up: its own share and, upsampled, that of the smaller level.
 #include "block.glsl"
 #include "sampling.glsl"
+#include "cubic.glsl"
 
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "storage.glsl"
@@ -16,12 +17,32 @@ layout(set = 0, binding = 2) uniform sampler2D own;
 
 layout(location = 0) out vec4 colour;
 
-#include "upsample.glsl"
+// 3 x 3 taps of weights (1 2 1)^2 / 16.
+vec3 tent(vec2 position)
+{
+    vec3 sum = vec3(0.0);
+    for (int y = -1; y <= 1; ++y)
+        for (int x = -1; x <= 1; ++x) {
+            vec2 offset = vec2(params.step_x, params.step_y) * vec2(x, y);
+            float weight = (2.0 - abs(float(x))) * (2.0 - abs(float(y))) / 16.0;
+            sum += weight * sample_at(smaller, position + offset, SAMPLING).rgb;
+        }
+    return sum;
+}
+
+vec3 upsample(vec2 position)
+{
+    if (UPSAMPLE == UPSAMPLE_LINEAR)
+        return sample_at(smaller, position, SAMPLING).rgb;
+    if (UPSAMPLE == UPSAMPLE_CUBIC)
+        return sample_cubic(smaller, position);
+    return tent(position);
+}
 
 void main()
 {
     vec2 position = gl_FragCoord.xy * vec2(params.ratio_x, params.ratio_y);
-    vec3 sum = params.coarse * upsample(smaller, position);
+    vec3 sum = params.coarse * upsample(position);
     if (ADD_OWN != 0)
         sum += params.own * texelFetch(own, ivec2(gl_FragCoord.xy), 0).rgb;
     colour = vec4(storable(sum), 1.0);

@@ -8,7 +8,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UrpBloom
+from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 #:   Packages/com.unity.render-pipelines.high-definition, Runtime/PostProcessing/Components/Bloom.cs
 #:   @ 2084a9d19159, with an intensity of 0.2 (Unity's own is 0, off; of its i HDRP makes
 #:   2^i - 1).
+#: - ``"threejs_unreal"``: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since
+#:   #31528 and #32517 (2025), with the defaults of its successor BloomNode: strength 1, radius
+#:   and threshold 0.
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
@@ -52,5 +55,6 @@ presets: Mapping[str, Settings] = MappingProxyType(
         "filament": FilamentBloom(),
         "unity_urp": UrpBloom(),
         "unity_hdrp": HdrpBloom(),
+        "threejs_unreal": UnrealBloom(),
     }
 )

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number, check_number
 
-__all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UrpBloom"]
+__all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UnrealBloom", "UrpBloom"]
 
 
 def _linear(encoded: float) -> float:
@@ -306,3 +306,52 @@ class HdrpBloom(Settings):
                 f"threshold: {self.threshold!r} is out of range, None, for what HDRP does with a "
                 "threshold is not a composite of the scene and the bloom alone"
             )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class UnrealBloom(Settings):
+    """three.js' UnrealBloomPass.
+
+    Parameters
+    ----------
+    radius : float
+        0 to 1: from the factors 1, 0.8, 0.6, 0.4, 0.2 of the levels to 0.2, 0.4, 0.6, 0.8, 1.
+    smooth_width : float
+        Luminance over which the threshold fades in, 0.0001 to 65504.
+    threshold : float or None
+        Luminance where that begins.
+    composite : {"add"}
+    intensity : float
+        Three times three.js' strength.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``bright`` is one bilinear tap at half of the frame's size, rounded, times
+    smoothstep(threshold, threshold + smooth_width, luminance). There are five levels, ``down_0`` of
+    the same size and each next the rounded half of the one before; each is the one above it, the
+    first one ``bright``, blurred along x, then along y, by taps one pixel of the level apart with
+    weights 0.39894 exp(-i^2 / (2 sigma^2)) / sigma, |i| < R, R = 6, 10, 14, 18, 22 and
+    sigma = R / 3, not normalized. ``up_0`` is the sum of the levels, bilinear, times their
+    factors, ``bloom`` one bilinear sample of it. In "rgba8unorm" up_0 is a third of that.
+
+    Source: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since pull requests
+    #31528 (kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js
+    @ 0255e15dd1d4; defaults of examples/jsm/tsl/display/BloomNode.js, as the pass has none for
+    radius and threshold.
+    """
+
+    method: ClassVar[str] = "unreal"
+
+    threshold: float | None = 0.0
+    intensity: float = _number("intensity", default=3.0)
+    format: BloomFormat | None = "rgba16float"
+    radius: float = _number("radius", default=0.0)
+    smooth_width: float = _number("smooth_width")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+        _check_no_knee(self)
+        check_number("radius", self.radius, 0, 1)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bevy, dual_kawase, filament, hdrp, kino, pyramid, separable, urp
+from . import bevy, dual_kawase, filament, hdrp, kino, pyramid, separable, unreal, urp
 from .compositing import CompositeSettings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
@@ -53,6 +53,7 @@ _METHODS = {
     "filament": _Method(filament.passes, filament.gain, published=True),
     "urp": _Method(urp.passes, urp.gain, published=True, sized=True),
     "hdrp": _Method(hdrp.passes, hdrp.gain, published=True),
+    "unreal": _Method(unreal.passes, unreal.gain, published=True),
     "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
 }
 
