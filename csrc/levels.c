@@ -203,50 +203,32 @@ bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combin
                   combination->gain * below, error);
 }
 
-// What a flat 1 in all levels becomes in up_0, where that must not be more than 1.
-static double gathered_whole(const struct vkb_levels *levels, const struct vkb_gather *gather)
+bool vkb_levels_gather(const struct vkb_levels *levels, const double shares[GATHERED_LEVELS],
+                       uint32_t *bloom, struct vkb_error *error)
 {
-    double whole = 0.0;
-
-    for (uint32_t level = 0; level < levels->count; ++level)
-        whole += gather->weights[level];
-    return levels->source->format == VKB_FORMAT_RGBA8_UNORM && whole > 1.0 ? whole : 1.0;
-}
-
-bool vkb_levels_gather(struct vkb_levels *levels, const struct vkb_gather *gather,
-                       struct vkb_error *error)
-{
+    static const struct vkb_combination enlarging = {0};
     const struct vkb_size size = levels->sizes[0];
-    const double whole = gathered_whole(levels, gather);
+    double whole = 0.0;
+    uint32_t sum;
 
-    if (!vkb_levels_image(levels, "up_%u", 0, size, &levels->gathered, error))
+    for (int level = 0; level < GATHERED_LEVELS; ++level)
+        whole += shares[level];
+    if (levels->source->format != VKB_FORMAT_RGBA8_UNORM)
+        whole = 1.0;
+    if (!vkb_levels_image(levels, "up_%u", 0, size, &sum, error))
         return false;
-    struct vkb_pass_row row =
-        fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], levels->gathered);
-    row.constants[1] = gather->kernel;
-    row.constants[2] = (int32_t)levels->count;
-    row.constant_count = 3;
-    // Every binding of the shader must be filled, also those beyond the last level.
-    row.read_count = MAX_GATHERED;
-    for (uint32_t level = 0; level < MAX_GATHERED; ++level) {
-        const bool there = level < levels->count;
-        row.reads[level] = levels->downs[there ? level : levels->count - 1];
-        row.params.gather.shares[level / 4][level % 4] =
-            there ? (float)(gather->weights[level] / whole) : 0.0f;
-    }
+    struct vkb_pass_row row = fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], sum);
+    row.read_count = GATHERED_LEVELS;
     row.block = VKB_BLOCK_gather;
+    for (int level = 0; level < GATHERED_LEVELS; ++level) {
+        row.reads[level] = levels->downs[level];
+        row.params.gather.shares[level / 4][level % 4] = (float)(shares[level] / whole);
+    }
     row.params.gather.limit = vkb_formats[levels->source->format].limit;
     row.params.gather.width = (float)size.width;
     row.params.gather.height = (float)size.height;
-    return vkb_graph_add_pass(levels->graph, &row, error);
-}
-
-bool vkb_levels_enlarge(const struct vkb_levels *levels, const struct vkb_gather *gather,
-                        uint32_t *bloom, struct vkb_error *error)
-{
-    const struct vkb_combination combination = {.last_kernel = gather->kernel};
-
-    return vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
-        && add_up(levels, &combination, gather->kernel, levels->gathered, *bloom, VKB_NO_IMAGE, 0.0,
-                  gathered_whole(levels, gather), error);
+    return vkb_graph_add_pass(levels->graph, &row, error)
+        && vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
+        && add_up(levels, &enlarging, UPSAMPLE_LINEAR, sum, *bloom, VKB_NO_IMAGE, 0.0, whole,
+                  error);
 }

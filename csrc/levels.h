@@ -13,7 +13,6 @@ struct vkb_levels {
     struct vkb_graph *graph;
     struct vkb_size sizes[VKB_MAX_LEVELS];
     uint32_t downs[VKB_MAX_LEVELS];
-    uint32_t gathered;  // up_0 of vkb_levels_gather
     uint32_t count;
 };
 
@@ -64,20 +63,11 @@ struct vkb_kernel {
 bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
                      const struct vkb_kernel *kernel, struct vkb_error *error);
 
-// How levels become the bloom without a way up: the sum of weights[k] U(down_k).
-struct vkb_gather {
-    enum vkb_mode kernel;  // U, of UPSAMPLE_*, but not the tent
-    double weights[MAX_GATHERED];
-};
-
-// The pass "up_0": the levels gathered at the size of the first one. In rgba8unorm, which ends at
-// 1, it is divided by the sum of the weights, by which vkb_levels_enlarge multiplies.
-bool vkb_levels_gather(struct vkb_levels *levels, const struct vkb_gather *gather,
-                       struct vkb_error *error);
-
-// The pass "bloom", after vkb_levels_gather: up_0, enlarged.
-bool vkb_levels_enlarge(const struct vkb_levels *levels, const struct vkb_gather *gather,
-                        uint32_t *bloom, struct vkb_error *error);
+// The pass "up_0": the sum of shares[k] down_k, each of the five levels enlarged bilinearly to the
+// size of the first one; then "bloom", which is that enlarged. In rgba8unorm, which ends at 1, up_0
+// is divided by the sum of the shares, and the bloom multiplied by it.
+bool vkb_levels_gather(const struct vkb_levels *levels, const double shares[GATHERED_LEVELS],
+                       uint32_t *bloom, struct vkb_error *error);
 
 // The passes up_N-2 ... up_0 and "bloom".
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,

@@ -4,13 +4,13 @@
 
 #include <math.h>
 
-enum { UNREAL_LEVELS = 5, UNREAL_LONGEST = 22 };
+enum { UNREAL_LONGEST = 22 };
 
 // Taps of each level's half-kernel, the centre counted; a third of it is the deviation.
-static const uint32_t tap_counts[UNREAL_LEVELS] = {6, 10, 14, 18, UNREAL_LONGEST};
+static const uint32_t tap_counts[GATHERED_LEVELS] = {6, 10, 14, 18, UNREAL_LONGEST};
 
 // The levels' shares for a radius of 0; one of 1 mirrors them at 0.6.
-static const double bloom_factors[UNREAL_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
+static const double bloom_factors[GATHERED_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
 
 static struct vkb_size rounded_half(struct vkb_size size)
 {
@@ -33,15 +33,14 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
                     struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
-    struct vkb_gather gather = {.kernel = UPSAMPLE_LINEAR};
+    double shares[GATHERED_LEVELS];
     struct vkb_size size = source->buffers;
     uint32_t from;
 
-    for (; levels.count < UNREAL_LEVELS; ++levels.count) {
+    for (; levels.count < GATHERED_LEVELS; ++levels.count) {
         const double factor = bloom_factors[levels.count];
         levels.sizes[levels.count] = size = rounded_half(size);
-        gather.weights[levels.count] =
-            factor + (1.2 - 2.0 * factor) * settings->values.pyramid.radius;
+        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.pyramid.radius;
     }
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
         return false;
@@ -52,7 +51,5 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])
         if (!add_level(&levels, level, from, error))
             return false;
-    // Gathered at the size of level 0, and enlarged from there.
-    return vkb_levels_gather(&levels, &gather, error)
-        && vkb_levels_enlarge(&levels, &gather, bloom, error);
+    return vkb_levels_gather(&levels, shares, bloom, error);
 }

@@ -115,8 +115,8 @@
 #define MAX_WEIGHTS 65
 #define MAX_LAYERS 8
 
-// The most levels that one pass gathers.
-#define MAX_GATHERED 7
+// The levels that one pass gathers.
+#define GATHERED_LEVELS 5
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
