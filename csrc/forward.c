@@ -4,12 +4,14 @@
 #include <stdio.h>
 #include <string.h>
 
-// The bloom buffers of the forward system, whatever the frame's size.
+// The bloom buffers of the forward system, whatever the frame's size. Published methods have rules
+// of their own, which start from the frame.
 static const struct vkb_size FORWARD_BUFFERS = {256, 256};
 
 static struct vkb_size buffer_size(const struct vkb_settings *settings, struct vkb_size frame)
 {
-    if (!settings->bloom_width && settings->values.bloom_scale == 1.0)
+    if (!settings->bloom_width && settings->values.bloom_scale == 1.0
+        && !vkb_is_published(settings))
         return FORWARD_BUFFERS;
     return vkb_bloom_size(settings, frame);
 }
@@ -57,7 +59,7 @@ static bool add_glow(const struct vkb_settings *settings, struct vkb_size size,
                                         VKB_SHADER_glow_frag, *glow, depth, matrices);
     row.constants[0] = vkb_threshold_mode(settings);
     row.constant_count = 1;
-    if (settings->thresholded) {
+    if (row.constants[0] != THRESHOLD_NONE) {
         row.params.mesh.threshold = settings->values.mesh.threshold;
         row.params.mesh.knee = settings->values.mesh.knee;
     }

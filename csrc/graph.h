@@ -10,7 +10,7 @@
 
 enum {
     VKB_NAME_SIZE = 32,
-    VKB_MAX_READS = 2,
+    VKB_MAX_READS = GATHERED_LEVELS,
     VKB_MAX_TARGETS = 4,
     VKB_MAX_CONSTANTS = 5,
 };

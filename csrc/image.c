@@ -30,7 +30,7 @@ static bool add_extract(const struct vkb_settings *settings, uint32_t image,
         .target_height = sampling.height,
         .limit = sampling.limit,
     };
-    if (settings->thresholded) {
+    if (row.constants[0] != THRESHOLD_NONE) {
         row.params.extract.threshold = settings->values.extract.threshold;
         row.params.extract.knee = settings->values.extract.knee;
     }

@@ -4,9 +4,36 @@
 #include <stdio.h>
 #include <string.h>
 
+static const struct method {
+    bool (*add)(const struct vkb_settings *, const struct vkb_bloom_source *, struct vkb_graph *,
+                uint32_t *, struct vkb_error *);
+    bool published;
+} methods[VKB_METHOD_COUNT] = {
+    [VKB_METHOD_SEPARABLE] = {vkb_add_separable, false},
+    [VKB_METHOD_PYRAMID] = {vkb_add_pyramid, false},
+    [VKB_METHOD_DUAL_KAWASE] = {vkb_add_dual_kawase, false},
+    [VKB_METHOD_BEVY] = {vkb_add_bevy, true},
+    [VKB_METHOD_UNREAL] = {vkb_add_unreal, true},
+    [VKB_METHOD_HDRP] = {vkb_add_hdrp, true},
+    [VKB_METHOD_URP] = {vkb_add_urp, true},
+    [VKB_METHOD_FILAMENT] = {vkb_add_filament, true},
+    [VKB_METHOD_KINO] = {vkb_add_kino, true},
+};
+
+bool vkb_is_published(const struct vkb_settings *settings)
+{
+    return methods[settings->method].published;
+}
+
+bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    return methods[settings->method].add(settings, source, graph, bloom, error);
+}
+
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
 {
-    if (!settings->thresholded)
+    if (!settings->thresholded || vkb_is_published(settings))
         return THRESHOLD_NONE;
     return settings->values.mesh.knee > 0.0f ? THRESHOLD_KNEE : THRESHOLD_HARD;
 }
@@ -41,20 +68,6 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragmen
     row.target_count = 1;
     row.depth = VKB_NO_IMAGE;
     return row;
-}
-
-bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
-{
-    static bool (*const methods[VKB_METHOD_COUNT])(
-        const struct vkb_settings *, const struct vkb_bloom_source *, struct vkb_graph *,
-        uint32_t *, struct vkb_error *) = {
-        [VKB_METHOD_SEPARABLE] = vkb_add_separable,
-        [VKB_METHOD_PYRAMID] = vkb_add_mip_chain,
-        [VKB_METHOD_DUAL_KAWASE] = vkb_add_mip_chain,
-    };
-
-    return methods[settings->method](settings, source, graph, bloom, error);
 }
 
 struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target)

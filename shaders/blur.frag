@@ -49,8 +49,7 @@ vec3 blur_line(Place place, vec2 centre, vec2 tap_step)
 void main()
 {
     float scale = params.blur_scale * params.layer_scale;
-    Place place = place_in(source, ivec2(gl_FragCoord.xy),
-                           ivec2(params.target_width, params.target_height));
+    Place place = PLACE_IN(source);
     vec2 across = vec2(scale, 0.0);
     // In texels of the height, one texel of the width is height / width (`step_ratio`).
     vec2 down = vec2(0.0, STEP_TEXEL == TEXEL_X ? scale * params.step_ratio : scale);

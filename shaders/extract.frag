@@ -21,8 +21,7 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    Place place = place_in(image, ivec2(gl_FragCoord.xy),
-                           ivec2(params.target_width, params.target_height));
+    Place place = PLACE_IN(image);
     vec3 reduced = sample_at(image, place, vec2(0.0), SAMPLING).rgb;
     vec3 bright = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
     colour = vec4(storable(bright), 1.0);

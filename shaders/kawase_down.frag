@@ -16,8 +16,7 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    Place place = place_in(source, ivec2(gl_FragCoord.xy),
-                           ivec2(params.target_width, params.target_height));
+    Place place = PLACE_IN(source);
     vec2 diagonal = vec2(0.5, -0.5) * params.offset;
     vec3 sum = 4.0 * sample_at(source, place, vec2(0.0), SAMPLING).rgb;
     sum += sample_at(source, place, diagonal.xx, SAMPLING).rgb;

@@ -16,8 +16,7 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    Place place = place_in(smaller, ivec2(gl_FragCoord.xy),
-                           ivec2(params.target_width, params.target_height));
+    Place place = PLACE_IN(smaller);
     vec2 axial = vec2(params.offset, 0.0);
     vec2 diagonal = vec2(0.5, -0.5) * params.offset;
     vec3 sum = sample_at(smaller, place, axial.xy, SAMPLING).rgb;

@@ -41,12 +41,28 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, SETTING)
 
-// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below.
+// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
+// the steps the distance of the tent's taps in texels of the smaller level.
 #define PYRAMID_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, radius, 1.0, 0.0, 16.0) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, own) \
-    INPUT(B, float, coarse)
+    INPUT(B, float, coarse) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y)
+
+// The first pass of a published method, from the frame.
+#define PREFILTER_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    THRESHOLD_ROWS(B, SETTING) \
+    SETTING(B, highlight, 1000.0, 10.0, 65504.0) \
+    SETTING(B, clamp_max, 65472.0, 0.0, 65504.0) \
+    SETTING(B, smooth_width, 0.01, 0.0001, 65504.0)
+
+// Levels of several sizes into one image, with their weights.
+#define GATHER_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    VEC4S(B, shares, 2)
 
 #define KAWASE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, offset, 1.0, 0.0, 16.0) \
@@ -62,6 +78,8 @@
     BLOCK(extract, EXTRACT_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
+    BLOCK(prefilter, PREFILTER_BLOCK) \
+    BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK)
 
@@ -73,11 +91,20 @@
     COUNT(first_tap, 1, 0, 1) \
     COUNT(direct, 0, 0, 1) \
     COUNT(levels, 6, 1, 16) \
-    COUNT(firefly_filter, 0, 0, 1)
+    COUNT(firefly_filter, 0, 0, 1) \
+    COUNT(max_mip_dimension, 512, 4, 4096) \
+    COUNT(anti_flicker, 1, 0, 1) \
+    COUNT(resolution, 384, 16, 2048) \
+    COUNT(iterations, 6, 2, 8) \
+    COUNT(high_quality_filtering, 1, 0, 1)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \
-    REAL(bloom_scale, 1.0, 0.001, 4.0)
+    REAL(bloom_scale, 1.0, 0.001, 4.0) \
+    REAL(low_frequency_boost, 0.7, 0.0, 1.0) \
+    REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
+    REAL(high_pass_frequency, 1.0, 0.001, 1.0) \
+    REAL(scatter, 0.7, 0.0, 1.0)
 
 // The largest half float.
 #define HALF_LIMIT 65504.0
@@ -85,6 +112,9 @@
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
 #define MAX_LAYERS 8
+
+// The levels that one pass gathers.
+#define GATHERED_LEVELS 5
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -126,4 +156,7 @@
     NAME(DIRECTION_BOTH, 2, both) \
     NAME(SAMPLING_WHOLE, 0, whole) \
     NAME(SAMPLING_FILTER, 1, filter) \
-    NAME(SAMPLING_FETCH, 2, fetch)
+    NAME(SAMPLING_FETCH, 2, fetch) \
+    NAME(UPSAMPLE_TENT, 0, tent) \
+    NAME(UPSAMPLE_LINEAR, 1, linear) \
+    NAME(UPSAMPLE_CUBIC, 2, cubic)

@@ -6,14 +6,21 @@ vec3 threshold_hard(vec3 colour, float threshold)
     return dot(colour, vec3(0.2126, 0.7152, 0.0722)) > threshold ? colour : vec3(0.0);
 }
 
-// Soft: a quadratic knee of half-width threshold * knee around the threshold (api: `knee`).
-vec3 threshold_knee(vec3 colour, float threshold, float knee)
+// Soft: a quadratic of half-width `width` around the threshold; sources differ in the divisor,
+// about 4 * width, and in the least brightness that they divide by.
+vec3 soft_threshold(vec3 colour, float threshold, float width, float divisor, float least)
 {
     float brightness = max(colour.r, max(colour.g, colour.b));
-    float width = threshold * knee;
     float soft = clamp(brightness - threshold + width, 0.0, 2.0 * width);
-    soft = soft * soft / (4.0 * width + 1e-5);
-    return colour * (max(soft, brightness - threshold) / max(brightness, 1e-5));
+    soft = soft * soft / divisor;
+    return colour * (max(soft, brightness - threshold) / max(brightness, least));
+}
+
+// The soft threshold of the settings (api: `knee`).
+vec3 threshold_knee(vec3 colour, float threshold, float knee)
+{
+    float width = threshold * knee;
+    return soft_threshold(colour, threshold, width, 4.0 * width + 1e-5, 1e-5);
 }
 
 vec3 apply_threshold(vec3 colour, int mode, float threshold, float knee)

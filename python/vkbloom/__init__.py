@@ -20,6 +20,7 @@ from vkbloom._core import (
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
 from vkbloom.presets import presets
+from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Scene
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
@@ -30,11 +31,15 @@ __all__ = [
     "TUTORIAL",
     "AdapterInfo",
     "AdapterNotFoundError",
+    "BevyBloom",
     "Camera",
     "DeviceLostError",
     "DualKawase",
     "Error",
+    "FilamentBloom",
     "Frames",
+    "HdrpBloom",
+    "KinoBloom",
     "OutOfMemoryError",
     "Pyramid",
     "Renderer",
@@ -42,6 +47,8 @@ __all__ = [
     "Separable",
     "Settings",
     "ShaderError",
+    "UnrealBloom",
+    "UrpBloom",
     "ValidationError",
     "adapters",
     "gaussian_weights",

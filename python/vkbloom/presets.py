@@ -1,11 +1,15 @@
-"""Settings under the names of where they were published."""
+"""Settings under the names of where they were published.
+
+``docs/presets.md`` gives the source of each, its formula and what differs from it.
+"""
 
 from __future__ import annotations
 
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.settings import Separable
+from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
+from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,9 +21,40 @@ if TYPE_CHECKING:
 #: - ``"tutorial"``: the forward system, 256 x 256 bloom buffers, nine taps.
 #: - ``"outline"``: the same passes with a loop that starts at the centre and a vertical step of
 #:   one texel of the width.
+#: - ``"jimenez2014"``: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced
+#:   Warfare", SIGGRAPH 2014; six levels as in LearnOpenGL's guest article on it
+#:   (JoeyDeVries/LearnOpenGL @ a545a703f958), mixed in with the talk's 0.04.
+#: - ``"dual_kawase"``: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015, with the
+#:   iterations and the offset of KWin's tenth strength (KDE/kwin @ 00a2faf64fbf,
+#:   src/plugins/blur/blur.cpp).
+#: - ``"bevy_natural"``: ``Bloom::NATURAL`` of bevyengine/bevy, tag v0.19.1 (b56fc29d3016),
+#:   crates/bevy_post_process/src/bloom/settings.rs.
+#: - ``"kino"``: keijiro/KinoBloom @ 0a04c43fa47d, Assets/Kino/Bloom/Bloom.cs, in high quality.
+#: - ``"filament"``: google/filament, filament/include/filament/Options.h @ 2fac13e154fb, at its
+#:   low quality; the strength is the intensity.
+#: - ``"unity_urp"``: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal,
+#:   Runtime/Overrides/Bloom.cs @ a085de35f86e, with an intensity of 1 (Unity's own is 0, off).
+#: - ``"unity_hdrp"``: Unity-Technologies/Graphics,
+#:   Packages/com.unity.render-pipelines.high-definition, Runtime/PostProcessing/Components/Bloom.cs
+#:   @ 2084a9d19159, with an intensity of 0.2 (Unity's own is 0, off; of its i HDRP makes
+#:   2^i - 1).
+#: - ``"threejs_unreal"``: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since
+#:   #31528 and #32517 (2025), with the defaults of its successor BloomNode: strength 1, radius
+#:   and threshold 0.
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
         "outline": Separable(first_tap=0, texel="x"),
+        "jimenez2014": Pyramid(
+            levels=6, radius=1.0, firefly_filter=True, composite="mix", intensity=0.04
+        ),
+        # KWin spreads six strengths of four iterations evenly over the offsets 3 to 8.
+        "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
+        "bevy_natural": BevyBloom(),
+        "kino": KinoBloom(),
+        "filament": FilamentBloom(),
+        "unity_urp": UrpBloom(),
+        "unity_hdrp": HdrpBloom(),
+        "threejs_unreal": UnrealBloom(),
     }
 )

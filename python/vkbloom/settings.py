@@ -122,7 +122,8 @@ class Settings:
             raise TypeError("Settings is abstract; use a method, such as Separable")
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if field.name in _core.VALUES and not (value is None and field.default is None):
+            optional = str(field.type).endswith("None")
+            if field.name in _core.VALUES and not (value is None and optional):
                 self._check_value(field, value)
             elif field.name in _core.CHOICES and value not in _core.CHOICES[field.name]:
                 names = ", ".join(_core.CHOICES[field.name])

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import dual_kawase, pyramid, separable
+from . import bevy, dual_kawase, filament, hdrp, kino, pyramid, separable, unreal, urp
 from .compositing import CompositeSettings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
@@ -38,13 +38,23 @@ class Settings(CompositeSettings, Protocol):
 class _Method(NamedTuple):
     # (glow, settings, size of the bloom, storing) -> framebuffers after the glow
     passes: Callable[[Array, Any, tuple[int, int], Storage], dict[str, Array]]
-    gain: Callable[[Any], float]
+    gain: Callable[..., float]
+    # Reduces and thresholds the frame in its own way, which its passes begin with.
+    published: bool = False
+    # The number of levels that are added follows from the frame's size, and so does the gain.
+    sized: bool = False
 
 
 _METHODS = {
     "separable": _Method(separable.passes, separable.gain),
     "pyramid": _Method(pyramid.passes, pyramid.gain),
     "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
+    "bevy": _Method(bevy.passes, bevy.gain, published=True),
+    "filament": _Method(filament.passes, filament.gain, published=True),
+    "urp": _Method(urp.passes, urp.gain, published=True, sized=True),
+    "hdrp": _Method(hdrp.passes, hdrp.gain, published=True),
+    "unreal": _Method(unreal.passes, unreal.gain, published=True),
+    "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
 }
 
 
@@ -88,8 +98,10 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     height, width, _ = scene.shape
     store = storage(format_of(image, settings.format))
     reduced = sample(finite(scene[..., :3]), _bloom_size(settings, (width, height)))
-    glow = store(extract(reduced, settings.threshold, settings.knee))
-    blurred = _method(settings).passes(glow, settings, (width, height), store)
+    method = _method(settings)
+    threshold = None if method.published else settings.threshold
+    glow = store(extract(reduced, threshold, settings.knee))
+    blurred = method.passes(glow, settings, (width, height), store)
     framebuffers = {name: _with_alpha(rgb) for name, rgb in {"glow": glow, **blurred}.items()}
     framebuffers["final"] = composite(scene, framebuffers["bloom"], settings, dtype)
     return framebuffers
@@ -170,20 +182,25 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
-def gain(settings: Settings) -> float:
+def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
     """Return the bloom of a flat image of 1, before any clamp and before the intensity.
 
     Parameters
     ----------
     settings : vkbloom.Separable, Pyramid or DualKawase
         A threshold that they set has its effect: a flat image of 1 passes through it first.
+    size : (int, int), optional
+        Width and height of the image. Counts with `vkbloom.KinoBloom`, which adds more levels
+        the higher the image is.
 
     Returns
     -------
     float
     """
-    glow = float(extract(np.ones((1, 1, 3)), settings.threshold, settings.knee)[0, 0, 0])
-    return glow * _method(settings).gain(settings)
+    method = _method(settings)
+    threshold = None if method.published else settings.threshold
+    glow = float(extract(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
+    return glow * (method.gain(settings, size) if method.sized else method.gain(settings))
 
 
 def _method(settings: Settings) -> _Method:

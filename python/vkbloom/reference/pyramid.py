@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +12,7 @@ from .levels import level_sizes
 from .sampling import Array, sample
 from .threshold import luminance
 
-__all__ = ["gain", "passes"]
+__all__ = ["downsample", "gain", "groups", "passes"]
 
 # The 13 taps are five 2 x 2 groups: (share of the group, x offsets, y offsets), offsets in
 # texels of the image read. The four outer groups overlap: they share the tap in the centre,
@@ -77,7 +78,7 @@ def passes(
     downs: list[Array] = []
     source = glow
     for k, level_size in enumerate(sizes):
-        source = store(_downsample(source, level_size, settings.firefly_filter and k == 0))
+        source = store(downsample(source, level_size, settings.firefly_filter and k == 0))
         downs.append(source)
         framebuffers[f"down_{k}"] = source
 
@@ -99,7 +100,14 @@ def gain(settings: PyramidSettings) -> float:
     return 1.0
 
 
-def _downsample(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:
+def groups(image: Array, size: tuple[int, int]) -> Iterator[tuple[float, Array]]:
+    """Yield the share and the mean of each of the five groups of taps, (height, width, C)."""
+    for share, x_offsets, y_offsets in _GROUPS:
+        x_taps, y_taps = ([(x, 0.5) for x in offsets] for offsets in (x_offsets, y_offsets))
+        yield share, sample(image, size, x_taps, y_taps)
+
+
+def downsample(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:
     """Read the 13 taps around each pixel of a smaller image.
 
     With `firefly_filter` the share of each group is multiplied by 1 / (1 + luminance of the
@@ -111,8 +119,7 @@ def _downsample(image: Array, size: tuple[int, int], firefly_filter: bool) -> Ar
         )
     total = np.zeros((size[1], size[0], image.shape[2]))
     shares = np.zeros((size[1], size[0], 1))
-    for group_share, x_offsets, y_offsets in _GROUPS:
-        mean = sample(image, size, [(x, 0.5) for x in x_offsets], [(y, 0.5) for y in y_offsets])
+    for group_share, mean in groups(image, size):
         share = np.full((size[1], size[0], 1), group_share)
         if firefly_filter:
             grey = mean if image.shape[2] == 1 else luminance(mean)

@@ -6,7 +6,7 @@ import numpy as np
 
 from .sampling import Array
 
-__all__ = ["extract", "luminance"]
+__all__ = ["extract", "luminance", "soften"]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -53,9 +53,28 @@ def extract(rgb: Array, threshold: float | None, knee: float) -> Array:
         return rgb
     if knee == 0:
         return np.where(luminance(rgb) > threshold, rgb, 0.0)
-    brightness = rgb.max(axis=-1, keepdims=True)
     half_width = threshold * knee
-    soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2
-    soft /= 4 * half_width + 1e-5
-    scale: Array = np.maximum(soft, brightness - threshold) / np.maximum(brightness, 1e-5)
+    return soften(rgb, threshold, half_width, 4 * half_width + 1e-5, 1e-5)
+
+
+def soften(rgb: Array, threshold: float, half_width: float, divisor: float, least: float) -> Array:
+    """Scale colours by max(q, b - threshold) / max(b, least), b being their brightest channel.
+
+    q = clamp(b - threshold + half_width, 0, 2 half_width)^2 / divisor.
+
+    Parameters
+    ----------
+    rgb : ndarray of float64, shape (..., C)
+    threshold, half_width : float
+        Middle and half-width of the soft part, in the image's units.
+    divisor, least : float
+        About 4 half_width, and the least brightness that is divided by: sources differ there.
+
+    Returns
+    -------
+    ndarray of float64, shape (..., C)
+    """
+    brightness = rgb.max(axis=-1, keepdims=True)
+    soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2 / divisor
+    scale: Array = np.maximum(soft, brightness - threshold) / np.maximum(brightness, least)
     return rgb * scale

@@ -1,0 +1,357 @@
+"""The settings of bloom as engines publish it: each class is one engine's method.
+
+Their parameters have the names, the defaults and the ranges of their sources, as far as C's table
+of numbers (``shaders/params.h``) can say it. What all of them share: they start from the whole
+frame (``bloom_scale`` 1 in scenes too), reduce it by rules of their own, and threshold where their
+source does, so that ``glow`` is what goes in, not what the threshold lets through. Their buffers
+are half floats unless ``format`` says otherwise, for those of the sources are floats too.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number, check_number
+
+__all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UnrealBloom", "UrpBloom"]
+
+
+def _linear(encoded: float) -> float:
+    """Return the linear value of an sRGB one above 0.04045: engines show thresholds as sRGB."""
+    return float(((encoded + 0.055) / 1.055) ** 2.4)
+
+
+def _check_composite(settings: Settings, *allowed: Composite) -> None:
+    """Raise ValueError unless the method has the composite."""
+    if settings.composite not in allowed:
+        raise ValueError(
+            f"composite: {settings.composite!r} is not one of {', '.join(allowed)}, "
+            f"which the method {settings.method} has"
+        )
+
+
+def _check_no_knee(settings: Settings) -> None:
+    """Raise ValueError where a knee is asked of a method whose threshold has none."""
+    if settings.knee != 0:
+        raise ValueError(
+            f"knee: {settings.knee!r} is out of range, 0, for the threshold of the method "
+            f"{settings.method} has no knee"
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BevyBloom(Settings):
+    """Bevy's bloom, by default its ``Bloom::NATURAL``.
+
+    Parameters
+    ----------
+    low_frequency_boost : float
+        How much the larger blurs count beyond `intensity`, 0 to 1.
+    low_frequency_boost_curvature : float
+        How soon the boost sets in from level to level, 0 to 0.99.
+    high_pass_frequency : float
+        Share of the levels, counted from the smallest blur, that are left in whole, 0.001 to 1.
+    max_mip_dimension : int
+        Height of ``down_0`` in pixels, 4 to 4096.
+    composite : {"mix", "add"}
+        Bevy's "energy conserving" and "additive".
+    intensity : float
+        0 to 1; it counts on the way up, too.
+    threshold, knee : float
+        Bevy's threshold and threshold softness, always with the knee curve.
+    **settings
+        The other fields of `Settings`.
+
+    Notes
+    -----
+    ``down_0`` is `max_mip_dimension` high, as wide as the frame's aspect asks for (rounded). It is
+    the 13 taps of Jimenez in texels of the frame, each of their five groups p, already times its
+    share, divided by 1 + luminance(p) / 4; then at least 0.0001; then the threshold. The
+    N = floor(log2(max_mip_dimension)) - 1 levels, each next the floored half, are plain 13 taps.
+    For level m, with x = m / (N - 1), f_m is
+
+        (intensity + (1 - (1 - x)^(1 / (1 - curvature))) * boost * (1 - intensity))
+        * (1 - clamp((x - high_pass) / high_pass, 0, 1)),
+
+    without the factor 1 - intensity where the composite is "add"; then
+    up_k = (1 - f_k+1) down_k + f_k+1 tent(up_k+1), for "add" down_k + f_k+1 tent(up_k+1), with the
+    tent of `Pyramid` at a radius of 1. Bevy's last step, lerp(scene, tent(up_0), f_0), is the
+    composite, as f_0 is the intensity.
+
+    Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016), crates/bevy_post_process/src/bloom.
+    """
+
+    method: ClassVar[str] = "bevy"
+
+    composite: Composite = "mix"
+    intensity: float = _number("intensity", default=0.15)
+    format: BloomFormat | None = "rgba16float"
+    low_frequency_boost: float = _number("low_frequency_boost")
+    low_frequency_boost_curvature: float = _number("low_frequency_boost_curvature")
+    high_pass_frequency: float = _number("high_pass_frequency")
+    max_mip_dimension: int = _number("max_mip_dimension")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "mix", "add")
+        check_number("intensity", self.intensity, 0, 1)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class KinoBloom(Settings):
+    """Keijiro Takahashi's KinoBloom, version 2, in its high quality.
+
+    Parameters
+    ----------
+    radius : float
+        Of the blur, 1 to 7; one more doubles it.
+    anti_flicker : bool
+        A median of five pixels before the threshold, and the first level's four taps weighted by
+        1 / (1 + their brightest channel).
+    threshold : float or None
+        In linear light; KinoBloom shows the default as 0.8 in sRGB.
+    knee : float
+        KinoBloom's "soft knee".
+    composite : {"add"}
+    **settings
+        The other fields of `Settings`.
+
+    Notes
+    -----
+    ``bright`` is, at the frame's size, m = median(median(c, left, right), up, down) past the knee
+    curve with k = threshold * knee + 1e-5 and q = clamp(b - threshold + k, 0, 2k)^2 / (4k).
+    ``down_0`` is its half, each next the floored half, all by four taps of 1/4 one texel to each
+    side. With lg = log2(height) + radius - 8 there are N = clamp(trunc(lg), 1, 16) levels, and the
+    tent's taps are 0.5 + lg - trunc(lg) texels apart: up_k = down_k + tent(up_k+1) and
+    ``bloom`` = tent(up_0), the sum of the levels, not their mean. In "rgba8unorm" the images on
+    the way up hold means, and the bloom is N times as coarse.
+
+    Source: keijiro/KinoBloom @ 0a04c43fa47d (2017), Assets/Kino/Bloom/Bloom.cs, Bloom.cginc.
+    """
+
+    method: ClassVar[str] = "kino"
+
+    threshold: float | None = _linear(0.8)
+    knee: float = _number("knee", default=0.5)
+    intensity: float = _number("intensity", default=0.8)
+    format: BloomFormat | None = "rgba16float"
+    radius: float = _number("radius", default=2.5)
+    anti_flicker: bool = _flag("anti_flicker")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+        check_number("radius", self.radius, 1, 7)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FilamentBloom(Settings):
+    """Filament's bloom at its low quality, the default one.
+
+    Parameters
+    ----------
+    resolution : int
+        Height of ``down_0`` before it is floored to a multiple of 16, 16 to 2048.
+    levels : int
+        Of the chain, 1 to floor(log2(resolution)) + 1, at which a larger number stops; at most 12.
+    highlight : float
+        Brightness towards which bright colours are compressed, 10 to 65504. Counts with a
+        threshold.
+    threshold : float or None
+        Filament's is 1 or off. With one, fireflies are filtered too.
+    composite : {"add"}
+    intensity : float
+        Filament's strength, 0 to 1.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``down_0`` is as wide as the frame's aspect asks for, floored to a multiple of 16. While it is
+    less than half of the frame in width or height, the frame is halved first. All these steps are
+    a bilinear sample of the image convolved with (1 2 1)^2 / 16; the first one has the threshold:
+    its four bilinear taps are weighted by 1 / (1 + their brightest channel), then
+    c = max(0, c - threshold), then c / (1 + brightest channel of c / highlight). Further levels
+    are the floored halves, by 3 x 3 taps 1.761629 texels apart, the outer ones 7.46602 / 32 along
+    an axis, or by the 13 taps of `Pyramid` where a side of the level above is odd. On the way up
+    up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level; ``bloom`` is one
+    bilinear sample of up_0, divided by the number of levels.
+
+    Source: google/filament: bloomDownsample2x.mat @ 9f62dc2f2f53, bloomDownsample9.mat and
+    bloomDownsample.mat @ 523a261b1052, bloomUpsample.mat @ 9f62dc2f2f53,
+    filament/src/PostProcessManager.cpp @ 003e5005713c, include/filament/Options.h @ 2fac13e154fb.
+    """
+
+    method: ClassVar[str] = "filament"
+
+    threshold: float | None = 1.0
+    intensity: float = _number("intensity", default=0.1)
+    format: BloomFormat | None = "rgba16float"
+    levels: int = _number("levels")
+    resolution: int = _number("resolution")
+    highlight: float = _number("highlight")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+        _check_no_knee(self)
+        check_number("intensity", self.intensity, 0, 1)
+        check_number("levels", self.levels, 1, 12)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class UrpBloom(Settings):
+    """Bloom of Unity's Universal Render Pipeline: the Gaussian filter without high quality.
+
+    Parameters
+    ----------
+    scatter : float
+        Share of the larger blurs, 0 to 1.
+    iterations : int
+        Most levels, 2 to 8.
+    clamp_max : float
+        Brightest value that goes into the bloom, 0 to 65504.
+    threshold : float or None
+        In linear light; Unity shows the default as 0.9 in sRGB.
+    knee : float
+        0.5 in Unity, and no setting there.
+    composite : {"add"}
+    intensity : float
+        0, off, is Unity's default.
+    **settings
+        The other fields of `Settings`.
+
+    Notes
+    -----
+    ``down_0`` is one bilinear tap at the floored half of the frame, clamped and past the knee
+    curve with k = threshold * knee, 4k + 1e-4 and 1e-4. There are clamp(floor(log2(longer side of
+    down_0) - 1), 1, iterations) levels, each next the floored half of the one before by the
+    half-kernel 0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622: horizontally two texels
+    of the level above apart, then vertically one pixel apart. With s = 0.05 + 0.9 scatter,
+    up_k = lerp(down_k, bilinear(up_k+1), s), and ``bloom`` is one bilinear sample of up_0. Dirt
+    and tint are left out.
+
+    Source: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal:
+    Shaders/PostProcessing/Bloom.shader @ 00d472fae509,
+    Runtime/Passes/PostProcess/BloomPostProcessPass.cs @ 13e28e026298,
+    Runtime/Overrides/Bloom.cs @ a085de35f86e.
+    """
+
+    method: ClassVar[str] = "urp"
+
+    threshold: float | None = _linear(0.9)
+    knee: float = _number("knee", default=0.5)
+    format: BloomFormat | None = "rgba16float"
+    scatter: float = _number("scatter")
+    iterations: int = _number("iterations")
+    clamp_max: float = _number("clamp_max")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class HdrpBloom(Settings):
+    """Bloom of Unity's High Definition Render Pipeline, without a threshold, at half resolution.
+
+    Parameters
+    ----------
+    scatter : float
+        Share of the larger blurs, 0 to 1.
+    high_quality_filtering : bool
+        The levels are enlarged by a cubic B-spline instead of bilinearly. Frames under 800 pixels
+        wide or 450 high are bilinear either way.
+    threshold : None
+        HDRP's default. With one HDRP would replace what of the scene is above it, a composite
+        that is not here.
+    composite : {"mix"}
+    intensity : float
+        0 to 1; it is 2^i - 1 of the i that HDRP shows, whose default is 0, off.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    Level k has the size of the frame / 2^(k + 1), rounded, halves to even; there are
+    clamp(floor(log2(longer side of the frame) - 2), 1, 16). Five bilinear taps in texels of the
+    frame, at (0, 0), +-(0.9, -0.4) and +-(0.4, 0.9), weighted by 1 / (1 + luminance), go into an
+    image of the size of ``down_0``. That is blurred into ``down_0``, and each level, read
+    bilinearly at distances of one pixel of the next one, into that, by the binomial 70, 56, 28, 8,
+    1 (/ 256) along both axes. With s = 0.05 + 0.9 scatter, up_k = lerp(down_k, U(up_k+1), s);
+    ``bloom`` is the cubic B-spline of up_0. Dirt, tint and anamorphism are left out.
+
+    Source: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.high-definition/
+    Runtime: PostProcessing/Shaders/BloomPrefilter.compute @ 2309d2c2fde8, BloomBlur.compute and
+    BloomUpsample.compute @ 0e4ca4d79b2c, PostProcessing/Components/Bloom.cs @ 2084a9d19159,
+    RenderPipeline/HDRenderPipeline.PostProcess.cs @ 0148835ea9ba.
+    """
+
+    method: ClassVar[str] = "hdrp"
+
+    composite: Composite = "mix"
+    intensity: float = _number("intensity", default=2**0.2 - 1)
+    format: BloomFormat | None = "rgba16float"
+    scatter: float = _number("scatter")
+    high_quality_filtering: bool = _flag("high_quality_filtering")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "mix")
+        _check_no_knee(self)
+        check_number("intensity", self.intensity, 0, 1)
+        if self.threshold is not None:
+            raise ValueError(
+                f"threshold: {self.threshold!r} is out of range, None, for what HDRP does with a "
+                "threshold is not a composite of the scene and the bloom alone"
+            )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class UnrealBloom(Settings):
+    """three.js' UnrealBloomPass.
+
+    Parameters
+    ----------
+    radius : float
+        0 to 1: from the factors 1, 0.8, 0.6, 0.4, 0.2 of the levels to 0.2, 0.4, 0.6, 0.8, 1.
+    smooth_width : float
+        Luminance over which the threshold fades in, 0.0001 to 65504.
+    threshold : float or None
+        Luminance where that begins.
+    composite : {"add"}
+    intensity : float
+        Three times three.js' strength.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``bright`` is one bilinear tap at half of the frame's size, rounded, times
+    smoothstep(threshold, threshold + smooth_width, luminance). There are five levels, ``down_0`` of
+    the same size and each next the rounded half of the one before; each is the one above it, the
+    first one ``bright``, blurred along x, then along y, by taps one pixel of the level apart with
+    weights 0.39894 exp(-i^2 / (2 sigma^2)) / sigma, |i| < R, R = 6, 10, 14, 18, 22 and
+    sigma = R / 3, not normalized. ``up_0`` is the sum of the levels, bilinear, times their
+    factors, ``bloom`` one bilinear sample of it. In "rgba8unorm" up_0 is a third of that.
+
+    Source: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since pull requests
+    #31528 (kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js
+    @ 0255e15dd1d4; defaults of examples/jsm/tsl/display/BloomNode.js, as the pass has none for
+    radius and threshold.
+    """
+
+    method: ClassVar[str] = "unreal"
+
+    threshold: float | None = 0.0
+    intensity: float = _number("intensity", default=3.0)
+    format: BloomFormat | None = "rgba16float"
+    radius: float = _number("radius", default=0.0)
+    smooth_width: float = _number("smooth_width")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_composite(self, "add")
+        _check_no_knee(self)
+        check_number("radius", self.radius, 0, 1)

@@ -1,0 +1,107 @@
+"""three.js' UnrealBloomPass, in its form since kernels and factor of 2025.
+
+From mrdoob/three.js: examples/jsm/postprocessing/UnrealBloomPass.js with pull requests #31528
+(kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from .image import Storage
+from .sampling import Array, sample
+
+__all__ = ["gain", "passes"]
+
+_TAP_COUNTS = (6, 10, 14, 18, 22)
+_FACTORS = (1.0, 0.8, 0.6, 0.4, 0.2)
+_LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
+
+
+class UnrealSettings(Protocol):
+    """What this blur reads of `vkbloom.UnrealBloom`."""
+
+    @property
+    def threshold(self) -> float | None: ...
+    @property
+    def smooth_width(self) -> float: ...
+    @property
+    def radius(self) -> float: ...
+
+
+def passes(
+    glow: Array, settings: UnrealSettings, size: tuple[int, int], store: Storage
+) -> dict[str, Array]:
+    """Return the framebuffers.
+
+    down_0 and "bright" have half of the frame's size, rounded, each next level half of the one
+    above, rounded. Each level is the one above it, the first one "bright", blurred by a Gaussian
+    along x with taps one pixel of the level apart, then along y. up_0 is the sum of the levels,
+    each bilinear and with its factor; the bloom is up_0, bilinear. In buffers that end at 1, up_0
+    is divided by the sum of the factors, 3.
+
+    Parameters
+    ----------
+    glow : ndarray of float64, shape (H, W, C)
+        1 or 3 channels.
+    settings : vkbloom.UnrealBloom
+    size : (int, int)
+        Width and height of the bloom.
+    store : Storage
+        What storing in a bloom buffer does to the values.
+
+    Returns
+    -------
+    dict of str to ndarray
+        "bright", "down_0" to "down_4", "up_0" and "bloom", (height, width, C).
+    """
+    height, width, _ = glow.shape
+    half = (math.floor(width / 2 + 0.5), math.floor(height / 2 + 0.5))
+    image = store(_prefilter(sample(glow, half), settings))
+    framebuffers = {"bright": image}
+    total = np.zeros_like(image)
+    for k, factor in enumerate(_factors(settings.radius)):
+        width, height = math.floor(width / 2 + 0.5), math.floor(height / 2 + 0.5)
+        ratio = image.shape[1] / width
+        x_taps = [(i * ratio, weight) for i, weight in _kernel(k)]
+        across = store(sample(image, (width, height), x_taps=x_taps))
+        image = store(sample(across, (width, height), y_taps=_kernel(k)))
+        framebuffers[f"down_{k}"] = image
+        total += factor * sample(image, half)
+    whole = sum(_factors(settings.radius)) if store.high == 1 else 1.0
+    framebuffers["up_0"] = store(total / whole)
+    framebuffers["bloom"] = store(whole * sample(framebuffers["up_0"], size))
+    return framebuffers
+
+
+def gain(settings: UnrealSettings) -> float:
+    """Return what a flat image of 1 becomes: about 3, as the kernels sum to nearly 1."""
+    value, total = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]), 0.0
+    for k, factor in enumerate(_factors(settings.radius)):
+        value *= sum(weight for _, weight in _kernel(k)) ** 2
+        total += factor * value
+    return total
+
+
+def _factors(radius: float) -> list[float]:
+    return [factor + (1.2 - factor - factor) * radius for factor in _FACTORS]
+
+
+def _kernel(level: int) -> list[tuple[float, float]]:
+    count = _TAP_COUNTS[level]
+    deviation = count / 3
+    return [
+        (float(i), 0.39894 * math.exp(-0.5 * i * i / deviation**2) / deviation)
+        for i in range(1 - count, count)
+    ]
+
+
+def _prefilter(rgb: Array, settings: UnrealSettings) -> Array:
+    if settings.threshold is None:
+        return rgb
+    grey = rgb if rgb.shape[2] == 1 else (rgb * _LUMINANCE).sum(axis=-1, keepdims=True)
+    t = np.clip((grey - settings.threshold) / settings.smooth_width, 0, 1)
+    return rgb * (t * t * (3 - 2 * t))

@@ -1,0 +1,113 @@
+"""The way up a chain of levels: filters that enlarge, and how levels become one image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .image import Storage
+from .sampling import Array, sample
+
+__all__ = ["combine", "cubic", "flat_gain", "linear", "tent", "tent_of_target"]
+
+# (image, size of the result) -> the image enlarged
+Filter = Callable[[Array, tuple[int, int]], Array]
+
+
+def linear(image: Array, size: tuple[int, int]) -> Array:
+    """Read one bilinear tap."""
+    return sample(image, size)
+
+
+def tent(image: Array, size: tuple[int, int], x_step: float = 1.0, y_step: float = 1.0) -> Array:
+    """Read 3 x 3 bilinear taps, so many texels of the image apart, with (1 2 1)^2 / 16."""
+    x_taps, y_taps = (((-step, 0.25), (0.0, 0.5), (step, 0.25)) for step in (x_step, y_step))
+    return sample(image, size, x_taps, y_taps)
+
+
+def tent_of_target(image: Array, size: tuple[int, int]) -> Array:
+    """Read the tent with taps one pixel of the result apart."""
+    return tent(image, size, image.shape[1] / size[0], image.shape[0] / size[1])
+
+
+def cubic(image: Array, size: tuple[int, int]) -> Array:
+    """Read the cubic B-spline with the texels as its control points.
+
+    At the fraction f of the way between two texels, the four nearest weigh (1 - f)^3,
+    4 - 6 f^2 + 3 f^3, 1 + 3 f + 3 f^2 - 3 f^3 and f^3, each divided by 6.
+    """
+    rows = _cubic_rows(image, size[1])
+    columns = _cubic_rows(rows.swapaxes(0, 1), size[0])
+    return np.ascontiguousarray(columns.swapaxes(0, 1))
+
+
+def _cubic_rows(image: Array, count: int) -> Array:
+    """Enlarge along the first axis."""
+    length = image.shape[0]
+    positions = (np.arange(count) + 0.5) * length / count - 0.5
+    lower = np.floor(positions)
+    f = (positions - lower)[:, np.newaxis, np.newaxis]
+    weights = ((1 - f) ** 3, 4 - 6 * f**2 + 3 * f**3, 1 + 3 * f + 3 * f**2 - 3 * f**3, f**3)
+    result = np.zeros((count, *image.shape[1:]))
+    for offset, weight in enumerate(weights, start=-1):
+        texels = np.clip(lower + offset, 0, length - 1).astype(np.intp)
+        result += weight / 6 * image[texels]
+    return result
+
+
+def combine(
+    downs: Sequence[Array],
+    size: tuple[int, int],
+    store: Storage,
+    *,
+    own: Sequence[float],
+    coarse: Sequence[float],
+    upsample: Filter,
+    last: Filter,
+    gain: float = 1.0,
+) -> dict[str, Array]:
+    """Return the framebuffers of the way up.
+
+    up_N-1 = down_N-1, up_k = own[k] down_k + coarse[k] upsample(up_k+1), and the bloom is
+    gain * last(up_0). In buffers that end at 1, up_k is divided by the value that it has where
+    all levels are 1, and the bloom is multiplied by that of up_0.
+
+    Parameters
+    ----------
+    downs : sequence of ndarray
+        The levels, largest first.
+    size : (int, int)
+        Width and height of the bloom.
+    store : Storage
+        What storing in a bloom buffer does to the values.
+    own, coarse : sequence of float
+        Shares of the level and of those below it; N - 1 entries are read.
+    upsample, last : callable
+        The filters between levels and to the bloom.
+    gain : float, optional
+        Factor of the bloom.
+
+    Returns
+    -------
+    dict of str to ndarray
+        "up_N-2" to "up_0" and "bloom".
+    """
+    framebuffers: dict[str, Array] = {}
+    up, whole = downs[-1], 1.0
+    for k in range(len(downs) - 2, -1, -1):
+        height, width, _ = downs[k].shape
+        up = own[k] * downs[k] + coarse[k] * whole * upsample(up, (width, height))
+        whole = own[k] + coarse[k] * whole if store.high == 1 else 1.0
+        up = store(up / whole)
+        framebuffers[f"up_{k}"] = up
+    framebuffers["bloom"] = store(gain * whole * last(up, size))
+    return framebuffers
+
+
+def flat_gain(own: Sequence[float], coarse: Sequence[float], levels: Sequence[float]) -> float:
+    """Return what `combine` makes of levels that are flat, for a gain of 1."""
+    value = levels[-1]
+    for k in range(len(levels) - 2, -1, -1):
+        value = own[k] * levels[k] + coarse[k] * value
+    return value

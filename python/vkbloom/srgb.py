@@ -1,0 +1,51 @@
+"""The sRGB curve and its inverse (IEC 61966-2-1), on arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["decode_srgb", "encode_srgb"]
+
+
+def decode_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
+    """Turn sRGB values into linear ones.
+
+    Parameters
+    ----------
+    encoded : ndarray of float
+        Any shape; 0..1, beyond which the curve goes on.
+
+    Returns
+    -------
+    ndarray
+        The same shape and dtype: x / 12.92 up to 0.04045, then ((x + 0.055) / 1.055)^2.4
+        (IEC 61966-2-1).
+    """
+    kind = encoded.dtype.type
+    # The maximum keeps the power defined where the line is used.
+    curve = ((np.maximum(encoded, kind(0.04045)) + kind(0.055)) / kind(1.055)) ** kind(2.4)
+    linear: NDArray[Any] = np.where(encoded <= kind(0.04045), encoded / kind(12.92), curve)
+    return linear
+
+
+def encode_srgb(linear: NDArray[Any]) -> NDArray[Any]:
+    """Turn linear values into sRGB ones, the inverse of `decode_srgb`.
+
+    Parameters
+    ----------
+    linear : ndarray of float
+        Any shape; 0..1, beyond which the curve goes on.
+
+    Returns
+    -------
+    ndarray
+        The same shape and dtype: 12.92 x up to 0.0031308, then 1.055 x^(1 / 2.4) - 0.055
+        (IEC 61966-2-1).
+    """
+    kind = linear.dtype.type
+    curve = kind(1.055) * np.maximum(linear, kind(0.0031308)) ** kind(1 / 2.4) - kind(0.055)
+    encoded: NDArray[Any] = np.where(linear <= kind(0.0031308), linear * kind(12.92), curve)
+    return encoded

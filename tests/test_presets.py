@@ -1,0 +1,423 @@
+"""The presets: each against its own NumPy reference, and the reference against its formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from vkbloom import (
+    BevyBloom,
+    DualKawase,
+    FilamentBloom,
+    HdrpBloom,
+    KinoBloom,
+    Pyramid,
+    Renderer,
+    Scene,
+    Settings,
+    UnrealBloom,
+    UrpBloom,
+    presets,
+    reference,
+)
+
+Array = NDArray[Any]
+
+# (width, height): odd, even, tall, wide, smaller than the chains are long.
+SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (333, 217)]
+FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
+PUBLISHED = sorted(set(presets) - {"tutorial", "outline"})
+
+
+@pytest.fixture(scope="module")
+def preset_renderer() -> Iterator[Renderer]:
+    with Renderer("software", validation=True) as renderer:
+        yield renderer
+
+
+def lights(size: tuple[int, int], dtype: str, seed: int = 3) -> Array:
+    """Make dim noise with a few bright points; in float formats they go up to 40."""
+    width, height = size
+    generator = np.random.default_rng(seed)
+    image = 0.8 * generator.random((height, width, 3)) ** 2
+    points = generator.random((height, width)) < 0.01
+    points[height // 2, width // 3] = True
+    image[points] = generator.random((int(points.sum()), 3)) * (1 if dtype == "uint8" else 40)
+    return np.round(image * 255).astype(np.uint8) if dtype == "uint8" else image.astype(dtype)
+
+
+def real(array: Array) -> NDArray[np.float64]:
+    values = array.astype(np.float64)
+    return values / 255 if array.dtype == np.uint8 else values
+
+
+def tolerance(name: str, expected: Array, format: str, settings: Settings, downs: int) -> float:
+    """Largest difference that the rounding of the buffers explains."""
+    if format == "rgba8unorm":
+        # 2 for a chain of 8-bit stages. three.js' kernels sum to less than 1: rounding undoes that
+        # in flat areas, each of ten times in the same direction.
+        levels = 3.0 if isinstance(settings, UnrealBloom) else 2.0
+        # A bloom that is a sum multiplies the error of the means it is made from.
+        sums: dict[type[Settings], int] = {KinoBloom: downs, UnrealBloom: 3}
+        if name in ("bloom", "final"):
+            levels *= sums.get(type(settings), 1)
+        if name == "final":
+            levels = max(2.0, levels * settings.intensity)
+        return levels / 255
+    largest = max(1.0, float(np.abs(expected).max()))
+    return (1e-4 if format == "rgba32float" else 2e-3) * largest
+
+
+def check(renderer: Renderer, image: Array, settings: Settings) -> None:
+    """All framebuffers of the image equal those of the reference."""
+    frames = renderer.apply(image, settings)
+    expected = reference.apply(image, settings)
+    assert list(frames) == list(expected)
+    format = settings.format or FORMATS[image.dtype.name]
+    downs = sum(name.startswith("down") for name in frames)
+    for name, values in expected.items():
+        actual = real(frames[name])
+        assert actual.shape == values.shape, name
+        # What is right in the bloom buffers is rounded once more in an 8-bit picture.
+        stored = "rgba8unorm" if name == "final" and image.dtype == np.uint8 else format
+        largest = tolerance(name, values, stored, settings, downs)
+        assert_allclose(actual, values, rtol=0, atol=largest, err_msg=name)
+
+
+@pytest.mark.parametrize("dtype", FORMATS)
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_preset_is_its_reference(
+    preset_renderer: Renderer, name: str, size: tuple[int, int], dtype: Any
+) -> None:
+    format: Any = FORMATS[dtype]
+    check(preset_renderer, lights(size, dtype), presets[name].replace(format=format))
+
+
+@pytest.mark.parametrize("dtype", FORMATS)
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_preset_as_it_is(preset_renderer: Renderer, name: str, dtype: str) -> None:
+    check(preset_renderer, lights((97, 45), dtype), presets[name])
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_flat_image_gets_the_gain(preset_renderer: Renderer, name: str) -> None:
+    settings = presets[name].replace(format="rgba32float")
+    gain = reference.gain(settings, (71, 45))
+    bloom = preset_renderer.apply(np.ones((45, 71, 3), np.float32), settings)["bloom"]
+    # Absolute too: a subtractive threshold of 1 leaves of 1 what its sums were rounded by.
+    assert_allclose(bloom[..., :3], gain, rtol=1e-5, atol=1e-6)
+    assert_allclose(reference.blur(np.ones((45, 71, 3)), settings), gain, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_nan_and_infinity_are_not_spread(preset_renderer: Renderer, name: str) -> None:
+    image = lights((33, 21), "float32")
+    image[4, 5, 0], image[10, 20, 1], image[20, 0, 2] = np.nan, np.inf, -np.inf
+    frames = preset_renderer.apply(image, presets[name])
+    clean = np.where(np.isfinite(image), image, 0).astype(np.float32)
+    expected = preset_renderer.apply(clean, presets[name])
+    for framebuffer in set(frames) - {"final"}:
+        assert np.array_equal(frames[framebuffer], expected[framebuffer]), framebuffer
+    assert np.array_equal(np.isfinite(frames["final"]), np.isfinite(image))
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_scene_is_blurred_as_an_image_is(preset_renderer: Renderer, name: str) -> None:
+    settings = presets[name]
+    frames = preset_renderer.render(Scene.ufo(), settings, (160, 90))
+    format = settings.format or "rgba8unorm"
+    if type(settings) not in (Pyramid, DualKawase):
+        assert frames["glow"].shape == (90, 160, 4)
+    expected = reference.passes(frames["glow"], settings, (160, 90), format)
+    for framebuffer, values in expected.items():
+        largest = tolerance(framebuffer, values, format, settings, 1)
+        assert_allclose(real(frames[framebuffer]), values, rtol=0, atol=largest)
+    final = reference.composite(frames["scene"], real(frames["bloom"]), settings)
+    assert_allclose(real(frames["final"]), final, rtol=0, atol=1.01 / 255)
+
+
+# --- Bevy ---
+
+
+def test_bevys_shares_are_the_published_ones() -> None:
+    """f_0..f_7 and each level's share, worked out from the formula in settings.rs."""
+    factors = [0.15, 0.717737, 0.744289, 0.744992, 0.745, 0.745, 0.745, 0.745]
+    shares = [0.28226, 0.18353, 0.13623, 0.10148, 0.07561, 0.05633, 0.04196, 0.12260]
+    rest = 1.0
+    for factor, share in zip([*factors[1:], 0.0], shares, strict=True):
+        assert rest * (1 - factor) == pytest.approx(share, abs=1e-5)
+        rest *= factor
+    own, coarse = reference.bevy._shares(BevyBloom())
+    assert_allclose(coarse, factors[1:], atol=1e-6)
+    assert_allclose(np.add(own, coarse), 1, rtol=1e-12)
+
+
+def test_bevys_sizes(preset_renderer: Renderer) -> None:
+    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["bevy_natural"])
+    sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
+    assert sizes[:3] == [(910, 512), (455, 256), (227, 128)]
+    assert sizes[-1] == (7, 4)
+    assert len(sizes) == 8
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        # Bloom::OLD_SCHOOL and Bloom::SCREEN_BLUR
+        BevyBloom(intensity=0.05, threshold=0.6, knee=0.2, composite="add"),
+        BevyBloom(
+            intensity=1.0,
+            low_frequency_boost=0.0,
+            low_frequency_boost_curvature=0.0,
+            high_pass_frequency=1 / 3,
+        ),
+        BevyBloom(max_mip_dimension=100, threshold=0.3),
+        BevyBloom(max_mip_dimension=5, composite="add"),
+    ],
+    ids=["old-school", "screen-blur", "100-high", "two-levels"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_bevys_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(preset_renderer, lights((91, 53), "float32"), settings.replace(format=format))
+
+
+def test_bevy_has_no_screen_and_ends_at_1() -> None:
+    with pytest.raises(ValueError, match="composite: 'screen' is not one of mix, add"):
+        BevyBloom(composite="screen")
+    with pytest.raises(ValueError, match=r"intensity: 1\.5 is out of range, 0 to 1"):
+        BevyBloom(intensity=1.5)
+
+
+# --- KinoBloom ---
+
+
+@pytest.mark.parametrize(
+    ("height", "radius", "levels", "step"),
+    [(720, 2.5, 3, 1.49185), (1080, 2.5, 4, 1.07682), (45, 1.0, 1, 0.5 + 5.49185 - 7 + 1)],
+)
+def test_kinos_levels_and_step(height: int, radius: float, levels: int, step: float) -> None:
+    actual = reference.kino._count_and_step(KinoBloom(radius=radius), height)
+    assert actual[0] == levels
+    assert actual[1] == pytest.approx(step, abs=1e-5)
+
+
+def test_kinos_threshold_is_0_8_in_srgb() -> None:
+    assert KinoBloom().threshold == pytest.approx(0.6038273, abs=1e-7)
+
+
+def test_kinos_median_removes_a_single_bright_pixel_and_keeps_a_large_light() -> None:
+    image = np.zeros((64, 64, 3))
+    image[20, 20] = 100
+    assert not reference.blur(image, KinoBloom()).any()
+    image[30:33, 30:33] = 100
+    bright = reference.passes(image, KinoBloom())["bright"]
+    assert (bright[..., 0] > 0).sum() == 9
+    assert reference.blur(image, KinoBloom(anti_flicker=False))[20, 20].min() > 1
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        KinoBloom(radius=7.0),
+        KinoBloom(radius=1.0, threshold=None),
+        KinoBloom(radius=4.2, anti_flicker=False, knee=0.0, threshold=1.5),
+    ],
+    ids=["widest", "no-threshold", "no-anti-flicker"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_kinos_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(preset_renderer, lights((91, 153), "float32"), settings.replace(format=format))
+
+
+# --- Filament ---
+
+
+def test_filaments_sizes(preset_renderer: Renderer) -> None:
+    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["filament"])
+    sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
+    assert sizes == [(672 >> k, 384 >> k) for k in range(6)]
+
+
+def test_filaments_reduction_is_a_sample_of_the_binomial() -> None:
+    """Without a threshold, level 0 is what a slow loop over the convolved image finds."""
+    image = np.random.default_rng(5).random((5, 7, 1))
+    padded = np.pad(image[..., 0], 2, mode="edge")
+    expected = np.zeros((16, 32))
+    for y in range(16):
+        for x in range(32):
+            at_y, at_x = (y + 0.5) * 5 / 16 - 0.5, (x + 0.5) * 7 / 32 - 0.5
+            top, left = int(np.floor(at_y)), int(np.floor(at_x))
+            for row, row_share in ((top, top + 1 - at_y), (top + 1, at_y - top)):
+                for column, column_share in ((left, left + 1 - at_x), (left + 1, at_x - left)):
+                    around = padded[row + 1 : row + 4, column + 1 : column + 4]
+                    binomial = np.array([1, 2, 1]) @ around @ np.array([1, 2, 1]) / 16
+                    expected[y, x] += row_share * column_share * binomial
+    # 24 / 5 * 7 = 33.6 wide, floored to a multiple of 16
+    settings = FilamentBloom(threshold=None, resolution=24, levels=1)
+    down = reference.passes(image, settings)["down_0"]
+    assert_allclose(down[..., 0], expected, rtol=1e-12)
+
+
+def test_filament_of_a_flat_image(preset_renderer: Renderer) -> None:
+    flat = np.full((300, 1000, 3), 3.0, np.float32)
+    settings = FilamentBloom(format="rgba32float", resolution=50)
+    bloom = preset_renderer.apply(flat, settings)["bloom"][..., :3]
+    assert_allclose(bloom, 2 / (1 + 2 / 1000), rtol=1e-5)
+    bloom = preset_renderer.apply(flat, settings.replace(threshold=None))["bloom"][..., :3]
+    assert_allclose(bloom, 3, rtol=1e-5)
+    assert reference.gain(FilamentBloom(threshold=0.5)) == pytest.approx(0.5 / 1.0005)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        FilamentBloom(threshold=None, levels=1),
+        FilamentBloom(resolution=40, levels=12, highlight=10.0),  # halved first, odd levels
+        FilamentBloom(resolution=112, levels=5, threshold=0.25),
+    ],
+    ids=["one-level", "low-resolution", "low-threshold"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_filaments_other_settings(
+    preset_renderer: Renderer, settings: Settings, format: Any
+) -> None:
+    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
+
+
+def test_filament_has_no_knee() -> None:
+    with pytest.raises(ValueError, match=r"knee: 0\.5 is out of range"):
+        FilamentBloom(knee=0.5)
+
+
+# --- Unity ---
+
+
+def test_urps_levels_and_shares(preset_renderer: Renderer) -> None:
+    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["unity_urp"])
+    sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
+    assert sizes == [(640, 360), (320, 180), (160, 90), (80, 45), (40, 22), (20, 11)]
+    own, coarse = reference.urp._shares(UrpBloom(), 6)
+    shares = np.cumprod([1, *coarse[:5]]) * [*own[:5], 1]
+    assert_allclose(shares, [0.32, 0.2176, 0.14797, 0.10062, 0.06842, 0.14539], atol=1e-5)
+
+
+def test_urps_threshold_is_0_9_in_srgb() -> None:
+    assert UrpBloom().threshold == pytest.approx(0.787412, abs=1e-6)
+
+
+def test_a_level_of_urp_is_the_tutorials_kernel_at_two_steps() -> None:
+    """Along x the half-kernel two texels apart, along y one pixel of the smaller level apart."""
+    weights = np.array([0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622])
+    weights = np.concatenate([weights[:0:-1], weights])
+    image = np.zeros((64, 64, 1))
+    image[32:34, 32] = 0.5  # one pixel of down_0, half of it
+    image[32:34, 33] = 0.5
+    framebuffers = reference.passes(image, UrpBloom(threshold=None))
+    assert framebuffers["down_0"][16, 16, 0] == 0.5
+    down = framebuffers["down_1"][..., 0]
+    # down_0's pixel 16 lies between the positions of the taps of all pixels: half each.
+    expected = np.zeros((16, 16))
+    for y in range(16):
+        for x in range(16):
+            across = sum(
+                w * max(0, 1 - abs(2 * x + 0.5 + 2 * i - 16))
+                for i, w in enumerate(weights, start=-4)
+            )
+            along = sum(
+                w * max(0, 1 - abs(2 * (y + i) + 0.5 - 16)) for i, w in enumerate(weights, start=-4)
+            )
+            expected[y, x] = 0.5 * across * along
+    assert_allclose(down, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        UrpBloom(scatter=0.0, threshold=None, iterations=2),
+        UrpBloom(scatter=1.0, clamp_max=30.0, iterations=8),
+        HdrpBloom(scatter=0.0),
+        HdrpBloom(scatter=1.0, high_quality_filtering=False),
+    ],
+    ids=["urp-narrow", "urp-wide", "hdrp-narrow", "hdrp-wide"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_unitys_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
+
+
+@pytest.mark.parametrize("size", [(801, 451), (800, 449), (799, 450)])
+@pytest.mark.parametrize("smooth", [True, False])
+def test_hdrps_cubic_filter_is_for_larger_frames(
+    preset_renderer: Renderer, size: tuple[int, int], smooth: bool
+) -> None:
+    settings = HdrpBloom(high_quality_filtering=smooth, format="rgba32float")
+    image = lights(size, "float32")
+    check(preset_renderer, image, settings)
+    same = np.array_equal(
+        reference.passes(image, settings)["up_0"],
+        reference.passes(image, settings.replace(high_quality_filtering=not smooth))["up_0"],
+    )
+    assert same == (min(size[0] - 800, size[1] - 450) < 0)
+
+
+def test_hdrps_sizes_are_rounded_halves_to_even() -> None:
+    image = np.zeros((10, 9, 1))
+    sizes = [a.shape[:2] for a in reference.passes(np.zeros((70, 75, 1)), HdrpBloom()).values()]
+    assert sizes[:4] == [(35, 38), (18, 19), (9, 9), (4, 5)]
+    assert reference.passes(image, HdrpBloom())["down_0"].shape == (5, 4, 1)
+
+
+def test_the_cubic_filter_is_the_b_spline() -> None:
+    """The spline as a function of the distance: 2/3 - t^2 + t^3 / 2, beyond 1 (2 - t)^3 / 6."""
+    image = np.zeros((9, 1, 1))
+    image[4] = 1
+    t = np.abs((np.arange(27) + 0.5) / 3 - 4.5)
+    expected = np.where(t < 1, 2 / 3 - t**2 + t**3 / 2, np.maximum(2 - t, 0) ** 3 / 6)
+    enlarged = reference.upsampling.cubic(image, (1, 27))[:, 0, 0]
+    assert_allclose(enlarged, expected, atol=1e-12)
+
+
+def test_hdrp_has_no_threshold() -> None:
+    with pytest.raises(ValueError, match=r"threshold: 1\.0 is out of range, None"):
+        HdrpBloom(threshold=1.0)
+
+
+# --- three.js ---
+
+
+def test_unreals_sizes_are_rounded() -> None:
+    framebuffers = reference.passes(np.zeros((90, 77, 1)), UnrealBloom())
+    sizes = [a.shape[:2] for name, a in framebuffers.items() if name.startswith("down")]
+    assert sizes == [(45, 39), (23, 20), (12, 10), (6, 5), (3, 3)]
+    assert framebuffers["up_0"].shape == framebuffers["bright"].shape == (45, 39, 1)
+
+
+def test_unreals_kernels_are_the_published_ones() -> None:
+    """Their sums, worked out from the formula in UnrealBloomPass.js."""
+    sums = [sum(weight for _, weight in reference.unreal._kernel(k)) for k in range(5)]
+    assert_allclose(sums, [0.99454, 0.99577, 0.99624, 0.99649, 0.99665], atol=1e-5)
+
+
+def test_unreals_radius_keeps_the_sum_of_the_factors() -> None:
+    assert reference.unreal._factors(1.0) == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    for radius in (0.0, 0.35, 1.0):
+        assert sum(reference.unreal._factors(radius)) == pytest.approx(3)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        UnrealBloom(radius=1.0, threshold=0.85, smooth_width=0.5),
+        UnrealBloom(radius=0.4, threshold=None, intensity=1.5),
+    ],
+    ids=["threshold", "no-threshold"],
+)
+@pytest.mark.parametrize("format", FORMATS.values())
+def test_unreals_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
