@@ -19,6 +19,7 @@ rm -rf "$folder/tree" "$folder/log"
 mkdir -p "$folder/tree" "$folder/log"
 cp -r csrc shaders python setup.py pyproject.toml README.md tests tools examples "$folder/tree/"
 rm -f "$folder"/tree/python/vkbloom/_core*.so
+test -d ../shared && ln -sfn "$(cd .. && pwd)/shared" "$folder/shared"
 cd "$folder/tree"
 VKBLOOM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=undefined \
     -fno-omit-frame-pointer -g -O1 -Wall -Wextra -Werror" \
