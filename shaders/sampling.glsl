@@ -11,15 +11,17 @@ struct Place {
     vec2 part;
 };
 
-// Where the centre of a target's pixel falls. In whole numbers: a float position at the far end of a
-// large image is off by so much that filtered values of neighbouring texels would show it.
+// Where the centre of a target's pixel falls. In whole numbers, for a float position at the far end
+// of a large image is off by so much that filtered values of neighbouring texels would show it;
+// unsigned, so that sides of 32768 fit.
 Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
 {
-    ivec2 divisor = 2 * target_size;
-    // One texel is added so that the division has no negative numbers, and taken away after it.
-    ivec2 number = (2 * pixel + 1) * textureSize(source, 0) - target_size + divisor;
-    ivec2 texel = number / divisor;
-    return Place(texel - 1, vec2(number - texel * divisor) / vec2(divisor));
+    uvec2 divisor = 2u * uvec2(target_size);
+    // Places up to half a texel before the first texel's centre are negative: one texel is added here
+    // and taken away below.
+    uvec2 number = uvec2(2 * pixel + 1) * uvec2(textureSize(source, 0)) + uvec2(target_size);
+    uvec2 texel = number / divisor;
+    return Place(ivec2(texel) - 1, vec2(number - texel * divisor) / vec2(divisor));
 }
 
 // The place of this fragment, in a shader whose parameters hold SAMPLING_ROWS.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -32,12 +31,6 @@ Array = NDArray[Any]
 SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (333, 217)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 PUBLISHED = sorted(set(presets) - {"tutorial", "outline"})
-
-
-@pytest.fixture(scope="module")
-def preset_renderer() -> Iterator[Renderer]:
-    with Renderer("software", validation=True) as renderer:
-        yield renderer
 
 
 def lights(size: tuple[int, int], dtype: str, seed: int = 3) -> Array:
@@ -93,44 +86,44 @@ def check(renderer: Renderer, image: Array, settings: Settings) -> None:
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_a_preset_is_its_reference(
-    preset_renderer: Renderer, name: str, size: tuple[int, int], dtype: Any
+    renderer: Renderer, name: str, size: tuple[int, int], dtype: Any
 ) -> None:
     format: Any = FORMATS[dtype]
-    check(preset_renderer, lights(size, dtype), presets[name].replace(format=format))
+    check(renderer, lights(size, dtype), presets[name].replace(format=format))
 
 
 @pytest.mark.parametrize("dtype", FORMATS)
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_a_preset_as_it_is(preset_renderer: Renderer, name: str, dtype: str) -> None:
-    check(preset_renderer, lights((97, 45), dtype), presets[name])
+def test_a_preset_as_it_is(renderer: Renderer, name: str, dtype: str) -> None:
+    check(renderer, lights((97, 45), dtype), presets[name])
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_a_flat_image_gets_the_gain(preset_renderer: Renderer, name: str) -> None:
+def test_a_flat_image_gets_the_gain(renderer: Renderer, name: str) -> None:
     settings = presets[name].replace(format="rgba32float")
     gain = reference.gain(settings, (71, 45))
-    bloom = preset_renderer.apply(np.ones((45, 71, 3), np.float32), settings)["bloom"]
+    bloom = renderer.apply(np.ones((45, 71, 3), np.float32), settings)["bloom"]
     # Absolute too: a subtractive threshold of 1 leaves of 1 what its sums were rounded by.
     assert_allclose(bloom[..., :3], gain, rtol=1e-5, atol=1e-6)
     assert_allclose(reference.blur(np.ones((45, 71, 3)), settings), gain, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_nan_and_infinity_are_not_spread(preset_renderer: Renderer, name: str) -> None:
+def test_nan_and_infinity_are_not_spread(renderer: Renderer, name: str) -> None:
     image = lights((33, 21), "float32")
     image[4, 5, 0], image[10, 20, 1], image[20, 0, 2] = np.nan, np.inf, -np.inf
-    frames = preset_renderer.apply(image, presets[name])
+    frames = renderer.apply(image, presets[name])
     clean = np.where(np.isfinite(image), image, 0).astype(np.float32)
-    expected = preset_renderer.apply(clean, presets[name])
+    expected = renderer.apply(clean, presets[name])
     for framebuffer in set(frames) - {"final"}:
         assert np.array_equal(frames[framebuffer], expected[framebuffer]), framebuffer
     assert np.array_equal(np.isfinite(frames["final"]), np.isfinite(image))
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_a_scene_is_blurred_as_an_image_is(preset_renderer: Renderer, name: str) -> None:
+def test_a_scene_is_blurred_as_an_image_is(renderer: Renderer, name: str) -> None:
     settings = presets[name]
-    frames = preset_renderer.render(Scene.ufo(), settings, (160, 90))
+    frames = renderer.render(Scene.ufo(), settings, (160, 90))
     format = settings.format or "rgba8unorm"
     if type(settings) not in (Pyramid, DualKawase):
         assert frames["glow"].shape == (90, 160, 4)
@@ -158,8 +151,8 @@ def test_bevys_shares_are_the_published_ones() -> None:
     assert_allclose(np.add(own, coarse), 1, rtol=1e-12)
 
 
-def test_bevys_sizes(preset_renderer: Renderer) -> None:
-    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["bevy_natural"])
+def test_bevys_sizes(renderer: Renderer) -> None:
+    frames = renderer.apply(lights((1280, 720), "uint8"), presets["bevy_natural"])
     sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
     assert sizes[:3] == [(910, 512), (455, 256), (227, 128)]
     assert sizes[-1] == (7, 4)
@@ -183,8 +176,8 @@ def test_bevys_sizes(preset_renderer: Renderer) -> None:
     ids=["old-school", "screen-blur", "100-high", "two-levels"],
 )
 @pytest.mark.parametrize("format", FORMATS.values())
-def test_bevys_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
-    check(preset_renderer, lights((91, 53), "float32"), settings.replace(format=format))
+def test_bevys_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(renderer, lights((91, 53), "float32"), settings.replace(format=format))
 
 
 def test_bevy_has_no_screen_and_ends_at_1() -> None:
@@ -231,15 +224,15 @@ def test_kinos_median_removes_a_single_bright_pixel_and_keeps_a_large_light() ->
     ids=["widest", "no-threshold", "no-anti-flicker"],
 )
 @pytest.mark.parametrize("format", FORMATS.values())
-def test_kinos_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
-    check(preset_renderer, lights((91, 153), "float32"), settings.replace(format=format))
+def test_kinos_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(renderer, lights((91, 153), "float32"), settings.replace(format=format))
 
 
 # --- Filament ---
 
 
-def test_filaments_sizes(preset_renderer: Renderer) -> None:
-    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["filament"])
+def test_filaments_sizes(renderer: Renderer) -> None:
+    frames = renderer.apply(lights((1280, 720), "uint8"), presets["filament"])
     sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
     assert sizes == [(672 >> k, 384 >> k) for k in range(6)]
 
@@ -264,12 +257,12 @@ def test_filaments_reduction_is_a_sample_of_the_binomial() -> None:
     assert_allclose(down[..., 0], expected, rtol=1e-12)
 
 
-def test_filament_of_a_flat_image(preset_renderer: Renderer) -> None:
+def test_filament_of_a_flat_image(renderer: Renderer) -> None:
     flat = np.full((300, 1000, 3), 3.0, np.float32)
     settings = FilamentBloom(format="rgba32float", resolution=50)
-    bloom = preset_renderer.apply(flat, settings)["bloom"][..., :3]
+    bloom = renderer.apply(flat, settings)["bloom"][..., :3]
     assert_allclose(bloom, 2 / (1 + 2 / 1000), rtol=1e-5)
-    bloom = preset_renderer.apply(flat, settings.replace(threshold=None))["bloom"][..., :3]
+    bloom = renderer.apply(flat, settings.replace(threshold=None))["bloom"][..., :3]
     assert_allclose(bloom, 3, rtol=1e-5)
     assert reference.gain(FilamentBloom(threshold=0.5)) == pytest.approx(0.5 / 1.0005)
 
@@ -284,10 +277,8 @@ def test_filament_of_a_flat_image(preset_renderer: Renderer) -> None:
     ids=["one-level", "low-resolution", "low-threshold"],
 )
 @pytest.mark.parametrize("format", FORMATS.values())
-def test_filaments_other_settings(
-    preset_renderer: Renderer, settings: Settings, format: Any
-) -> None:
-    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
+def test_filaments_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(renderer, lights((211, 153), "float32"), settings.replace(format=format))
 
 
 def test_filament_has_no_knee() -> None:
@@ -298,8 +289,8 @@ def test_filament_has_no_knee() -> None:
 # --- Unity ---
 
 
-def test_urps_levels_and_shares(preset_renderer: Renderer) -> None:
-    frames = preset_renderer.apply(lights((1280, 720), "uint8"), presets["unity_urp"])
+def test_urps_levels_and_shares(renderer: Renderer) -> None:
+    frames = renderer.apply(lights((1280, 720), "uint8"), presets["unity_urp"])
     sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
     assert sizes == [(640, 360), (320, 180), (160, 90), (80, 45), (40, 22), (20, 11)]
     own, coarse = reference.urp._shares(UrpBloom(), 6)
@@ -347,18 +338,18 @@ def test_a_level_of_urp_is_the_tutorials_kernel_at_two_steps() -> None:
     ids=["urp-narrow", "urp-wide", "hdrp-narrow", "hdrp-wide"],
 )
 @pytest.mark.parametrize("format", FORMATS.values())
-def test_unitys_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
-    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
+def test_unitys_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(renderer, lights((211, 153), "float32"), settings.replace(format=format))
 
 
 @pytest.mark.parametrize("size", [(801, 451), (800, 449), (799, 450)])
 @pytest.mark.parametrize("smooth", [True, False])
 def test_hdrps_cubic_filter_is_for_larger_frames(
-    preset_renderer: Renderer, size: tuple[int, int], smooth: bool
+    renderer: Renderer, size: tuple[int, int], smooth: bool
 ) -> None:
     settings = HdrpBloom(high_quality_filtering=smooth, format="rgba32float")
     image = lights(size, "float32")
-    check(preset_renderer, image, settings)
+    check(renderer, image, settings)
     same = np.array_equal(
         reference.passes(image, settings)["up_0"],
         reference.passes(image, settings.replace(high_quality_filtering=not smooth))["up_0"],
@@ -419,5 +410,5 @@ def test_unreals_radius_keeps_the_sum_of_the_factors() -> None:
     ids=["threshold", "no-threshold"],
 )
 @pytest.mark.parametrize("format", FORMATS.values())
-def test_unreals_other_settings(preset_renderer: Renderer, settings: Settings, format: Any) -> None:
-    check(preset_renderer, lights((211, 153), "float32"), settings.replace(format=format))
+def test_unreals_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
+    check(renderer, lights((211, 153), "float32"), settings.replace(format=format))
