@@ -5,7 +5,7 @@ VENV := .venv
 PYTHON := $(VENV)/bin/python
 CORE := $(wildcard csrc/*.[ch]) $(wildcard shaders/*) setup.py pyproject.toml
 
-.PHONY: demo test lint format sanitize clean
+.PHONY: demo test bench lint format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -13,6 +13,9 @@ demo: build/stamp/core
 
 test: build/stamp/core build/stamp/test
 	$(PYTHON) -m pytest
+
+bench: build/stamp/core
+	$(PYTHON) benchmarks/separable.py
 
 lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .

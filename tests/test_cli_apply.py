@@ -15,10 +15,12 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom import images
 from vkbloom.cli.program import program
-from vkbloom.images import Picture, decode_srgb, encode_srgb, load, save
+from vkbloom.image_reading import load
+from vkbloom.image_writing import save
+from vkbloom.images import Picture
 from vkbloom.settings import Pyramid, Separable
+from vkbloom.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -292,7 +294,7 @@ class TestColours:
         path = tmp_path / "a.exr"
         image = light(20, 30, 3)
         image[0, 0] = np.nan
-        save(images.Picture(**{**vars(Picture.of_values(image, "float")), "grey": True}), path)
+        save(Picture(**{**vars(Picture.of_values(image, "float")), "grey": True}), path)
         assert "NaN 1 times" in run(path, tmp_path / "b.exr").stderr
 
     def test_what_is_lost_is_told(self, tmp_path: Path) -> None:

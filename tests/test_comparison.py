@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from vkbloom.cli.program import program
 from vkbloom.comparison import Comparison, Limits, compare, difference
-from vkbloom.images import Picture, decode_srgb, save
+from vkbloom.image_writing import save
+from vkbloom.images import Picture
+from vkbloom.srgb import decode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 metrics = pytest.importorskip("skimage.metrics")

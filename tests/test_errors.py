@@ -54,7 +54,7 @@ def test_settings_are_needed(renderer: Renderer, scene: Scene, settings: Any) ->
         (1.5, 2),
         (2**31, 1),
         (2**64, 1),
-        (10**400, 1),
+        pytest.param((10**400, 1), id="huge"),
         (math.inf, 1),
         (math.nan, 1),
     ],
@@ -238,3 +238,10 @@ def test_the_tree_of_exceptions() -> None:
         assert error("text").vk_call is None
         assert error("text").vk_result is None
     assert issubclass(vkbloom.Error, Exception)
+
+
+@pytest.mark.parametrize("name", ["nothing", "depth"])
+def test_out_names_what_is_wanted(renderer: Renderer, scene: Scene, name: str) -> None:
+    spare = np.zeros((9, 16), np.float32)
+    with pytest.raises(ValueError, match=rf"^out: '{name}' is not among the framebuffers: final$"):
+        renderer.render(scene, size=(16, 9), attachments="final", out={name: spare})

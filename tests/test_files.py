@@ -19,7 +19,7 @@ import pytest
 from framebuffers import INFO, TIMINGS, make, mixed, names_in, noise, read
 
 import vkbloom.files
-from vkbloom import Separable
+from vkbloom import Separable, safe_writing
 from vkbloom.frames import Frames
 
 
@@ -311,8 +311,8 @@ class TestWriteErrors:
                 stack.enter_context(small_files_only())
                 return reserved
 
-            original = vkbloom.files._reserve
-            monkeypatch.setattr(vkbloom.files, "_reserve", reserve)
+            original = safe_writing.reserve
+            monkeypatch.setattr(safe_writing, "reserve", reserve)
             with pytest.raises(OSError, match=re.escape(str(file))) as caught:
                 frames.save(file)
         assert caught.value.filename == str(file)

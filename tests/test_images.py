@@ -13,8 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom import images
-from vkbloom.images import Picture, decode, decode_srgb, encode_srgb, load, save
+from vkbloom import safe_writing
+from vkbloom.image_reading import decode, load
+from vkbloom.image_writing import check_writable, save
+from vkbloom.images import Colour, Picture, Window
+from vkbloom.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -160,8 +163,8 @@ class TestLoad:
     def test_windows(
         self,
         tmp_path: Path,
-        data: images.Window,
-        display: images.Window,
+        data: Window,
+        display: Window,
         origin: tuple[int, int],
         size: tuple[int, int],
     ) -> None:
@@ -443,7 +446,7 @@ class TestSave:
         ],
     )
     def test_colours(
-        self, tmp_path: Path, name: str, colour: images.Colour | None, expected: float
+        self, tmp_path: Path, name: str, colour: Colour | None, expected: float
     ) -> None:
         pixels = np.full((4, 4, 3), 0.5, np.float32)
         save(picture(pixels, "float"), tmp_path / name, colour)
@@ -578,11 +581,11 @@ class TestSave:
     @pytest.mark.parametrize("name", ["b.unknown", "b", "b.null", "b.term", "b.heic"])
     def test_extensions_that_cannot_be_written(self, tmp_path: Path, name: str) -> None:
         made = picture(np.ones((2, 2, 3), np.float32), "uint8")
-        for write in (lambda: save(made, tmp_path / name), lambda: images.check_writable(name)):
+        for write in (lambda: save(made, tmp_path / name), lambda: check_writable(name)):
             with pytest.raises(ValueError, match="no image format for the extension"):
                 write()
         assert only_in(tmp_path) == []
-        images.check_writable("b.PNG")
+        check_writable("b.PNG")
 
     def test_pictures_that_no_format_holds(self, tmp_path: Path) -> None:
         made = picture(np.ones((2, 2, 3), np.float32), "uint8")
@@ -611,7 +614,7 @@ class TestSave:
             assert target.read_bytes() == b"before"
             return False
 
-        monkeypatch.setattr(images, "_is_readable", is_readable)
+        monkeypatch.setattr(safe_writing, "_is_readable", is_readable)
         with pytest.raises(OSError, match="is the disk full") as caught:
             save(picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
         assert (caught.value.errno, caught.value.filename) == (errno.EIO, str(target))

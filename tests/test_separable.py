@@ -216,22 +216,6 @@ def test_another_kernel_is_not_the_same(renderer: Renderer) -> None:
     assert np.abs(passes - other).max() > 2 * FRACTION["rgba16float"] * passes.max()
 
 
-def test_two_passes_take_less_time_than_one(renderer: Renderer) -> None:
-    # 2 x 33 taps against 33 x 33, a factor of 16.5; the half of it is left to the scheduler.
-    image = noise((200, 200))
-    settings = Separable(weights=gaussian_weights(6.0, 16), format="rgba32float")
-    names = ("blur_vertical", "bloom")
-    separable, direct = (
-        min(
-            sum(frames.timings.get(name, 0.0) for name in names)
-            # Each image is a new scene, so that all passes run; the first time the driver compiles.
-            for frames in (render(renderer, image, method) for _ in range(3))
-        )
-        for method in (settings, settings.replace(direct=True))
-    )
-    assert direct > 8 * separable
-
-
 # What the parameters do
 
 

@@ -507,3 +507,13 @@ def test_the_seed_cubemap_is_the_sky_of_the_seed_frame() -> None:
             differences.append(np.abs(texel[:3] - frame[row, column]).max())
     # The frame is filtered and this is not, so stars differ; the sky between them is smooth.
     assert np.median(differences) < 2.0
+
+
+def test_a_face_that_ends_early_is_refused(tmp_path: Path) -> None:
+    panorama = tmp_path / "panorama.jpg"
+    noise = np.random.default_rng(0).integers(0, 256, (64, 128, 3), dtype=np.uint8)
+    assert oiio.ImageBuf(noise).write(str(panorama))
+    content = panorama.read_bytes()
+    panorama.write_bytes(content[: len(content) // 2])
+    with pytest.raises(ValueError, match=r"panorama\.jpg"):
+        skybox.load(panorama)

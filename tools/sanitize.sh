@@ -1,9 +1,16 @@
 #!/bin/sh
 # Runs the test-suite over a core built with the address, undefined-behaviour and leak sanitizers.
-# PYTHON: an interpreter with the test requirements installed. Arguments go to pytest.
+# PYTHON: an interpreter with the test requirements installed. Arguments go to pytest; without any,
+# all tests run that touch the core.
 set -eu
 
 cd "$(dirname "$0")/.."
+# Without arguments: these files test Python alone.
+if [ $# = 0 ]; then
+    for name in assets comparison files frames gltf images pictures reference scene skybox; do
+        set -- "$@" "--ignore=tests/test_$name.py"
+    done
+fi
 folder=$PWD/build/sanitize
 mkdir -p "$folder"
 
@@ -12,6 +19,7 @@ rm -rf "$folder/tree" "$folder/log"
 mkdir -p "$folder/tree" "$folder/log"
 cp -r csrc shaders python setup.py pyproject.toml README.md tests tools examples "$folder/tree/"
 rm -f "$folder"/tree/python/vkbloom/_core*.so
+test -d ../shared && ln -sfn "$(cd .. && pwd)/shared" "$folder/shared"
 cd "$folder/tree"
 VKBLOOM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=undefined \
     -fno-omit-frame-pointer -g -O1 -Wall -Wextra -Werror" \

@@ -10,7 +10,7 @@ import re
 import sys
 from pathlib import Path
 
-OURS = "_core.abi3.so"
+OURS = re.compile(r" csrc/|_core\.abi3\.so")  # with debug information, without it
 FRAMES = 3  # the allocator, the core's own allocation function, its caller
 
 
@@ -21,7 +21,7 @@ def findings(log: str) -> list[str]:
         found.append(log)
     for leak in re.split(r"\n(?=(?:Direct|Indirect) leak of)", log)[1:]:
         frames = re.findall(r"^\s*#\d+ .*$", leak, re.MULTILINE)
-        if any(OURS in frame for frame in frames[:FRAMES]):
+        if any(OURS.search(frame) for frame in frames[:FRAMES]):
             found.append(leak)
     return found
 

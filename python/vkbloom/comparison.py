@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.extras import import_extra
-from vkbloom.images import decode_srgb
 from vkbloom.settings import check_number
+from vkbloom.srgb import decode_srgb
 
 __all__ = ["Comparison", "Limits", "compare", "difference"]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import errno
 import json
 import os
 from collections.abc import Iterable
@@ -14,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom import safe_writing
 from vkbloom.dimensions import leading
 from vkbloom.extras import import_extra
 
@@ -26,11 +25,6 @@ __all__ = ["save"]
 
 # OpenImageIO's names of the pixel types, by the array's dtype.
 _PIXEL_TYPES = {"uint8": "uint8", "float16": "half", "float32": "float"}
-
-# Formats of OpenImageIO that throw the picture away or print it on the terminal.
-_FORMATS_WITHOUT_A_FILE = ("null", "term")
-
-_LARGEST_HEADER = 65536  # bytes; what a file may hold beside the pixels
 
 
 def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
@@ -66,7 +60,7 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
         target.mkdir(parents=True, exist_ok=True)
         plan = {target / f"{name}.png": [name] for name in frames}
     else:
-        _check_extension(oiio, target.suffix)
+        safe_writing.check_extension(oiio, target.suffix)
         if _is_exr(target) or len(frames) == 1:
             plan = {target: list(frames)}
         else:
@@ -78,19 +72,16 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
     try:
         for file, names in plan.items():
             arrays = [frames[name] for name in names]
-            files.append((_reserve(file, arrays), file))
+            files.append((safe_writing.reserve(file, arrays), file))
             if not _is_exr(file):
                 if _write_image(oiio, frames, names[0], *files[-1]):
                     continue
                 files.pop()[0].unlink()
                 beside = file.with_suffix(".exr")
-                files.append((_reserve(beside, arrays), beside))
+                files.append((safe_writing.reserve(beside, arrays), beside))
             _write_exr(oiio, frames, names, *files[-1])
         for temporary, file in files:
-            try:
-                temporary.replace(file)
-            except OSError as error:
-                raise OSError(error.errno, error.strerror, str(file)) from error
+            safe_writing.put_in_place(temporary, file)
     finally:
         for temporary, _ in files:
             temporary.unlink(missing_ok=True)
@@ -106,7 +97,7 @@ def _write_image(oiio: ModuleType, frames: Frames, name: str, temporary: Path, f
         if not (pixels[:, :, 3] == opaque).all():
             return False
         pixels = pixels[:, :, :3]
-    if not _holds(oiio, temporary, pixels):
+    if not safe_writing.holds(oiio, temporary, pixels.shape[2], _PIXEL_TYPES[str(pixels.dtype)]):
         return False
     spec = _spec(oiio, frames, pixels)
     # Otherwise OpenImageIO takes the colours for premultiplied and divides them by alpha.
@@ -116,10 +107,8 @@ def _write_image(oiio: ModuleType, frames: Frames, name: str, temporary: Path, f
         and writer.write_image(np.ascontiguousarray(pixels))
         and writer.close()
     ):
-        raise _write_error(writer, temporary, file)
-    # Should the disk have filled up since: not all writers (PNG, Targa) notice that.
-    if not _is_readable(oiio, temporary):
-        raise OSError(errno.EIO, "not written completely; is the disk full?", str(file))
+        raise safe_writing.write_error(writer, temporary, file)
+    safe_writing.check_complete(oiio, temporary, file)
     return True
 
 
@@ -145,14 +134,14 @@ def _write_exr(
         specs.append(spec)
     writer = oiio.ImageOutput.create(str(temporary))
     if not writer.open(str(temporary), specs):
-        raise _write_error(writer, temporary, file)
+        raise safe_writing.write_error(writer, temporary, file)
     for index, (pixels, spec) in enumerate(zip(parts, specs, strict=True)):
         if index and not writer.open(str(temporary), spec, "AppendSubimage"):
-            raise _write_error(writer, temporary, file)
+            raise safe_writing.write_error(writer, temporary, file)
         if not writer.write_image(np.ascontiguousarray(pixels)):
-            raise _write_error(writer, temporary, file)
+            raise safe_writing.write_error(writer, temporary, file)
     if not writer.close():
-        raise _write_error(writer, temporary, file)
+        raise safe_writing.write_error(writer, temporary, file)
 
 
 def _spec(oiio: ModuleType, frames: Frames, pixels: NDArray[Any]) -> OpenImageIO.ImageSpec:
@@ -174,67 +163,3 @@ def _spec(oiio: ModuleType, frames: Frames, pixels: NDArray[Any]) -> OpenImageIO
 
 def _is_exr(file: Path) -> bool:
     return file.suffix.lower() == ".exr"
-
-
-def _check_extension(oiio: ModuleType, suffix: str) -> None:
-    writer = oiio.ImageOutput.create(f"image{suffix}")
-    if writer is None:
-        oiio.geterror()
-    if writer is None or writer.format_name() in _FORMATS_WITHOUT_A_FILE:
-        raise ValueError(f"path: no image format for the extension {suffix!r} can be written")
-
-
-def _holds(oiio: ModuleType, temporary: Path, pixels: NDArray[Any]) -> bool:
-    """Tell whether a format keeps an array's dtype and channels.
-
-    A format answers only once a file is open, and libpng complains on stderr about a file
-    without pixels; so one pixel is written.
-    """
-    pixel = np.ascontiguousarray(pixels[:1, :1])
-    spec = oiio.ImageSpec(1, 1, pixel.shape[2], _PIXEL_TYPES[str(pixel.dtype)])
-    writer = oiio.ImageOutput.create(str(temporary))
-    if not writer.open(str(temporary), spec):
-        writer.geterror()
-        return False
-    opened = writer.spec()
-    kept = (str(opened.format), opened.nchannels) == (str(spec.format), spec.nchannels)
-    writer.write_image(pixel)
-    writer.close()
-    return kept
-
-
-def _is_readable(oiio: ModuleType, file: Path) -> bool:
-    reader = oiio.ImageInput.open(str(file))
-    if reader is None:
-        oiio.geterror()
-        return False
-    spec = reader.spec()
-    readable = reader.read_image(0, 0, 0, spec.nchannels, spec.format) is not None
-    reader.geterror()
-    reader.close()
-    return readable
-
-
-def _reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
-    """Make a file of a new name beside a file, as large as the arrays that it shall hold.
-
-    Doing it here gives the system's own reason where it fails, which OpenImageIO does not
-    pass on. And on a full disk its JPEG writer would end the process and its WebP writer
-    would not return.
-    """
-    temporary = file.with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
-    try:
-        with temporary.open("xb") as stream:
-            stream.write(bytes(_LARGEST_HEADER))
-            for array in arrays:
-                stream.write(np.ascontiguousarray(array).data)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise OSError(error.errno, error.strerror, str(file)) from error
-    return temporary
-
-
-def _write_error(writer: OpenImageIO.ImageOutput, temporary: Path, file: Path) -> OSError:
-    reason = writer.geterror().replace(str(temporary), file.name).strip() or "not written"
-    return OSError(errno.EIO, reason, str(file))

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import importlib
 import os
 import re
 import reprlib
@@ -22,6 +21,8 @@ from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .extras import import_extra
 
 Floats: TypeAlias = NDArray[np.float64]
 # An object of pygltflib, which has no types.
@@ -43,12 +44,7 @@ class GltfFile:
     """An opened file: what was parsed, its buffers, and what of it is left out."""
 
     def __init__(self, path: Path) -> None:
-        try:
-            pygltflib: Any = importlib.import_module("pygltflib")
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError(
-                "reading glTF files needs pygltflib: pip install vkbloom[scenes]", name=error.name
-            ) from error
+        pygltflib = import_extra("pygltflib", "scenes", "Reading glTF files")
         self.path = path
         # A dict for its order and because each thing is named once.
         self.left_out: dict[str, None] = {}

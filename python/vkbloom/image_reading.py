@@ -34,6 +34,51 @@ _LARGEST_SIDE: Final = 65536
 _LARGEST_AREA: Final = 1 << 28
 
 
+@contextmanager
+def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
+    """Open an image file for as long as the context lasts.
+
+    Parameters
+    ----------
+    path : str or path-like
+        Of any format that OpenImageIO reads.
+    purpose : str
+        What needs OpenImageIO, as the subject of the message where it is missing.
+
+    Yields
+    ------
+    OpenImageIO.ImageInput
+        It gives colours as they are stored, not multiplied by alpha.
+
+    Raises
+    ------
+    OSError
+        The file is not there, or cannot be opened; it names the file.
+    ValueError
+        The file is no image; it names the file.
+    ModuleNotFoundError
+        OpenImageIO is missing.
+    """
+    oiio = import_extra("OpenImageIO", "images", purpose)
+    name = os.fspath(path)
+    # OpenImageIO says the same of missing and of damaged files; this has the system's own reason.
+    with open(name, "rb"):
+        pass
+    # Without this, colours would be multiplied by alpha where the file has them plain.
+    plain = oiio.ImageSpec()
+    plain.attribute("oiio:UnassociatedAlpha", 1)
+    reader = oiio.ImageInput.open(name, plain)
+    if reader is None:
+        reason = oiio.geterror().strip() or "unknown format"
+        raise ValueError(f"{name}: not an image that can be read: {reason}")
+    try:
+        yield reader
+    finally:
+        # An error that nobody asked for would be printed when the reader is gone.
+        reader.geterror()
+        reader.close()
+
+
 def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     """Read an image file.
 
@@ -58,24 +103,8 @@ def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     ModuleNotFoundError
         OpenImageIO is missing.
     """
-    oiio = import_extra("OpenImageIO", "images", "Reading images")
-    name = os.fspath(path)
-    # OpenImageIO says the same of missing and of damaged files; this has the system's own reason.
-    with open(name, "rb"):
-        pass
-    # Without this, colours would be multiplied by alpha where the file has them plain.
-    plain = oiio.ImageSpec()
-    plain.attribute("oiio:UnassociatedAlpha", 1)
-    reader = oiio.ImageInput.open(name, plain)
-    if reader is None:
-        reason = oiio.geterror().strip() or "unknown format"
-        raise ValueError(f"{name}: not an image that can be read: {reason}")
-    try:
-        return _read(reader, name, subimage)
-    finally:
-        # An error that nobody asked for would be printed when the reader is gone.
-        reader.geterror()
-        reader.close()
+    with opened(path, "Reading images") as reader:
+        return _read(reader, os.fspath(path), subimage)
 
 
 def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredImage:
@@ -191,7 +220,11 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
         values = _linear(values, encoding, len(chosen) in (2, 4))
         if encoding != "srgb":
             # A profile of what will be encoded otherwise.
-            kept = {name: stored.attributes[name] for name in KEPT_ATTRIBUTES if name in stored.attributes}
+            kept = {
+                name: stored.attributes[name]
+                for name in KEPT_ATTRIBUTES
+                if name in stored.attributes
+            }
             stored = replace(stored, attributes=kept)
         encoding = "linear"
     grey = len(chosen) < 3

@@ -1,4 +1,4 @@
-"""Image files written, with colours and numbers as those that read them expect."""
+"""Pictures written to image files, in numbers and colours that the format has a place for."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     ModuleNotFoundError
         OpenImageIO is missing.
     """
-    _check_extension(import_extra("OpenImageIO", "images", "Writing images"), Path(path).suffix)
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    safe_writing.check_extension(oiio, Path(path).suffix)
 
 
 def save(
@@ -91,17 +92,12 @@ def save(
         raise ValueError(f"colour: {colour!r} needs a linear picture, not {picture.encoding}")
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)
-    _check_extension(oiio, target.suffix)
-    temporary = _reserve(target, [picture.values])
+    safe_writing.check_extension(oiio, target.suffix)
+    temporary = safe_writing.reserve(target, [picture.values])
     try:
         notes = _write(oiio, picture, colour, temporary, target, attributes=attributes or {})
-        # Not all writers notice that a disk is full.
-        if not _is_readable(oiio, temporary):
-            raise OSError(errno.EIO, "not written completely; is the disk full?", str(target))
-        try:
-            temporary.replace(target)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(target)) from error
+        safe_writing.check_complete(oiio, temporary, target)
+        safe_writing.put_in_place(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
     return notes
@@ -150,7 +146,7 @@ def _write(
         and writer.close()
     )
     if not is_written:
-        raise _write_error(writer, temporary, target)
+        raise safe_writing.write_error(writer, temporary, target)
     # An error that nobody asked for would be printed when the writer is gone.
     writer.geterror()
     return tuple(notes)
@@ -162,7 +158,7 @@ def _chosen_form(
     """Return the channels and the numbers to write, those most like the picture's first."""
     for values in _layouts(picture, writer.supports("alpha") != 0):
         for numbers in _PREFERENCES[picture.numbers]:
-            if _holds(oiio, temporary, values.shape[2], numbers):
+            if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
                 return values, numbers
     return None
 
@@ -175,24 +171,6 @@ def _layouts(picture: Picture, with_alpha: bool) -> Iterator[NDArray[Any]]:
         yield from (form[:, :, :-1] for form in forms)
     elif not with_alpha:
         yield from forms
-
-
-def _holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> bool:
-    """Tell whether a format keeps a number of channels and a type of numbers.
-
-    A format answers only once a file is open, and libpng complains on stderr about a file
-    without pixels; so one pixel is written.
-    """
-    spec = oiio.ImageSpec(1, 1, channels, numbers)
-    writer = oiio.ImageOutput.create(str(temporary))
-    is_open = writer.open(str(temporary), spec)
-    if is_open:
-        opened = writer.spec()
-        is_open = (str(opened.format), opened.nchannels) == (numbers, channels)
-        writer.write_image(np.zeros((1, 1, channels), DTYPES[numbers]))
-        writer.close()
-    writer.geterror()
-    return bool(is_open)
 
 
 def _losses(

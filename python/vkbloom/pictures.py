@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from vkbloom.dimensions import leading
 from vkbloom.extras import import_extra
+from vkbloom.srgb import encode_srgb
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
@@ -217,7 +218,7 @@ def _picture(frames: Frames, name: str, size: tuple[int, int] | None = None) -> 
     if size is not None:
         shown = _resized(shown, *size)
     if linear:
-        shown[:, :, :3] = _srgb(shown[:, :, :3])
+        shown[:, :, :3] = encode_srgb(shown[:, :, :3])
     picture: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
     return picture
 
@@ -259,12 +260,6 @@ def _stretched(values: NDArray[np.float32]) -> NDArray[np.float32]:
     # Also positive where no value is finite, and the range therefore inf to -inf.
     span = np.maximum(high - low, np.finfo(np.float32).tiny)
     return _clipped((np.clip(values, low, high) - low) / span)
-
-
-def _srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Apply the sRGB transfer function of IEC 61966-2-1 to values in 0..1."""
-    curve = np.float32(1.055) * linear ** np.float32(1 / 2.4) - np.float32(0.055)
-    return np.where(linear <= 0.0031308, linear * np.float32(12.92), curve)
 
 
 def _scaled(width: int, height: int, factor: float) -> tuple[int, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import abc
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -58,7 +59,10 @@ def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | No
         return None
     if isinstance(attachments, str):
         return (attachments,)
-    names = tuple(attachments)
+    try:
+        names = tuple(attachments)
+    except TypeError:
+        raise TypeError(f"attachments: names are needed, not {attachments!r}") from None
     for name in names:
         if not isinstance(name, str):
             raise TypeError(f"attachments: names are needed, not {name!r}")
@@ -69,6 +73,8 @@ def _allocator(
     out: Mapping[str, NDArray[Any]] | None,
 ) -> Callable[[str, tuple[int, ...], str], NDArray[Any]]:
     """Return what gives the core its arrays: those of `out` where they fit, else new ones."""
+    if out is not None and not isinstance(out, abc.Mapping):
+        raise TypeError(f"out: a mapping of names to arrays is needed, not {type(out).__name__}")
 
     def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
         if out is None or name not in out:
@@ -86,6 +92,13 @@ def _allocator(
         return array
 
     return allocate
+
+
+def _check_filled(out: Mapping[str, NDArray[Any]] | None, arrays: Mapping[str, object]) -> None:
+    """Raise ValueError where `out` names what was not among the framebuffers of the call."""
+    for name in out or ():
+        if name not in arrays:
+            raise ValueError(f"out: {name!r} is not among the framebuffers: {', '.join(arrays)}")
 
 
 class Renderer:
@@ -225,7 +238,11 @@ class Renderer:
         settings = _check_settings(settings)
         if shading not in SHADINGS:
             raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-        if not math.isfinite(time):
+        try:
+            finite = math.isfinite(time)
+        except (TypeError, OverflowError):
+            raise TypeError(f"time: a number is needed, not {time!r}") from None
+        if not finite:
             raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
         from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
@@ -244,6 +261,7 @@ class Renderer:
             _check_attachments(attachments),
             _allocator(out),
         )
+        _check_filled(out, arrays)
         return self._frames(arrays, timings, specials, settings)
 
     def apply(
@@ -295,6 +313,7 @@ class Renderer:
         arrays, timings, specials = self._core.apply(
             settings, _check_image(image), _check_attachments(attachments), _allocator(out)
         )
+        _check_filled(out, arrays)
         return self._frames(arrays, timings, specials, settings)
 
     def apply_many(

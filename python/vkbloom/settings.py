@@ -19,6 +19,8 @@ Encoding = Literal["none", "gamma22", "srgb"]
 Texel = Literal["own", "x"]
 BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float"]
 
+FLT_MAX = (2 - 2**-23) * 2.0**127
+
 BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
 
 #: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
@@ -51,12 +53,17 @@ def check_number(name: str, value: float, low: float, high: float) -> None:
 
 def _finite_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
     try:
+        if isinstance(values, str):
+            raise TypeError
         numbers = tuple(float(value) for value in values)
-    except TypeError:
+    except (TypeError, ValueError):
         raise TypeError(f"{name}: a sequence of numbers is needed, not {values!r}") from None
+    except OverflowError:
+        raise ValueError(f"{name}: {values!r} has a number out of range") from None
     for number in numbers:
-        if not math.isfinite(number):
-            raise ValueError(f"{name}: {number!r} is not finite")
+        # The device has 32 bits, of which this is the largest number.
+        if not abs(number) <= FLT_MAX:
+            raise ValueError(f"{name}: {number!r} is out of range, {-FLT_MAX:g} to {FLT_MAX:g}")
     return numbers
 
 
@@ -161,7 +168,7 @@ def check_size(name: str, size: Any) -> tuple[int, int]:
     try:
         width, height = size
         whole = (int(width), int(height))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise TypeError(f"{name}: (width, height) is needed, not {size!r}") from None
     if whole != (width, height) or min(whole) < 1 or max(whole) >= 2**31:
         raise ValueError(f"{name}: {size!r} is out of range, whole numbers from 1 on")
@@ -222,7 +229,11 @@ class Separable(Settings):
             raise ValueError(
                 f"weights: {len(self.weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
             )
-        layers = tuple(_finite_floats("layers", layer) for layer in self.layers)
+        try:
+            pairs = tuple(self.layers)
+        except TypeError:
+            raise TypeError(f"layers: pairs are needed, not {self.layers!r}") from None
+        layers = tuple(_finite_floats("layers", layer) for layer in pairs)
         if not 1 <= len(layers) <= _core.MAX_LAYERS:
             raise ValueError(
                 f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}"

@@ -7,7 +7,6 @@ and its projection has no y flip, so the -y face appears at the top of the frame
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import ktx
+from .image_reading import opened
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
@@ -416,35 +416,17 @@ def _split(coordinate: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[n
 
 def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Read an RGB or RGBA image file as ``(H, W, C)``, texels as they are stored."""
-    try:
-        oiio: Any = importlib.import_module("OpenImageIO")
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "reading sky images needs OpenImageIO: pip install vkbloom[images]",
-            name=error.name,
-        ) from error
     name = os.fspath(path)
-    # OpenImageIO says the same of missing and of damaged files; here a missing one is an OSError.
-    with open(name, "rb"):
-        pass
-    # Without this, alpha would be multiplied into the colours of a PNG.
-    raw = oiio.ImageSpec()
-    raw.attribute("oiio:UnassociatedAlpha", 1)
-    image = oiio.ImageInput.open(name, raw)
-    if image is None:
-        raise ValueError(f"{name}: not an image that can be read: {oiio.geterror().strip()}")
-    try:
+    with opened(path, "Reading sky images") as image:
         spec = image.spec()
         if spec.nchannels not in (3, 4) or spec.depth > 1 or spec.deep:
             raise ValueError(f"{name}: has {spec.nchannels} channels; flat RGB or RGBA is needed")
         if max(spec.width, spec.height) > 4 * MAX_SIDE:
             raise ValueError(f"{name}: {spec.width} x {spec.height} is too large for a sky")
-        stored = spec.format.basetype
-        kind = stored if stored in (oiio.UINT8, oiio.HALF) else oiio.FLOAT
+        kind = str(spec.format) if str(spec.format) in ("uint8", "half") else "float"
         pixels = image.read_image(0, 0, 0, spec.nchannels, kind)
-        if pixels is None:
+        # A file that ends early gives what is there, and says so.
+        if pixels is None or image.has_error:
             raise ValueError(f"{name}: damaged: {image.geterror().strip()}")
-    finally:
-        image.close()
     result: NDArray[Any] = np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
     return result

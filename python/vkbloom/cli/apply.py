@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom import images
+from vkbloom import image_reading, image_writing
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import note, read, subimage_option
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.cli.settings_options import settings_options
+from vkbloom.images import Colour, Picture
 from vkbloom.settings import Encoding
 
 _COLOURS: Final = ("linear", "srgb")
@@ -58,8 +59,8 @@ def command(
     source: str,
     target: str,
     attachments: str,
-    input_colour: images.Colour | None,
-    output_colour: images.Colour | None,
+    input_colour: Colour | None,
+    output_colour: Colour | None,
     raw: bool,
     subimage: int,
     adapter: str,
@@ -99,7 +100,7 @@ def command(
             "--output-colour does not go with it"
         )
     with blaming_the_call():
-        images.check_writable(target)
+        image_writing.check_writable(target)
     picture = _picture(source, subimage, input_colour, raw)
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
         click.echo(f"Rendering on {renderer.info.summary}")
@@ -111,7 +112,7 @@ def command(
                 attachments="all" if attachments == "all" else ["final", *names],
             )
     written = _save_others(frames, Path(target))
-    notes = images.save(
+    notes = image_writing.save(
         _result(picture, frames["final"], settings.encoding),
         target,
         output_colour,
@@ -126,14 +127,14 @@ def command(
         click.echo(f"wrote {path}")
 
 
-def _picture(source: str, subimage: int, colour: images.Colour | None, raw: bool) -> images.Picture:
+def _picture(source: str, subimage: int, colour: Colour | None, raw: bool) -> Picture:
     stored = read(source, subimage)
     if raw and stored.pixels.dtype != np.uint8:
         raise click.UsageError(
             f"--raw is for files of 8-bit integers; {source} holds {stored.numbers[0]}"
         )
     try:
-        picture = images.decode(stored, colour, raw=raw)
+        picture = image_reading.decode(stored, colour, raw=raw)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
     nan = int(np.isnan(picture.values).sum())
@@ -161,10 +162,10 @@ def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
 
 
 def _result(
-    picture: images.Picture,
+    picture: Picture,
     final: NDArray[Any],
     encoding: Encoding,
-) -> images.Picture:
+) -> Picture:
     """Return the picture with its bloom, encoded or as it came."""
     done = picture.encoding if encoding == "none" else encoding
     return dataclasses.replace(picture, pixels=final, encoding=done)

@@ -10,11 +10,12 @@ from typing import Any
 import click
 from rich.console import Console
 
-from vkbloom import images
+from vkbloom import image_writing
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import note, read, subimage_option
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.comparison import Comparison, Limits, compare, difference
+from vkbloom.images import Picture, StoredImage
 
 
 @click.command()
@@ -75,7 +76,7 @@ def command(
     with blaming_the_call():
         limits = Limits(**chosen)
         if diff is not None:
-            images.check_writable(diff)
+            image_writing.check_writable(diff)
     if diff is None and diff_scale is not None:
         raise click.UsageError("--diff-scale is for --diff")
     a, b = read(first, subimage), read(second, subimage)
@@ -105,7 +106,7 @@ def command(
     return 1 if failures else 0
 
 
-def _with_windows(found: Comparison, a: images.StoredImage, b: images.StoredImage) -> Comparison:
+def _with_windows(found: Comparison, a: StoredImage, b: StoredImage) -> Comparison:
     """Add a mismatch where pixels of one size have different places."""
     windows = [(*image.origin, *image.display) for image in (a, b)]
     if a.pixels.shape[:2] != b.pixels.shape[:2] or windows[0] == windows[1]:
@@ -118,13 +119,11 @@ def _with_windows(found: Comparison, a: images.StoredImage, b: images.StoredImag
     return dataclasses.replace(found, mismatches=(*found.mismatches, reason))
 
 
-def _write_difference(
-    a: images.StoredImage, b: images.StoredImage, path: str, scale: float | None
-) -> float:
+def _write_difference(a: StoredImage, b: StoredImage, path: str, scale: float | None) -> float:
     """Write the difference picture and return its scale."""
     with blaming_the_call():
         picture, used = difference(a.pixels, b.pixels, scale)
-    for text in images.save(images.Picture.of_values(picture), path):
+    for text in image_writing.save(Picture.of_values(picture), path):
         note(text)
     return used
 
@@ -155,7 +154,7 @@ def _object(
 def _lines(
     first: str,
     second: str,
-    a: images.StoredImage,
+    a: StoredImage,
     found: Comparison,
     failures: tuple[str, ...],
 ) -> list[str]:

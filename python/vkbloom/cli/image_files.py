@@ -10,13 +10,14 @@ from typing import Any
 
 import click
 
-from vkbloom import images
+from vkbloom import image_reading
+from vkbloom.images import StoredImage
 
 _STANDARD_ERROR = 2
 
 
 def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--subimage``, the argument of `vkbloom.images.load`."""
+    """Add ``--subimage``, the argument of `vkbloom.image_reading.load`."""
     return click.option(
         "--subimage",
         metavar="N",
@@ -27,10 +28,10 @@ def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
     )(command)
 
 
-def read(path: str, subimage: int) -> images.StoredImage:
+def read(path: str, subimage: int) -> StoredImage:
     """Read an image file; the only message of a failure is that of the exception."""
     with _silenced():
-        return images.load(path, subimage)
+        return image_reading.load(path, subimage)
 
 
 def note(text: str) -> None:
