@@ -49,6 +49,7 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
                         uint32_t glow, struct gbuffer *gbuffer, struct vkb_graph *graph,
                         struct vkb_error *error)
 {
+    const int emitters = source->has_emission && glow != VKB_NO_IMAGE ? 2 : 1;
     struct vkb_mesh_params stored = *params;
     struct vkb_pass_row row;
 
@@ -62,11 +63,15 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
             return false;
     }
     row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, VKB_SHADER_gbuffer_body_frag, 0, 0, &stored);
+    row.constants[0] = emitters;
+    row.constant_count = 1;
     if (!add_draw(gbuffer, &row, graph, error))
         return false;
     if (glow == VKB_NO_IMAGE)
         return true;
     row = vkb_fullscreen_row("glow_light", VKB_SHADER_gbuffer_glow_frag, 0);
+    row.constants[0] = emitters;
+    row.constant_count = 1;
     row.reads[0] = glow;
     row.read_count = 1;
     row.blend = VKB_BLEND_ADD;

@@ -16,7 +16,7 @@ struct vkb_scene_source {
     double time;
     struct vkb_size size;
     double glow_intensity;
-    bool has_sky, has_glow;
+    bool has_sky, has_glow, has_emission;  // the body's materials emit
 };
 
 // An image from the host.

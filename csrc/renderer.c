@@ -318,6 +318,7 @@ static PyObject *render(PyObject *object, PyObject *arguments)
     if (vkb_read_scene(scene_tuple, &scene)) {
         source.has_sky = scene.data.sky.level_count > 0;
         source.has_glow = scene.data.glow.index_count > 0;
+        source.has_emission = scene.data.body.emission != NULL;
         if (require_open(self, &error)
             && vkb_build_scene(shading, &settings, &source, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))

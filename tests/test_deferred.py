@@ -243,7 +243,7 @@ def test_emission_needs_the_nearest_surface(renderer: Renderer) -> None:
     body = Mesh(
         np.concatenate((near.vertices, behind)),
         np.concatenate((near.indices, far.indices + np.uint32(len(near.vertices)))),
-        np.repeat(np.float32([[0, 0, 0], [9, 9, 9]]), len(near.vertices), axis=0),
+        np.repeat(np.array([[0, 0, 0], [9, 9, 9]], np.float32), len(near.vertices), axis=0),
     )
     shown = deferred(renderer, Scene(body=body, camera=screen(WHITE, SIZE).camera))
     # The wall behind is smaller on the screen than the one before it.
@@ -263,6 +263,18 @@ def test_no_intensity_is_infinite(renderer: Renderer, scene: Scene, intensity: f
     for name, array in shown.items():
         assert np.isfinite(array).all(), name
     assert shown["brightness"].max() == 65504
+
+
+def test_two_lights_are_no_infinite_one(renderer: Renderer) -> None:
+    wall = screen(WHITE, (16, 9))
+    assert wall.glow is not None
+    emission = np.full((len(wall.glow.vertices), 3), 3e38, np.float32)
+    body = dataclasses.replace(wall.glow, emission=emission)
+    scene = Scene(body=body, glow=wall.glow, camera=wall.camera, glow_intensity=1e9)
+    shown = deferred(renderer, scene, presets["deferred"], (16, 9))
+    for name, array in shown.items():
+        assert np.isfinite(array).all(), name
+    np.testing.assert_array_equal(rgb(shown["brightness"]), 65504)
 
 
 # What is made from the G-buffer
@@ -500,10 +512,10 @@ def test_shade_by_hand() -> None:
 
 
 def test_shade_takes_arrays_of_one_size() -> None:
-    arrays = [np.zeros((2, 3, 4), np.float16) for _ in range(4)]
+    one = np.zeros((2, 3, 4), np.float16)
     with pytest.raises(ValueError, match=r"^position must have the albedo's height"):
-        reference.shade(*arrays[:2], np.zeros((3, 3, 4)), arrays[3])
+        reference.shade(one, one, np.zeros((3, 3, 4)), one)
     with pytest.raises(TypeError, match=r"^normal must be"):
-        reference.shade(arrays[0], np.zeros((2, 3, 4), np.int64), *arrays[2:])
+        reference.shade(one, np.zeros((2, 3, 4), np.int64), one, one)
     with pytest.raises(ValueError, match=r"^brightness must have 3 or 4 channels"):
-        reference.shade(*arrays[:3], np.zeros((2, 3, 2)))
+        reference.shade(one, one, one, np.zeros((2, 3, 2)))
