@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from screens import DISTANCE, NOTHING, noise, screen
 from skimage.metrics import structural_similarity
-from test_graph import COLOR_OUTPUT, FRAGMENT_SHADER, READ_BEFORE_WRITE, WRITE_BEFORE_READ
+from test_gltf import Document
 from tolerance import assert_close, tolerance
 
 from vkbloom import (
@@ -24,7 +24,6 @@ from vkbloom import (
     Scene,
     Separable,
     Settings,
-    _core,
     presets,
     reference,
 )
@@ -194,6 +193,35 @@ def test_brightness_is_the_glow_mesh_as_the_forward_system_draws_it(
     shown = deferred(renderer, scene, time=0.3)
     assert rgb(glow).max() == 1
     np.testing.assert_array_equal(shown["brightness"], glow)
+
+
+def test_brightness_is_rounded_to_the_nearest(renderer: Renderer) -> None:
+    colours = noise((16, 9))
+    shown = deferred(
+        renderer, dataclasses.replace(screen(colours, (16, 9)), glow_intensity=5), size=(16, 9)
+    )
+    np.testing.assert_allclose(rgb(shown["brightness"]), 5 * colours, rtol=1.01 * HALF, atol=1e-7)
+
+
+def test_materials_that_emit(renderer: Renderer, tmp_path: Path) -> None:
+    document = Document()
+    triangle = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [0.0, 3.0, 0.0]]
+    document.primitive(triangle, material=0)
+    document.json["extensionsUsed"] = ["KHR_materials_emissive_strength"]
+    document.json["materials"] = [
+        {
+            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]},
+            "emissiveFactor": [1.0, 0.5, 0.0],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8.0}},
+        }
+    ]
+    (tmp_path / "lamp.gltf").write_bytes(document.as_gltf())
+    camera = Camera(rotation=(0, 0, 0))
+    shown = deferred(renderer, Scene.from_gltf(tmp_path / "lamp.gltf", camera=camera))
+    body = shown["depth"] < 1
+    assert 0.01 < body.mean() < 0.9
+    np.testing.assert_array_equal(rgb(shown["brightness"]), body[..., np.newaxis] * (8.0, 4.0, 0.0))
+    np.testing.assert_array_equal(rgb(shown["albedo"]), body[..., np.newaxis] * (0.5, 0.25, 0.125))
 
 
 def test_the_glow_mesh_changes_nothing_but_the_brightness(
@@ -386,106 +414,6 @@ def test_eight_times_white_is_eight_times_the_halo(renderer: Renderer) -> None:
     assert (after < 8 * before).all()
     width = [(rgb(shown["final"])[..., 0] > 32).any(axis=0).sum() for shown in (white, bright)]
     assert width[1] > 1.1 * width[0]
-
-
-# Passes
-
-
-def test_weights_change_without_a_new_pipeline(
-    new_renderer: Callable[[], Renderer], scene: Scene
-) -> None:
-    renderer = new_renderer()
-    settings = presets["deferred"]
-    assert isinstance(settings, Separable)
-    before = deferred(renderer, scene, settings)
-    count = renderer._core.pipeline_count
-    weights = tuple(reversed(settings.weights))
-    after = deferred(renderer, scene, settings.replace(weights=weights))
-    assert renderer._core.pipeline_count == count > 0
-    assert np.abs(rgb(after["bloom"]) - rgb(before["bloom"])).max() > 0.01
-    blurs = [f"blur_{way}_0_{loop}" for loop in range(2) for way in ("vertical", "horizontal")]
-    assert list(after.timings) == [*blurs, *BLURRED, "final"]
-
-
-def test_timings_of_each_pass(renderer: Renderer, scene: Scene) -> None:
-    shown = deferred(renderer, scene, time=0.1234)
-    assert list(shown.timings) == ["glow", "albedo", *BLURRED, *LIT]
-    assert all(math.isfinite(seconds) and seconds > 0 for seconds in shown.timings.values())
-
-
-CHANGES: list[tuple[dict[str, Any], list[str]]] = [
-    ({"exposure": 1.0}, ["final"]),
-    ({"tonemap": "aces"}, ["final"]),
-    ({"blur_strength": 0.7}, [*BLURRED, "final"]),
-    ({"threshold": 0.5}, ["extracted", *BLURRED, "final"]),
-    ({"bloom": False}, ["albedo", *LIT]),
-]
-
-
-@pytest.mark.parametrize(("changes", "ran"), CHANGES)
-def test_what_runs_after_a_change(
-    renderer: Renderer, scene: Scene, changes: dict[str, Any], ran: list[str]
-) -> None:
-    deferred(renderer, scene)
-    assert list(deferred(renderer, scene, Separable(**changes)).timings) == ran
-
-
-def test_what_is_not_wanted_does_not_run(
-    new_renderer: Callable[[], Renderer], scene: Scene
-) -> None:
-    renderer = new_renderer()
-    some = deferred(renderer, scene, attachments=("brightness",))
-    assert list(some) == ["brightness"]
-    assert list(some.timings) == ["glow", "albedo"]
-
-
-def test_shadings_take_turns(renderer: Renderer, scene: Scene, frames: Frames) -> None:
-    forward = renderer.render(scene, None, SIZE)
-    again = deferred(renderer, scene)
-    for name, array in frames.items():
-        np.testing.assert_array_equal(array, again[name], err_msg=name)
-    for name, array in renderer.render(scene, None, SIZE).items():
-        np.testing.assert_array_equal(array, forward[name], err_msg=name)
-
-
-# The graph
-
-
-def describe(settings: Settings) -> dict[str, Any]:
-    return _core.describe(settings, (1280, 720), True, "deferred")
-
-
-def test_the_passes() -> None:
-    passes = describe(Separable())["passes"]
-    assert [(row["name"], row["reads"], row["targets"]) for row in passes] == [
-        ("glow", [], ["glow", "glow_depth"]),
-        ("skybox", [], GBUFFER),
-        ("gbuffer", [], GBUFFER),
-        ("glow_light", ["glow"], GBUFFER),
-        ("blur_vertical", ["brightness"], ["blur_vertical"]),
-        ("bloom", ["blur_vertical"], ["bloom"]),
-        ("scene", GBUFFER[:4], ["scene"]),
-        ("final", ["scene", "bloom"], ["final"]),
-    ]
-    # One render pass for all of the G-buffer.
-    assert [row["render_pass"] for row in passes] == [0, 1, 1, 1, 2, 3, 4, 5]
-
-
-def test_the_last_pass_waits_for_the_second_blur() -> None:
-    graph = describe(presets["deferred"])
-    by_name = {row["name"]: row["render_pass"] for row in graph["passes"]}
-    assert [tuple(row) for row in graph["dependencies"][by_name["bloom"]]] == [
-        READ_BEFORE_WRITE,
-        WRITE_BEFORE_READ,
-    ]
-
-
-def test_the_blurs_and_the_light_wait_for_the_gbuffer() -> None:
-    graph = describe(Separable())
-    (number,) = {row["render_pass"] for row in graph["passes"] if row["name"] == "gbuffer"}
-    after = [row for row in graph["dependencies"][number] if row[0] == 0]
-    assert len(after) == 1
-    assert after[0][2:4] == (COLOR_OUTPUT, FRAGMENT_SHADER)
 
 
 # The reference's light
