@@ -314,8 +314,8 @@ def test_the_scene_is_the_references(renderer: Renderer, scene: Scene, turns: fl
         gbuffer = (shown[name] for name in ("albedo", "normal", "position", "brightness"))
         expected = reference.shade(*gbuffer)
         error = np.abs(shown["scene"] - expected)
-        # Half of the last bit, and the float32 arithmetic of a highlight.
-        assert (error <= HALF * np.abs(expected) + 2e-6).all(), error.max()
+        # Half of the last bit, and what the pow() of a highlight is off by on some devices.
+        assert (error <= HALF * np.abs(expected) + 1e-5).all(), error.max()
         assert len(np.unique(np.round(expected, 2))) > 100
 
 
