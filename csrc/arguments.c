@@ -258,7 +258,7 @@ static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, cons
 }
 
 static bool read_mesh(struct vkb_held_scene *scene, PyObject *vertices, PyObject *indices,
-                      struct vkb_mesh_data *mesh)
+                      PyObject *emission, struct vkb_mesh_data *mesh)
 {
     if (vertices == Py_None)
         return true;
@@ -270,9 +270,21 @@ static bool read_mesh(struct vkb_held_scene *scene, PyObject *vertices, PyObject
     *mesh = (struct vkb_mesh_data){
         .vertices = vertex_view->buf,
         .indices = index_view->buf,
-        .vertex_count = (uint32_t)((size_t)vertex_view->len / sizeof *mesh->vertices),
+        .vertex_count =
+            (uint32_t)((size_t)vertex_view->len / (VKB_GIVEN_FLOATS * sizeof *mesh->vertices)),
         .index_count = (uint32_t)((size_t)index_view->len / sizeof *mesh->indices),
     };
+    if (emission != Py_None) {
+        const Py_buffer *view = hold(scene, emission, "emission", "f");
+        if (!view)
+            return false;
+        if ((size_t)view->len != 3 * sizeof *mesh->emission * mesh->vertex_count) {
+            PyErr_Format(PyExc_ValueError, "scene: emission must have the mesh's %u rows of 3",
+                         mesh->vertex_count);
+            return false;
+        }
+        mesh->emission = view->buf;
+    }
     for (uint32_t i = 0; i < mesh->index_count; ++i)
         if (mesh->indices[i] >= mesh->vertex_count) {
             PyErr_Format(PyExc_ValueError, "scene: index %u is beyond the mesh's %u vertices",
@@ -325,14 +337,15 @@ static bool read_sky(struct vkb_held_scene *scene, PyObject *levels)
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene)
 {
     unsigned long long serial;
-    PyObject *body_vertices, *body_indices, *glow_vertices, *glow_indices, *sky;
+    PyObject *body_vertices, *body_indices, *body_emission, *glow_vertices, *glow_indices, *sky;
 
-    if (!PyArg_ParseTuple(tuple, "KOOOOO!", &serial, &body_vertices, &body_indices, &glow_vertices,
-                          &glow_indices, &PyTuple_Type, &sky))
+    if (!PyArg_ParseTuple(tuple, "KOOOOOO!", &serial, &body_vertices, &body_indices, &body_emission,
+                          &glow_vertices, &glow_indices, &PyTuple_Type, &sky))
         return false;
     scene->data.serial = serial;
-    return read_mesh(scene, body_vertices, body_indices, &scene->data.body)
-        && read_mesh(scene, glow_vertices, glow_indices, &scene->data.glow) && read_sky(scene, sky);
+    return read_mesh(scene, body_vertices, body_indices, body_emission, &scene->data.body)
+        && read_mesh(scene, glow_vertices, glow_indices, Py_None, &scene->data.glow)
+        && read_sky(scene, sky);
 }
 
 void vkb_release_scene(struct vkb_held_scene *scene)

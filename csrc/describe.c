@@ -87,17 +87,22 @@ PyObject *vkb_describe(PyObject *module, PyObject *arguments)
 {
     PyObject *settings_object, *result = NULL;
     struct vkb_settings settings;
-    struct vkb_forward forward = {.camera = {.fov = 45.0, .near = 0.1, .far = 256.0}};
+    struct vkb_scene_source source = {
+        .camera = {.fov = 45.0, .near = 0.1, .far = 256.0},
+        .glow_intensity = 1.0,
+        .has_glow = true,
+    };
+    const char *shading;
     struct vkb_graph graph = {0};
     struct vkb_error error = {0};
     int has_sky;
 
-    if (!PyArg_ParseTuple(arguments, "O(II)p:describe", &settings_object, &forward.size.width,
-                          &forward.size.height, &has_sky)
+    if (!PyArg_ParseTuple(arguments, "O(II)ps:describe", &settings_object, &source.size.width,
+                          &source.size.height, &has_sky, &shading)
         || !vkb_read_settings(settings_object, &settings))
         return NULL;
-    forward.has_sky = has_sky;
-    if (vkb_build_forward(&settings, &forward, &graph, &error)
+    source.has_sky = has_sky;
+    if (vkb_build_scene(shading, &settings, &source, &graph, &error)
         && vkb_graph_check(&graph, UINT32_MAX, &error))
         result = describe_graph(&graph);
     else

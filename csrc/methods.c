@@ -87,13 +87,54 @@ bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)
     return first->width == second->width && first->height == second->height;
 }
 
+bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
+                    struct vkb_size size, bool framebuffer, uint32_t *index,
+                    struct vkb_error *error)
+{
+    struct vkb_image_row row = {
+        .format = format,
+        .width = size.width,
+        .height = size.height,
+        .framebuffer = framebuffer,
+    };
+
+    snprintf(row.name, sizeof row.name, "%s", name);
+    return vkb_graph_add_image(graph, &row, index, error);
+}
+
+bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
+                     struct vkb_graph *graph, struct vkb_error *error)
+{
+    struct vkb_pass_row row =
+        vkb_fullscreen_row(graph->images[glow].name, VKB_SHADER_extract_frag, glow);
+    const struct vkb_sampling sampling = vkb_sampling_into(graph, glow);
+
+    row.constants[0] = vkb_threshold_mode(settings);
+    // Never the sampler's filter: it would spread NaN, and a threshold magnifies what it rounds.
+    row.constants[1] = vkb_same_size(graph, image, glow) ? SAMPLING_WHOLE : SAMPLING_FETCH;
+    row.constant_count = 2;
+    row.reads[0] = image;
+    row.read_count = 1;
+    row.block = VKB_BLOCK_extract;
+    row.params.extract = (struct vkb_extract_params){
+        .target_width = sampling.width,
+        .target_height = sampling.height,
+        .limit = sampling.limit,
+    };
+    if (row.constants[0] != THRESHOLD_NONE) {
+        row.params.extract.threshold = settings->values.extract.threshold;
+        row.params.extract.knee = settings->values.extract.knee;
+    }
+    return vkb_graph_add_pass(graph, &row, error);
+}
+
 bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
-                       struct vkb_graph *graph, struct vkb_error *error)
+                       enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error)
 {
     uint32_t final;
     struct vkb_image_row image = {
         .name = "final",
-        .format = graph->images[scene].format,
+        .format = format,
         .width = graph->images[scene].width,
         .height = graph->images[scene].height,
         .channels = graph->images[scene].channels,

@@ -10,12 +10,13 @@ struct vkb_size {
     uint32_t width, height;
 };
 
-// A frame of a scene, forward shading.
-struct vkb_forward {
+// A frame of a scene.
+struct vkb_scene_source {
     struct vkb_camera camera;
     double time;
     struct vkb_size size;
-    bool has_sky;
+    double glow_intensity;
+    bool has_sky, has_glow, has_emission;  // the body's materials emit
 };
 
 // An image from the host.
@@ -33,8 +34,29 @@ struct vkb_bloom_source {
     enum vkb_format format;
 };
 
-bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_forward *forward,
+// The graph of a scene in the shading of that name.
+bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
+                     const struct vkb_scene_source *source, struct vkb_graph *graph,
+                     struct vkb_error *error);
+bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
                        struct vkb_graph *graph, struct vkb_error *error);
+bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_scene_source *source,
+                        struct vkb_graph *graph, struct vkb_error *error);
+
+// What every draw of a frame of the scene has in its parameters.
+struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source);
+
+// The glow mesh into the images "glow" and "glow_depth"; the colours pass the threshold of that
+// mode.
+bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_mesh_params *params,
+                  enum vkb_format format, struct vkb_size size, bool framebuffer,
+                  enum vkb_mode threshold, struct vkb_graph *graph, uint32_t *glow,
+                  struct vkb_error *error);
+
+// A row that draws a mesh or the sky, with a depth test; the caller fills in further targets.
+struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
+                                  enum vkb_shader fragment, uint32_t target, uint32_t depth,
+                                  const struct vkb_mesh_params *params);
 
 bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image_source *image,
                      struct vkb_graph *graph, struct vkb_error *error);
@@ -64,10 +86,19 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
 // A published method starts from the whole frame: it reduces and thresholds in its own way.
 bool vkb_is_published(const struct vkb_settings *settings);
 
-// The last pass: `scene` and `bloom` (VKB_NO_IMAGE: none) to the framebuffer "final", which has the
-// scene's format and channels.
+// The last pass: `scene` and `bloom` (VKB_NO_IMAGE: none) to the framebuffer "final", of that
+// format and with the scene's channels.
 bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
-                       struct vkb_graph *graph, struct vkb_error *error);
+                       enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error);
+
+// An image that a pass will write.
+bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
+                    struct vkb_size size, bool framebuffer, uint32_t *index,
+                    struct vkb_error *error);
+
+// A pass that reduces `image` to the size of `glow` and keeps what the threshold lets through.
+bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
+                     struct vkb_graph *graph, struct vkb_error *error);
 
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
 

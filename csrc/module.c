@@ -79,7 +79,7 @@ static PyObject *adapters(PyObject *module, PyObject *unused)
 
 static PyMethodDef functions[] = {
     {"adapters", adapters, METH_NOARGS, "Describes the adapters that can run vkbloom."},
-    {"describe", vkb_describe, METH_VARARGS, "The graph of a forward frame as lists and dicts."},
+    {"describe", vkb_describe, METH_VARARGS, "The graph of a scene's frame as lists and dicts."},
     {0},
 };
 

@@ -31,14 +31,15 @@ bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
 
 // A scene's arrays, held until vkb_release_scene, which may be called on a zeroed or half-read one.
-enum { VKB_SCENE_ARRAYS = 4 + VKB_MAX_MIP_LEVELS };
+enum { VKB_SCENE_ARRAYS = 5 + VKB_MAX_MIP_LEVELS };
 struct vkb_held_scene {
     struct vkb_scene_data data;
     Py_buffer views[VKB_SCENE_ARRAYS];
     int view_count;
 };
 
-// (serial, body vertices, body indices, glow vertices or None, glow indices or None, sky levels)
+// (serial, body vertices, body indices, body emission or None, glow vertices or None, glow indices
+// or None, sky levels)
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
 void vkb_release_scene(struct vkb_held_scene *scene);
 
@@ -54,7 +55,7 @@ struct vkb_held_image {
 bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
 
-// The graph of a forward frame as Python data: describe(settings, size, has_sky).
+// The graph of a scene's frame as Python data: describe(settings, size, has_sky, shading).
 PyObject *vkb_describe(PyObject *module, PyObject *arguments);
 
 #endif

@@ -302,20 +302,25 @@ static PyObject *render(PyObject *object, PyObject *arguments)
     struct renderer *self = (struct renderer *)object;
     PyObject *settings_object, *scene_tuple, *camera, *names, *allocate, *result = NULL;
     struct vkb_settings settings;
-    struct vkb_forward forward;
+    struct vkb_scene_source source;
+    const char *shading;
     struct vkb_graph graph = {0};
     struct vkb_held_scene scene = {0};
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "OO!O!(II)dOO:render", &settings_object, &PyTuple_Type,
-                          &scene_tuple, &PyTuple_Type, &camera, &forward.size.width,
-                          &forward.size.height, &forward.time, &names, &allocate))
+    if (!PyArg_ParseTuple(arguments, "OO!O!(II)sddOO:render", &settings_object, &PyTuple_Type,
+                          &scene_tuple, &PyTuple_Type, &camera, &source.size.width,
+                          &source.size.height, &shading, &source.time, &source.glow_intensity,
+                          &names, &allocate))
         return NULL;
-    if (!vkb_read_settings(settings_object, &settings) || !vkb_read_camera(camera, &forward.camera))
+    if (!vkb_read_settings(settings_object, &settings) || !vkb_read_camera(camera, &source.camera))
         return NULL;
     if (vkb_read_scene(scene_tuple, &scene)) {
-        forward.has_sky = scene.data.sky.level_count > 0;
-        if (require_open(self, &error) && vkb_build_forward(&settings, &forward, &graph, &error)
+        source.has_sky = scene.data.sky.level_count > 0;
+        source.has_glow = scene.data.glow.index_count > 0;
+        source.has_emission = scene.data.body.emission != NULL;
+        if (require_open(self, &error)
+            && vkb_build_scene(shading, &settings, &source, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
             result = run_graph(self, &graph, &(struct vkb_frame_source){.scene = &scene.data},
                                names, allocate);
@@ -399,7 +404,8 @@ static PyObject *get_pipeline_count(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Gives all back; may be called twice."},
     {"render", render, METH_VARARGS,
-     "render(settings, scene, camera, size, time, names, allocate) -> (arrays, timings, counts)"},
+     "render(settings, scene, camera, size, shading, time, glow_intensity, names, allocate) -> "
+     "(arrays, timings, counts)"},
     {"apply", apply, METH_VARARGS,
      "apply(settings, image, names, allocate) -> (arrays, timings, counts)"},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},

@@ -7,6 +7,7 @@ const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_VERTEX_ATTRIBU
     {0, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, position)},
     {1, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, normal)},
     {2, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, colour)},
+    {3, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, emission)},
 };
 
 // Where the pieces of a scene lie in the one staging buffer that brings them to the device.
@@ -17,7 +18,7 @@ struct staging {
 
 static size_t vertex_bytes(const struct vkb_mesh_data *data)
 {
-    return data->vertex_count * sizeof *data->vertices;
+    return data->vertex_count * sizeof(struct vkb_vertex);
 }
 
 static size_t index_bytes(const struct vkb_mesh_data *data)
@@ -62,8 +63,24 @@ static VkDeviceSize stage(struct staging *staging, const void *data, size_t size
     return offset;
 }
 
+static VkDeviceSize stage_vertices(struct staging *staging, const struct vkb_mesh_data *data)
+{
+    static const float none[3];
+    const VkDeviceSize offset = staging->used;
+    struct vkb_vertex *vertices = (void *)((char *)staging->buffer.mapped + offset);
+
+    for (size_t i = 0; i < data->vertex_count; ++i) {
+        memcpy(&vertices[i], data->vertices + VKB_GIVEN_FLOATS * i,
+               offsetof(struct vkb_vertex, emission));
+        memcpy(vertices[i].emission, data->emission ? data->emission + 3 * i : none, sizeof none);
+    }
+    staging->used += align16(vertex_bytes(data));
+    return offset;
+}
+
+// A buffer on the device with what lies in the staging buffer from `offset` on.
 static bool load_buffer(const struct vkb_device *device, VkCommandBuffer commands,
-                        struct staging *staging, const void *data, size_t size,
+                        const struct staging *staging, VkDeviceSize offset, size_t size,
                         VkBufferUsageFlags usage, struct vkb_buffer *buffer,
                         struct vkb_error *error)
 {
@@ -72,7 +89,7 @@ static bool load_buffer(const struct vkb_device *device, VkCommandBuffer command
         return false;
     device->vk.vkCmdCopyBuffer(commands, staging->buffer.handle, buffer->handle, 1,
                                &(VkBufferCopy){
-                                   .srcOffset = stage(staging, data, size),
+                                   .srcOffset = offset,
                                    .size = size,
                                });
     return true;
@@ -85,9 +102,11 @@ static bool load_mesh(const struct vkb_device *device, VkCommandBuffer commands,
     mesh->index_count = data->index_count;
     if (data->index_count == 0)
         return true;
-    return load_buffer(device, commands, staging, data->vertices, vertex_bytes(data),
+    const VkDeviceSize vertices = stage_vertices(staging, data);
+    const VkDeviceSize indices = stage(staging, data->indices, index_bytes(data));
+    return load_buffer(device, commands, staging, vertices, vertex_bytes(data),
                        VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->vertices, error)
-        && load_buffer(device, commands, staging, data->indices, index_bytes(data),
+        && load_buffer(device, commands, staging, indices, index_bytes(data),
                        VK_BUFFER_USAGE_INDEX_BUFFER_BIT, &mesh->indices, error);
 }
 

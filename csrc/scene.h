@@ -6,17 +6,18 @@
 #include "memory.h"
 #include "params.h"
 
-// As the meshes arrive from Python: float32 (N, 9), tightly packed.
+// As the meshes lie on the device, tightly packed.
 struct vkb_vertex {
-    float position[3], normal[3], colour[3];
+    float position[3], normal[3], colour[3], emission[3];
 };
 
-enum { VKB_VERTEX_ATTRIBUTES = 3, VKB_MAX_MIP_LEVELS = 16 };
+enum { VKB_VERTEX_ATTRIBUTES = 4, VKB_GIVEN_FLOATS = 9, VKB_MAX_MIP_LEVELS = 16 };
 extern const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_VERTEX_ATTRIBUTES];
 
 // Host memory that the caller keeps alive; no vertices: no such mesh.
 struct vkb_mesh_data {
-    const struct vkb_vertex *vertices;
+    const float *vertices;  // position, normal and colour of each
+    const float *emission;  // three floats of each, NULL: nothing emits
     const uint32_t *indices;
     uint32_t vertex_count, index_count;
 };

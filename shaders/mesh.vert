@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// A mesh in view space, for the glow and the Phong passes.
+// A mesh in view space, for the glow, the Phong and the G-buffer passes.
 #include "block.glsl"
 
 UNIFORM_BLOCK(MESH_BLOCK);
@@ -8,10 +8,12 @@ UNIFORM_BLOCK(MESH_BLOCK);
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 colour;
+layout(location = 3) in vec3 emission;
 
 layout(location = 0) out vec3 view_position;
 layout(location = 1) out vec3 view_normal;
 layout(location = 2) out vec3 vertex_colour;
+layout(location = 3) out vec3 vertex_emission;
 
 void main()
 {
@@ -24,5 +26,6 @@ void main()
     view_position = in_view.xyz;
     view_normal = mat3(model_view) * normal;
     vertex_colour = colour;
+    vertex_emission = emission;
     gl_Position = projection * in_view;
 }

@@ -19,11 +19,14 @@
     SETTING(B, threshold, 0.0, 0.0, 65504.0) \
     SETTING(B, knee, 0.0, 0.0, 1.0)
 
-// The matrices of a mesh or skybox draw; the glow mesh's colours pass the threshold.
+// The matrices of a mesh or skybox draw, and the largest value that the colour targets hold; the glow
+// mesh's colours, times their intensity, pass the threshold.
 #define MESH_BLOCK(B, SETTING, INPUT, VEC4S) \
     VEC4S(B, projection, 4) \
     VEC4S(B, view, 4) \
     VEC4S(B, model, 4) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, SETTING)
 
 // A blur pass. `step_ratio` is what one texel of the width is in texels of the height; the half-kernel w0..w64 lies four to a vec4.
@@ -68,6 +71,9 @@
     SETTING(B, offset, 1.0, 0.0, 16.0) \
     SAMPLING_ROWS(B, INPUT)
 
+// The light of the deferred system.
+#define LIGHTING_BLOCK(B, SETTING, INPUT, VEC4S) INPUT(B, float, limit)
+
 #define COMPOSITE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, intensity, 1.0, 0.0, 65504.0) \
     SETTING(B, exposure, 0.0, -32.0, 32.0) \
@@ -81,6 +87,7 @@
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
+    BLOCK(lighting, LIGHTING_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK)
 
 // Settings that no shader reads, for they shape the graph.

@@ -228,6 +228,8 @@ def test_options_change_a_preset() -> None:
         ("--frames 0", "'--frames': 0 is not in the range x>=1"),
         ("--attachments final,glare", "attachments: there is no 'glare' here, only glow"),
         ("--camera-fov 180", "fov is 180.0; over 0 and under 180"),
+        ("--glow-intensity -1", "glow_intensity is -1.0; 0 or more"),
+        ("--shading flat", "'--shading': 'flat' is not one of 'forward', 'deferred'"),
         ("--camera-position 1,2", "position has 2 entries; three are needed"),
         ("--skybox a.png --skybox b.png", "--skybox is given 2 times"),
     ],
@@ -340,6 +342,18 @@ def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:
     assert list(times) == list(rendered().timings)
     assert all(0 < float(time) < 60_000 for time in times.values())
     assert stdout.endswith(f"\nwrote {tmp_path / 'out.exr'}\n")
+
+
+def test_render_in_deferred_shading(tmp_path: Path) -> None:
+    out = tmp_path / "out.png"
+    options = ("--shading", "deferred", "--glow-intensity", "8", "--attachments", "final")
+    result = vkb("render", "-o", out, *SMALL, *options)
+    assert result.exit_code == 0
+    expected = rendered(
+        scene=dataclasses.replace(Scene.ufo(), glow_intensity=8.0), shading="deferred"
+    )
+    assert (rgb(pixels(out)) == rgb(expected["final"])).all()
+    assert (rgb(expected["final"]) != rgb(rendered(shading="deferred")["final"])).any()
 
 
 @pytest.mark.parametrize("out", ["folder", "folder/"])

@@ -52,7 +52,7 @@ WRITE_BEFORE_READ = (
 
 
 def describe(settings: Separable, has_sky: bool = True) -> dict[str, Any]:
-    return _core.describe(settings, (1280, 720), has_sky)
+    return _core.describe(settings, (1280, 720), has_sky, "forward")
 
 
 def names(graph: dict[str, Any]) -> list[str]:
@@ -174,4 +174,4 @@ def test_no_image_is_written_by_two_render_passes() -> None:
 @pytest.mark.parametrize("size", [(0, 1), (1, 0)])
 def test_an_image_without_pixels_is_refused(size: tuple[int, int]) -> None:
     with pytest.raises(ValueError, match="out of this adapter's range"):
-        _core.describe(Separable(), size, True)
+        _core.describe(Separable(), size, True, "forward")

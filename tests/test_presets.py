@@ -30,7 +30,7 @@ Array = NDArray[Any]
 # (width, height): odd, even, tall, wide, smaller than the chains are long.
 SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (333, 217)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
-PUBLISHED = sorted(set(presets) - {"tutorial", "outline"})
+PUBLISHED = sorted(set(presets) - {"tutorial", "outline", "deferred"})
 
 
 def lights(size: tuple[int, int], dtype: str, seed: int = 3) -> Array:

@@ -17,6 +17,7 @@ _Scene = tuple[
     NDArray[np.float32],
     NDArray[np.uint32],
     NDArray[np.float32] | None,
+    NDArray[np.float32] | None,
     NDArray[np.uint32] | None,
     tuple[_Array, ...],
 ]
@@ -34,7 +35,9 @@ class ValidationError(Error): ...
 class ShaderError(Error): ...
 
 def adapters() -> list[_Adapter]: ...
-def describe(settings: object, size: tuple[int, int], has_sky: bool, /) -> dict[str, Any]: ...
+def describe(
+    settings: object, size: tuple[int, int], has_sky: bool, shading: str, /
+) -> dict[str, Any]: ...
 
 class Renderer:
     def __new__(
@@ -54,7 +57,9 @@ class Renderer:
         scene: _Scene,
         camera: _Camera,
         size: tuple[int, int],
+        shading: str,
         time: float,
+        glow_intensity: float,
         names: tuple[str, ...] | None,
         allocate: _Allocate,
         /,

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 #: - ``"tutorial"``: the forward system, 256 x 256 bloom buffers, nine taps.
 #: - ``"outline"``: the same passes with a loop that starts at the centre and a vertical step of
 #:   one texel of the width.
+#: - ``"deferred"``: the deferred HDR system's nine weights, which add up to less than 1, in three
+#:   loops. For ``shading="deferred"``, and for images too.
 #: - ``"jimenez2014"``: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced
 #:   Warfare", SIGGRAPH 2014; six levels as in LearnOpenGL's guest article on it
 #:   (JoeyDeVries/LearnOpenGL @ a545a703f958), mixed in with the talk's 0.04.
@@ -45,6 +47,12 @@ presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
         "outline": Separable(first_tap=0, texel="x"),
+        "deferred": Separable(
+            weights=(0.175713, 0.121703, 0.065984, 0.028002, 0.0093),
+            loops=3,
+            blur_scale=1.1,
+            blur_strength=1.5,
+        ),
         "jimenez2014": Pyramid(
             levels=6, radius=1.0, firefly_filter=True, composite="mix", intensity=0.04
         ),

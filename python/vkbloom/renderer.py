@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
     from vkbloom.scene import Scene
 
-Shading = Literal["forward"]
+Shading = Literal["forward", "deferred"]
+SHADINGS: tuple[Shading, ...] = get_args(Shading)
 
 
 def _version() -> str:
@@ -190,9 +191,12 @@ class Renderer:
             By default ``Separable()``, the forward system's.
         size : (int, int)
             Width and height of the frame in pixels.
-        shading : {"forward"}
+        shading : {"forward", "deferred"}
             Forward: the glow mesh is drawn into buffers of its own, blurred and added to the
-            Phong-lit scene.
+            Phong-lit scene, all in 8 bits. Deferred: albedo, normal, position and brightness of
+            what is seen are drawn into a G-buffer of half floats; the scene is lit from it, and
+            what is blurred is the brightness: what the body's materials emit plus the glow mesh's
+            colour times the scene's `glow_intensity`.
         time : float
             Of the animation, in turns: 0 and 1 are the same place. Any finite number.
         attachments : "all" or sequence of str
@@ -204,11 +208,18 @@ class Renderer:
         Returns
         -------
         Frames
-            ``glow`` (bloom buffer size, (H, W, 4)), ``glow_depth`` ((H, W) float32),
+            Forward: ``glow`` (bloom buffer size, (H, W, 4)), ``glow_depth`` ((H, W) float32),
             ``blur_vertical``, ``bloom`` (at the frame's size), ``scene`` ((H, W, 4) uint8),
-            ``depth`` ((H, W) float32) and ``final`` ((H, W, 4) uint8). With ``direct=True`` there
-            is no ``blur_vertical``; with ``bloom=False`` there are ``scene``, ``depth`` and
-            ``final`` only.
+            ``depth`` ((H, W) float32) and ``final`` ((H, W, 4) uint8).
+
+            Deferred, at the frame's size but for the blur's: ``albedo``, ``normal``, ``position``
+            (both in view space), ``brightness`` (all (H, W, 4) float16), ``depth``,
+            ``blur_vertical``, ``bloom``, ``scene`` ((H, W, 4) float16, light plus brightness) and
+            ``final`` ((H, W, 4) uint8). Where the normal is 0 there is the sky, or nothing:
+            its albedo is its colour.
+
+            With ``direct=True`` there is no ``blur_vertical``. With ``bloom=False`` there are no
+            bloom buffers, and the glow mesh is left out.
 
         Raises
         ------
@@ -225,8 +236,8 @@ class Renderer:
         ``timings`` of the result names the passes that ran.
         """
         settings = _check_settings(settings)
-        if shading != "forward":
-            raise ValueError(f"shading: {shading!r} is not one of forward")
+        if shading not in SHADINGS:
+            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
         try:
             finite = math.isfinite(time)
         except (TypeError, OverflowError):
@@ -243,8 +254,10 @@ class Renderer:
             _scene_arrays(scene),
             (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
             check_size("size", size),
+            shading,
             # Whole turns change nothing; without them large times keep their precision.
             math.fmod(time, 1.0),
+            scene.glow_intensity,
             _check_attachments(attachments),
             _allocator(out),
         )
@@ -390,6 +403,7 @@ def _scene_arrays(scene: Scene) -> Any:
         scene.serial,
         scene.body.vertices,
         scene.body.indices,
+        scene.body.emission,
         None if glow is None else glow.vertices,
         None if glow is None else glow.indices,
         () if scene.skybox is None else scene.skybox.levels,

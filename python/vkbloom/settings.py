@@ -74,10 +74,11 @@ class Settings:
     Parameters
     ----------
     bloom : bool
-        Off: the bloom's passes are left out, ``final`` is the tone-mapped scene.
+        Off: the bloom's passes are left out, and a scene's glow mesh; ``final`` is the tone-mapped
+        scene.
     threshold : float or None
         Brightness from which a colour goes into the bloom, 0 to 65504; None: no extraction. Of a
-        scene, the threshold is applied to the glow.
+        scene, the threshold is applied to the glow, in deferred shading to the brightness.
     knee : float
         Softness of the threshold, 0 to 1. 0: colours whose luminance is above the threshold. Else,
         with b = max(r, g, b), k = threshold * knee and
@@ -99,8 +100,8 @@ class Settings:
         The same as a fraction of the frame, 0.001 to 4, where `bloom_size` is None; sides are
         floored, never under 1. A forward scene with neither (a scale of 1) has 256 x 256.
     format : {"rgba8unorm", "rgba16float", "rgba32float"} or None
-        Of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images, the image's
-        own for float images.
+        Of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images,
+        "rgba16float" for deferred scenes, the image's own for float images.
 
     Raises
     ------

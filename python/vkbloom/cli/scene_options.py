@@ -40,25 +40,43 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
         help="Once: a KTX 1 cubemap or an equirectangular image. Six times: the images of the "
         "faces +x, -x, +y, -y, +z, -z.",
     )
+    @click.option(
+        "--glow-intensity",
+        type=float,
+        default=1.0,
+        show_default=True,
+        help="Factor of the glow mesh's colour in deferred shading, 0 or more.",
+    )
     @fields.options({"": Camera}, "camera", prefix="camera-")
     @functools.wraps(command)
     def run(
-        base: str, glow: str | None, sky: tuple[str, ...], camera: dict[str, Any], **rest: object
+        base: str,
+        glow: str | None,
+        sky: tuple[str, ...],
+        glow_intensity: float,
+        camera: dict[str, Any],
+        **rest: object,
     ) -> object:
         if len(sky) not in (0, 1, _FACES):
             raise click.UsageError(f"--skybox is given {len(sky)} times; once or six times it is")
-        return command(scene=lambda: _load(base, glow, sky, camera), **rest)
+        return command(scene=lambda: _load(base, glow, sky, glow_intensity, camera), **rest)
 
     return run
 
 
-def _load(base: str, glow: str | None, sky: tuple[str, ...], camera: dict[str, Any]) -> Scene:
+def _load(
+    base: str,
+    glow: str | None,
+    sky: tuple[str, ...],
+    glow_intensity: float,
+    camera: dict[str, Any],
+) -> Scene:
     scene = Scene.ufo() if base == _BUILT_IN else Scene.from_gltf(base)
-    changes: dict[str, Any] = {}
+    changes: dict[str, Any] = {"glow_intensity": glow_intensity}
     if glow is not None:
         changes["glow"] = gltf.load_mesh(glow)
     if sky:
         changes["skybox"] = skybox.load(sky[0] if len(sky) == 1 else list(sky))
     with blaming_the_call():
         changes["camera"] = dataclasses.replace(scene.camera, **camera)
-    return dataclasses.replace(scene, **changes)
+        return dataclasses.replace(scene, **changes)

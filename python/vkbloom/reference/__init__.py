@@ -3,12 +3,14 @@
 Slow, simple and independent of the device code: what a picture is compared with.
 
 `apply` gives all framebuffers of an image, `passes` and `blur` those of the blur alone,
-`composite` the final image, and `gain` what a method does to a flat image of 1.
+`composite` the final image, `gain` what a method does to a flat image of 1, and `shade` the light
+of the deferred system.
 """
 
 from __future__ import annotations
 
 from .compositing import composite
 from .framebuffers import apply, blur, gain, passes
+from .shading import shade
 
-__all__ = ["apply", "blur", "composite", "gain", "passes"]
+__all__ = ["apply", "blur", "composite", "gain", "passes", "shade"]

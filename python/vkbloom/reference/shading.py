@@ -1,0 +1,93 @@
+"""The light of the deferred system, from its G-buffer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .image import as_float, storage
+from .sampling import Array
+
+__all__ = ["shade"]
+
+# Figures of the forward system's Phong pass; the light stands still in view space.
+_LIGHT = np.array([-5.0, -5.0, 0.0])
+_LAMP = 0.9
+_AMBIENT = 0.25
+_SPECULAR = 0.75
+_SHININESS = 8
+
+
+def shade(
+    albedo: NDArray[Any],
+    normal: NDArray[Any],
+    position: NDArray[Any],
+    brightness: NDArray[Any],
+) -> Array:
+    """Return the deferred system's "scene": what is lit, plus what is emitted.
+
+    With c the albedo, N the normal, P the position, L the direction from P to the light at
+    (-5, -5, 0), V that to the camera at the origin and R = 2 (N.L) N - L, all of length 1:
+
+        c / 4 where any channel of c is 0.9 or more (a lamp's ambient light), else 0
+        + max(N.L, 0) c + 0.75 max(R.V, 0)^8 + brightness
+
+    Where the normal is (0, 0, 0) there is no surface, and c + brightness is the result. The
+    formula is that of the forward system's Phong pass.
+
+    Parameters
+    ----------
+    albedo, normal, position, brightness : ndarray, shape (H, W, 3) or (H, W, 4)
+        Framebuffers of a deferred frame, or others in their place: float16, float32 or float64,
+        finite. Normal and position in view space, the position in units of the scene; the normal
+        need not have length 1. A fourth channel is not read.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, 4)
+        Kept within +-65504, which is what "rgba16float" holds, but not rounded to it. Alpha is 1.
+
+    Raises
+    ------
+    TypeError
+        An array of another dtype.
+    ValueError
+        An array of another shape, or shapes that differ.
+    """
+    given = {
+        "albedo": albedo,
+        "normal": normal,
+        "position": position,
+        "brightness": brightness,
+    }
+    colour, normals, places, emitted = (
+        as_float(array, name, (3, 4))[..., :3] for name, array in given.items()
+    )
+    for name, array in given.items():
+        if array.shape[:2] != colour.shape[:2]:
+            raise ValueError(
+                f"{name} must have the albedo's height and width {colour.shape[:2]}, "
+                f"not {array.shape[:2]}"
+            )
+    is_surface = normals.any(axis=-1, keepdims=True)
+    n, to_light, to_camera = _unit(normals), _unit(_LIGHT - places), _unit(-places)
+    facing = _dot(n, to_light)
+    reflected = 2 * facing * n - to_light
+    ambient = np.where((colour >= _LAMP).any(axis=-1, keepdims=True), _AMBIENT * colour, 0.0)
+    specular = _SPECULAR * np.maximum(_dot(reflected, to_camera), 0) ** _SHININESS
+    lit = np.where(is_surface, ambient + np.maximum(facing, 0) * colour + specular, colour)
+    rgb = storage("rgba16float")(lit + emitted)
+    return np.concatenate([rgb, np.ones((*rgb.shape[:2], 1))], axis=-1)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    product: Array = (a * b).sum(axis=-1, keepdims=True)
+    return product
+
+
+def _unit(vectors: Array) -> Array:
+    """Return the vectors at length 1; those without length stay as they are."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1.0)

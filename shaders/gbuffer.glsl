@@ -1,0 +1,16 @@
+// The colour targets of the G-buffer pass. A normal of length 0 marks what the light leaves alone:
+// its albedo is its colour.
+
+layout(constant_id = 0) const int EMITTERS = 1;
+
+layout(location = 0) out vec4 albedo;
+layout(location = 1) out vec4 normal;
+layout(location = 2) out vec4 position;
+layout(location = 3) out vec4 brightness;
+
+// Blending does not clamp, so where two emitters are added each keeps to its part of the range.
+vec3 in_its_part(vec3 light)
+{
+    const float most = HALF_LIMIT / float(EMITTERS);
+    return clamp(light, -most, most);
+}

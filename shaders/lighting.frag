@@ -1,0 +1,26 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The scene from the G-buffer: the forward system's Phong light, and what is emitted.
+#include "block.glsl"
+#include "phong.glsl"
+
+UNIFORM_BLOCK(LIGHTING_BLOCK);
+#include "storage.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D albedo;
+layout(set = 0, binding = 2) uniform sampler2D normal;
+layout(set = 0, binding = 3) uniform sampler2D position;
+layout(set = 0, binding = 4) uniform sampler2D brightness;
+
+layout(location = 0) out vec4 colour;
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec3 base = texelFetch(albedo, pixel, 0).rgb;
+    vec3 n = texelFetch(normal, pixel, 0).xyz;
+    vec3 lit = base;
+    if (any(notEqual(n, vec3(0.0))))
+        lit = phong(base, normalize(n), texelFetch(position, pixel, 0).xyz);
+    colour = vec4(storable(lit + texelFetch(brightness, pixel, 0).rgb), 1.0);
+}
