@@ -123,13 +123,9 @@ static bool read_size(PyObject *object, struct vkb_settings *settings)
 
 static bool read_method(PyObject *object, enum vkb_method *method)
 {
-    static const char *const names[VKB_METHOD_COUNT] = {
-        [VKB_METHOD_UNREAL] = "unreal",   [VKB_METHOD_SEPARABLE] = "separable",
-        [VKB_METHOD_PYRAMID] = "pyramid", [VKB_METHOD_DUAL_KAWASE] = "dual_kawase",
-        [VKB_METHOD_BEVY] = "bevy",       [VKB_METHOD_FILAMENT] = "filament",
-        [VKB_METHOD_KINO] = "kino",       [VKB_METHOD_URP] = "urp",
-        [VKB_METHOD_HDRP] = "hdrp",
-    };
+#define METHOD_NAME(constant, name, published) [VKB_METHOD_##constant] = #name,
+    static const char *const names[VKB_METHOD_COUNT] = {VKB_METHODS(METHOD_NAME)};
+#undef METHOD_NAME
     PyObject *value = PyObject_GetAttrString(object, "method");
 
     if (!value)

@@ -9,15 +9,9 @@ static const struct method {
                 uint32_t *, struct vkb_error *);
     bool published;
 } methods[VKB_METHOD_COUNT] = {
-    [VKB_METHOD_SEPARABLE] = {vkb_add_separable, false},
-    [VKB_METHOD_PYRAMID] = {vkb_add_pyramid, false},
-    [VKB_METHOD_DUAL_KAWASE] = {vkb_add_dual_kawase, false},
-    [VKB_METHOD_BEVY] = {vkb_add_bevy, true},
-    [VKB_METHOD_UNREAL] = {vkb_add_unreal, true},
-    [VKB_METHOD_HDRP] = {vkb_add_hdrp, true},
-    [VKB_METHOD_URP] = {vkb_add_urp, true},
-    [VKB_METHOD_FILAMENT] = {vkb_add_filament, true},
-    [VKB_METHOD_KINO] = {vkb_add_kino, true},
+#define METHOD_ROW(constant, name, published) [VKB_METHOD_##constant] = {vkb_add_##name, published},
+    VKB_METHODS(METHOD_ROW)
+#undef METHOD_ROW
 };
 
 bool vkb_is_published(const struct vkb_settings *settings)

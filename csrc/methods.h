@@ -64,26 +64,13 @@ bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image
 // The rows of the method that the settings name; *bloom is the image that they end in.
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                       struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                     struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_dual_kawase(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                         struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_filament(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                      struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                 struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
-bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
+#define VKB_METHOD_FUNCTION(constant, name, published) \
+    bool vkb_add_##name(const struct vkb_settings *settings, \
+                        const struct vkb_bloom_source *source, struct vkb_graph *graph, \
+                        uint32_t *bloom, struct vkb_error *error);
+VKB_METHODS(VKB_METHOD_FUNCTION)
+#undef VKB_METHOD_FUNCTION
 
-// A published method starts from the whole frame: it reduces and thresholds in its own way.
 bool vkb_is_published(const struct vkb_settings *settings);
 
 // The last pass: `scene` and `bloom` (VKB_NO_IMAGE: none) to the framebuffer "final", of that

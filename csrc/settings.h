@@ -7,17 +7,24 @@
 
 #include <stdbool.h>
 
+// Every method: METHOD(name in C, name in Python and of its vkb_add_ function, published). A
+// published method starts from the whole frame: it reduces and thresholds in its own way.
+#define VKB_METHODS(METHOD) \
+    METHOD(SEPARABLE, separable, false) \
+    METHOD(PYRAMID, pyramid, false) \
+    METHOD(DUAL_KAWASE, dual_kawase, false) \
+    METHOD(BEVY, bevy, true) \
+    METHOD(KINO, kino, true) \
+    METHOD(FILAMENT, filament, true) \
+    METHOD(URP, urp, true) \
+    METHOD(HDRP, hdrp, true) \
+    METHOD(UNREAL, unreal, true)
+
 enum vkb_method {
-    VKB_METHOD_SEPARABLE,
-    VKB_METHOD_PYRAMID,
-    VKB_METHOD_DUAL_KAWASE,
-    VKB_METHOD_BEVY,
-    VKB_METHOD_KINO,
-    VKB_METHOD_FILAMENT,
-    VKB_METHOD_URP,
-    VKB_METHOD_HDRP,
-    VKB_METHOD_UNREAL,
-    VKB_METHOD_COUNT,
+#define VKB_METHOD_ENUM(constant, name, published) VKB_METHOD_##constant,
+    VKB_METHODS(VKB_METHOD_ENUM)
+#undef VKB_METHOD_ENUM
+        VKB_METHOD_COUNT,
 };
 
 struct vkb_layer {
