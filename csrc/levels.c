@@ -44,15 +44,11 @@ static bool add_image(const struct vkb_levels *levels, const char *name, uint32_
                       struct vkb_size size, bool framebuffer, uint32_t *image,
                       struct vkb_error *error)
 {
-    struct vkb_image_row row = {
-        .format = levels->source->format,
-        .width = size.width,
-        .height = size.height,
-        .framebuffer = framebuffer,
-    };
+    char numbered[VKB_NAME_SIZE];
 
-    snprintf(row.name, sizeof row.name, name, number);
-    return vkb_graph_add_image(levels->graph, &row, image, error);
+    snprintf(numbered, sizeof numbered, name, number);
+    return vkb_add_target(levels->graph, numbered, levels->source->format, size, framebuffer, image,
+                          error);
 }
 
 bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
@@ -67,8 +63,8 @@ bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t
     return add_image(levels, name, number, size, false, image, error);
 }
 
-static struct vkb_pass_row fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
-                                        uint32_t from, uint32_t to)
+struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                     uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_fullscreen_row(levels->graph->images[to].name, fragment, to);
 
@@ -83,7 +79,7 @@ static struct vkb_pass_row fetching_row(const struct vkb_levels *levels, enum vk
 struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                     uint32_t from, uint32_t to)
 {
-    struct vkb_pass_row row = fetching_row(levels, fragment, from, to);
+    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
 
     row.block = VKB_BLOCK_pyramid;
@@ -97,7 +93,7 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_
                                       uint32_t from, uint32_t to)
 {
     const struct vkb_settings *settings = levels->settings;
-    struct vkb_pass_row row = fetching_row(levels, fragment, from, to);
+    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
 
     row.constants[1] = settings->thresholded;
@@ -118,7 +114,7 @@ static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *k
                      enum vkb_mode direction, double step, uint32_t from, uint32_t to,
                      struct vkb_error *error)
 {
-    struct vkb_pass_row row = fetching_row(levels, VKB_SHADER_blur_frag, from, to);
+    struct vkb_pass_row row = vkb_fetching_row(levels, VKB_SHADER_blur_frag, from, to);
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
     struct vkb_blur_params *params = &row.params.blur;
     const bool whole = vkb_same_size(levels->graph, from, to) && step == 1.0;
@@ -222,7 +218,8 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double shares[GATH
         whole = 1.0;
     if (!vkb_levels_image(levels, "up_%u", 0, size, &sum, error))
         return false;
-    struct vkb_pass_row row = fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], sum);
+    struct vkb_pass_row row =
+        vkb_fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], sum);
     row.read_count = GATHERED_LEVELS;
     row.block = VKB_BLOCK_gather;
     for (int level = 0; level < GATHERED_LEVELS; ++level) {

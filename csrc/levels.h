@@ -44,7 +44,10 @@ bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_
 bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
                      struct vkb_size size, uint32_t *image, struct vkb_error *error);
 
-// A pass of the pyramid's or the prefilter's block, its taps filtered by hand.
+// A pass from one image to another, its taps filtered by hand, with no block yet; and with the
+// pyramid's or the prefilter's.
+struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                     uint32_t from, uint32_t to);
 struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                     uint32_t from, uint32_t to);
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,

@@ -35,13 +35,8 @@ static bool add_kawase(const struct vkb_levels *levels, enum vkb_shader fragment
                        uint32_t to, struct vkb_error *error)
 {
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
-    struct vkb_pass_row row = vkb_fullscreen_row(levels->graph->images[to].name, fragment, to);
+    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
 
-    row.reads[0] = from;
-    row.read_count = 1;
-    // Never the sampler's filter: lavapipe's is good to 8 bits, and the errors of a chain add up.
-    row.constants[0] = SAMPLING_FETCH;
-    row.constant_count = 1;
     row.block = VKB_BLOCK_kawase;
     row.params.kawase = (struct vkb_kawase_params){
         .offset = levels->settings->values.kawase.offset,

@@ -64,16 +64,9 @@ static bool add_step(const struct vkb_settings *settings, const struct vkb_bloom
                      const char *name, bool framebuffer, enum vkb_mode direction, uint32_t layer,
                      uint32_t *image, struct vkb_graph *graph, struct vkb_error *error)
 {
-    struct vkb_image_row row = {
-        .format = source->format,
-        .width = source->buffers.width,
-        .height = source->buffers.height,
-        .framebuffer = framebuffer,
-    };
     const uint32_t from = *image;
 
-    snprintf(row.name, sizeof row.name, "%s", name);
-    return vkb_graph_add_image(graph, &row, image, error)
+    return vkb_add_target(graph, name, source->format, source->buffers, framebuffer, image, error)
         && add_blur(settings, source, name, direction, layer, from, *image, graph, error);
 }
 
@@ -111,19 +104,12 @@ bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_blo
                        struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
     uint32_t ends[MAX_LAYERS];
-    struct vkb_image_row row = {
-        .name = "bloom",
-        .format = source->format,
-        .width = source->final.width,
-        .height = source->final.height,
-        .framebuffer = true,
-    };
     char name[VKB_NAME_SIZE];
 
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer)
         if (!add_layer(settings, source, layer, &ends[layer], graph, error))
             return false;
-    if (!vkb_graph_add_image(graph, &row, bloom, error))
+    if (!vkb_add_target(graph, "bloom", source->format, source->final, true, bloom, error))
         return false;
     // The layers' last passes follow each other, so they share a render pass and add up in it.
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer) {
