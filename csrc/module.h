@@ -31,15 +31,15 @@ bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
 
 // A scene's arrays, held until vkb_release_scene, which may be called on a zeroed or half-read one.
-enum { VKB_SCENE_ARRAYS = 5 + VKB_MAX_MIP_LEVELS };
 struct vkb_held_scene {
     struct vkb_scene_data data;
-    Py_buffer views[VKB_SCENE_ARRAYS];
-    int view_count;
+    Py_buffer *views;
+    size_t view_count;
 };
 
-// (serial, body vertices, body indices, body emission or None, glow vertices or None, glow indices
-// or None, sky levels)
+// (serial, body, glow or None, sky levels, textures); a mesh is (vertices, indices, emission or
+// None, texcoords or None, surfaces), a surface (index count, base texture, emission texture), a
+// texture (levels, address mode across, down, magnification, minification, mipmap filter).
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
 void vkb_release_scene(struct vkb_held_scene *scene);
 
