@@ -81,7 +81,8 @@ def sampled(
             at = wrapped(texel.astype(int), side, modes[axis])
             np.add.at(matrix, (np.arange(pixels), at), share)
         weights.append(matrix)
-    return np.einsum("yh,xw,hwc->yxc", weights[1], weights[0], rgb(colours))
+    shown: NDArray[np.float64] = np.einsum("yh,xw,hwc->yxc", *weights[::-1], rgb(colours))
+    return shown
 
 
 # What a fragment gets
@@ -125,7 +126,7 @@ def test_colour_times_texture(renderer: Renderer) -> None:
     body = panel(size, texture(colours), texture(colours), colour=(0.5, 3, 0), radiance=(7, 0, 0.3))
     shown = deferred(renderer, body, size)
     for name, factor in (("albedo", (0.5, 3, 0)), ("brightness", (7, 0, 0.3))):
-        expected = rgb(colours) * np.float32(factor)
+        expected = rgb(colours) * factor
         np.testing.assert_allclose(rgb(shown[name]), expected, rtol=1.01 * HALF, atol=1e-7)
 
 
@@ -412,53 +413,50 @@ def test_surfaces_that_are_refused(count: int) -> None:
         Surface(3, base=GOOD)  # type: ignore[arg-type]
 
 
-def test_the_core_checks_what_it_is_given(renderer: Renderer) -> None:
-    body = panel((4, 4))
-    good = (body.vertices, body.indices, None, body.texcoords, ((12, 0, 0),))
-    white = (WHITE.levels, "repeat", "repeat", "linear", "linear", "linear")
-
-    def refused(mesh: Any, textures: Any, message: str) -> None:
-        with pytest.raises(ValueError, match=message):
-            renderer._core.render(
-                Separable(),
-                (2**60, mesh, None, (), textures),
-                ((0, 0, -9), (0, 0, 0), 45, 0.1, 99),
-                (4, 4),
-                "forward",
-                0.0,
-                1.0,
-                None,
-                lambda name, shape, dtype: np.empty(shape, dtype),
-            )
-
-    refused((*good[:4], ((12, 1, 0),)), (white,), "surface 0")
-    refused((*good[:4], ((12, 0, 1),)), (white,), "surface 0")
-    refused((*good[:4], ((9, 0, 0), (6, 0, 0))), (white,), "surface 1")
-    refused((*good[:3], None, good[4]), (white,), "texcoords")
-    refused((*good[:3], np.zeros((3, 4), np.float32), good[4]), (white,), "texcoords")
-    refused(good, ((*white[:1], "edge", *white[2:]),), "edge")
-    refused(good, (((), *white[1:]),), "no levels")
-    refused(good, (((GOOD, GOOD), *white[1:]),), "level 1")
+def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
+    """Give a mesh and textures to the core past the checks of `Mesh` and `Texture`."""
+    renderer._core.render(
+        Separable(),
+        (serial, mesh, None, (), textures),
+        ((0, 0, -9), (0, 0, 0), 45, 0.1, 99),
+        (4, 4),
+        "forward",
+        0.0,
+        1.0,
+        None,
+        lambda name, shape, dtype: np.empty(shape, dtype),
+    )
 
 
-def test_a_texture_beyond_the_adapter(renderer: Renderer) -> None:
-    long = np.ones((1, 2**15, 4), np.float16)
-    body = panel((4, 4))
-    with pytest.raises(ValueError, match="texture: a side of 32768 pixels"):
-        renderer._core.render(
-            Separable(),
-            (
-                2**61,
-                (body.vertices, body.indices, None, body.texcoords, ((12, 0, 0),)),
-                None,
-                (),
-                (((long,), "repeat", "repeat", "linear", "linear", "linear"),),
-            ),
-            ((0, 0, -9), (0, 0, 0), 45, 0.1, 99),
-            (4, 4),
-            "forward",
-            0.0,
-            1.0,
-            None,
-            lambda name, shape, dtype: np.empty(shape, dtype),
-        )
+BODY = panel((4, 4))
+RAW_BODY = (BODY.vertices, BODY.indices, None, BODY.texcoords, ((12, 0, 0),))
+RAW_WHITE = (WHITE.levels, "repeat", "repeat", "linear", "linear", "linear")
+
+
+@pytest.mark.parametrize(
+    ("mesh", "texture", "message"),
+    [
+        ((*RAW_BODY[:4], ((12, 1, 0),)), RAW_WHITE, "surface 0"),
+        ((*RAW_BODY[:4], ((12, 0, 1),)), RAW_WHITE, "surface 0"),
+        ((*RAW_BODY[:4], ((9, 0, 0), (6, 0, 0))), RAW_WHITE, "surface 1"),
+        ((*RAW_BODY[:3], None, RAW_BODY[4]), RAW_WHITE, "texcoords"),
+        ((*RAW_BODY[:3], np.zeros((3, 4), np.float32), RAW_BODY[4]), RAW_WHITE, "texcoords"),
+        (RAW_BODY, (*RAW_WHITE[:1], "edge", *RAW_WHITE[2:]), "edge"),
+        (RAW_BODY, (*RAW_WHITE[:5], "cubic"), "cubic"),
+        (RAW_BODY, ((), *RAW_WHITE[1:]), "no levels"),
+        (RAW_BODY, ((GOOD, GOOD), *RAW_WHITE[1:]), "level 1"),
+        (RAW_BODY, ((GOOD,) * 17, *RAW_WHITE[1:]), "17 mip levels"),
+        (RAW_BODY, ((GOOD[0],), *RAW_WHITE[1:]), "level 0"),
+        (
+            RAW_BODY,
+            ((np.ones((1, 2**17, 4), np.float16),), *RAW_WHITE[1:]),
+            "texture: a side of 131072 pixels is beyond this adapter's limit",
+        ),
+    ],
+)
+def test_the_core_checks_what_it_is_given(
+    renderer: Renderer, mesh: Any, texture: Any, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        draw_raw(renderer, 2**60, mesh, (texture,))
+    draw_raw(renderer, 2**61, RAW_BODY, (RAW_WHITE,))

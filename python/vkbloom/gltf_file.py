@@ -327,8 +327,6 @@ class GltfFile:
             return self._elements(
                 image.bufferView, 0, length, 1, np.dtype(np.uint8), what=what
             ).tobytes()
-        if not isinstance(image.uri, str):
-            self.fail(f"{what}.uri is no string")
         if image.uri[:5].lower() == "data:":
             return self._data_uri(image.uri, what)
         return self._outer_file(image.uri, None, what)

@@ -67,8 +67,6 @@ class TextureReader:
 
     def use(self, info: Parsed, what: str) -> TextureUse | None:
         """Read what a material's textureInfo names; None where there is no image to read."""
-        if not hasattr(info, "texCoord"):
-            self._file.fail(f"{what} is no object")
         texture = self._file.item("textures", info.index, what)
         user = f"textures[{info.index}]"
         if texture.source is None:
