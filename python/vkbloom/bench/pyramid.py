@@ -103,11 +103,11 @@ def _pygfx(
     peer.radius = radius = _fitting_radius(peer, size, sigma)
     found, gain = spread(peer.bloom, size)
     spreads[f"{PYGFX}, filter_radius {radius:.5f}"] = (found, gain)
-    reason = "a search for the radius to 1 %, or as near as it gets"
+    reason = "the radius is found to a third of a pixel"
     section.agreements += [
-        Agreement("pygfx: spread, relative", abs(found / sigma - 1), 0.15, reason),
+        Agreement("pygfx: spread, relative", abs(found / sigma - 1), 0.02, reason),
         # pygfx adds its levels up and leaves their number to the strength.
-        Agreement("pygfx: gain, relative", abs(gain / LEVELS - 1), 0.01, "sums of halves"),
+        Agreement("pygfx: gain, relative", abs(gain / LEVELS - 1), 0.01, "sums of small halves"),
     ]
     return [
         Contender(PYGFX, lambda turn: peer.bloom(images[turn % COUNT], 1 / LEVELS)),
@@ -147,7 +147,9 @@ def _gaussian(
     found, gain = spread(lambda image: bloom(image).astype(np.float32) - image, size)
     spreads[f"{GAUSSIAN}, sigma {sigma:.2f}"] = (found, gain)
     section.agreements += [
-        Agreement("GaussianBlur: spread, relative", abs(found / sigma - 1), 0.02, "kernel's end"),
-        Agreement("GaussianBlur: gain, relative", abs(gain - 1), 0.01, "sums of halves"),
+        Agreement(
+            "GaussianBlur: spread, relative", abs(found / sigma - 1), 0.02, "its ends are cut off"
+        ),
+        Agreement("GaussianBlur: gain, relative", abs(gain - 1), 0.01, "sums of small halves"),
     ]
     return [Contender(GAUSSIAN, lambda turn: bloom(images[turn % COUNT]))]

@@ -90,9 +90,6 @@ class Bloom:
 
 def _select(wgpu: Any, adapter: str) -> None:
     """Make pygfx use the Vulkan adapter of that name; it has one for the whole process."""
-    extras = importlib.import_module("wgpu.backends.wgpu_native.extras")
-    # Without it OpenGL is tried too, which complains where there is no display.
-    extras.set_instance_extras(backends=["Vulkan"])
     found = [
         each
         for each in wgpu.gpu.enumerate_adapters_sync()
