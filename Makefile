@@ -1,6 +1,6 @@
 # make demo: sets up what is missing, renders the built-in scene into out/.
 # make test: the same for the tests, and runs them. Both are quick the second time.
-# make bench: times vkbloom beside its peers into out/bench.md, in about half an hour.
+# make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python

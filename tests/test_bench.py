@@ -25,9 +25,10 @@ from vkbloom.bench.cost import Line
 from vkbloom.bench.image import SETTINGS, full_kernel
 from vkbloom.bench.inputs import REC709, THRESHOLD, pictures
 from vkbloom.bench.machine import command
+from vkbloom.bench.ours import contender
 from vkbloom.bench.plan import FORM_VARIABLE
 from vkbloom.bench.points import best_order, worst_order
-from vkbloom.bench.results import Goal, Section, Table, agreement
+from vkbloom.bench.results import Curve, Goal, Section, Table, agreement
 from vkbloom.bench.spread import spread
 from vkbloom.bench.timing import Contender, Times, alternate
 from vkbloom.cli.program import program
@@ -240,6 +241,17 @@ def test_the_spread_of_a_known_blur() -> None:
     assert spread(blur, (256, 128)) == pytest.approx((6.0, 3.0), rel=2e-3)
 
 
+def test_no_call_finds_its_passes_done(renderer: vkbloom.Renderer) -> None:
+    feed = itertools.cycle(pictures((20, 10), np.float16))
+    several = [
+        contender(str(taps), renderer, feed, vkbloom.Separable(weights=(1.0,) * taps))
+        for taps in (1, 2, 3)
+    ]
+    ran = [len(each.call(turn).timings) for turn in range(4) for each in several]
+    assert set(ran) == {ran[0]}
+    assert ran[0] > 0
+
+
 # Plans
 
 
@@ -310,6 +322,26 @@ def test_what_is_written(tmp_path: Path) -> None:
         "seconds": [0.5, 1.5, 1.0],
     }
     assert [goal["ratio"] for goal in found["goals"]] == [2.0, None]
+
+
+def test_curves_are_drawn_by_their_kind(tmp_path: Path) -> None:
+    oiio = pytest.importorskip("OpenImageIO")
+    section = Section("cost", "Cost")
+    section.curves = [
+        Curve("pixels", "one", (1.0, 100.0), (0.1, 9.0)),
+        Curve("kernel length", "one", (1.0, 2.0), (0.5, 0.8)),
+        Curve("pixels", "two", (1.0, 100.0), (0.2, 8.0)),
+    ]
+    machine = {"date": "", "command": "", "adapter": "", "adapter type": "discrete", "peers": {}}
+    written = write(Report(machine, (section,)), tmp_path / "b.md")
+    names = ["b.md", "b.json", "b-pixels.png", "b-kernel_length.png"]
+    assert [path.name for path in written] == names
+    page = written[0].read_text()
+    for chart in written[2:]:
+        assert f"({chart.name})" in page
+        pixels = oiio.ImageBuf(str(chart)).get_pixels(oiio.UINT8)
+        assert pixels.min() < 100 < pixels.max(), "something is drawn"
+    assert "wall-clock" not in page
 
 
 def test_what_was_found_is_written_before_the_rest_fails(

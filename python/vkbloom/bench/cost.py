@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -14,9 +15,10 @@ import vkbloom
 from vkbloom.bench import peers
 from vkbloom.bench.image import SETTINGS, full_kernel
 from vkbloom.bench.inputs import COUNT, THRESHOLD, pictures
+from vkbloom.bench.ours import contender
 from vkbloom.bench.plan import Plan
 from vkbloom.bench.results import Curve, Section, Table
-from vkbloom.bench.timing import Contender, Times, alternate, device_clock
+from vkbloom.bench.timing import Contender, Times, alternate
 
 __all__ = ["Line", "run"]
 
@@ -24,7 +26,8 @@ SIDES: Final = (64, 128, 256, 512, 1024, 2048, 4096)
 #: From here on the cost is to be a straight line.
 FIRST_SIDE: Final = 512
 RADII: Final = (1, 2, 4, 8, 16, 32, 64)
-LEVELS: Final = tuple(range(1, 11))
+#: Of 1024 pixels a side; one more would be of 1 x 1, which is cut.
+LEVELS: Final = tuple(range(1, 10))
 SIDE: Final = 1024
 SMALL: Final = 256
 SEPARABLE: Final = "vkbloom, 9 taps"
@@ -73,19 +76,6 @@ def run(plan: Plan) -> Section:
     return section
 
 
-def _contender(
-    name: str,
-    renderer: vkbloom.Renderer,
-    images: list[NDArray[Any]],
-    settings: vkbloom.Settings,
-) -> Contender:
-    return Contender(
-        name,
-        lambda turn: renderer.apply(images[turn % COUNT], settings, attachments=("final",)),
-        device_clock(renderer.info),
-    )
-
-
 def _peer_contenders(
     plan: Plan, section: Section, images: list[NDArray[Any]], kernel: NDArray[np.float32], name: str
 ) -> list[Contender]:
@@ -106,10 +96,11 @@ def _over_pixels(
     for side in sides:
         plan.tell(f"cost: {side} x {side}")
         images = pictures((side, side), np.float16)
+        feed = itertools.cycle(images)
         contenders = [
-            _contender(SEPARABLE, ours, images, SETTINGS),
-            _contender(FRAGMENT, source, images, SETTINGS),
-            _contender(PYRAMID, ours, images, vkbloom.Pyramid(levels=5, threshold=THRESHOLD)),
+            contender(SEPARABLE, ours, feed, SETTINGS),
+            contender(FRAGMENT, source, itertools.cycle(images), SETTINGS),
+            contender(PYRAMID, ours, feed, vkbloom.Pyramid(levels=5, threshold=THRESHOLD)),
             *_peer_contenders(plan, section, images, full_kernel(SETTINGS), "OpenCV, 9 taps"),
         ]
         times = alternate(contenders, plan.times(25 if side < 1024 else 9))
@@ -138,7 +129,7 @@ def _over_taps(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
         weights = vkbloom.gaussian_weights(max(radius / 2, 0.5), radius)
         settings = SETTINGS.replace(weights=weights, blur_strength=1.0)
         contenders = [
-            _contender("vkbloom, Separable", ours, images, settings),
+            contender("vkbloom, Separable", ours, itertools.cycle(images), settings),
             *_peer_contenders(plan, section, images, full_kernel(settings), "OpenCV, sepFilter2D"),
         ]
         times = alternate(contenders, plan.times(9))
@@ -151,8 +142,8 @@ def _over_taps(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
         tuple(map(str, taps)),
         tuple(map(float, taps)),
         0,
-        "us a tap and megapixel",
-        1e6 / (side * side / 1e6),
+        "ns a tap and pixel",
+        1e9 / side**2,
     )
     for name, each in found.items():
         _add(section, axis, f"{name}, {side} x {side}", each)
@@ -160,12 +151,12 @@ def _over_taps(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
 
 def _over_levels(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
     side = SMALL if plan.quick else SIDE
-    images = pictures((side, side), np.float16)
+    images = itertools.cycle(pictures((side, side), np.float16))
     levels = LEVELS[:3] if plan.quick else LEVELS
     plan.tell("cost: levels")
     settings = {count: vkbloom.Pyramid(levels=count, threshold=THRESHOLD) for count in levels}
     times = alternate(
-        [_contender(str(count), ours, images, each) for count, each in settings.items()],
+        [contender(str(count), ours, images, each) for count, each in settings.items()],
         plan.times(9),
     )
     section.times["levels"] = times

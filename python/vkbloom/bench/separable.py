@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Final
 
 import numpy as np
 
 import vkbloom
-from vkbloom.bench.inputs import COUNT, pictures
+from vkbloom.bench.inputs import pictures
+from vkbloom.bench.ours import contender
 from vkbloom.bench.plan import Plan
 from vkbloom.bench.results import Section, Table, agreement
-from vkbloom.bench.timing import Contender, alternate, device_clock
+from vkbloom.bench.timing import alternate
 
 __all__ = ["run"]
 
@@ -28,23 +30,15 @@ def run(plan: Plan) -> Section:
         f"Two passes against one at {size[0]} x {size[1]}, float32 RGBA",
         [
             "The same Gaussian as two passes of N taps and as one pass of N x N (`direct=True`). "
-            "On CPU adapters by the wall clock, from which the time of a kernel of one tap is "
-            "taken: upload, readback and what each pass costs without taps. On GPUs the passes' "
-            "time on the device, without such a correction.",
+            "The time of a kernel of one tap is taken away: upload, readback, composite and what a "
+            "pass costs without taps. On CPU adapters by the wall clock, on GPUs by the passes' "
+            "time on the device.",
         ],
     )
     images = pictures(size, np.float32)
     rows = []
     with plan.renderer() as renderer:
-        clock = device_clock(renderer.info)
-
-        def contender(name: str, settings: vkbloom.Separable) -> Contender:
-            return Contender(
-                name,
-                lambda turn: renderer.apply(images[turn % COUNT], settings, attachments=("bloom",)),
-                clock,
-            )
-
+        feed = itertools.cycle(images)
         for radius in RADII[:2] if plan.quick else RADII:
             taps = 2 * radius + 1
             plan.tell(f"separable: {taps} taps")
@@ -56,14 +50,14 @@ def run(plan: Plan) -> Section:
             section.agreements.append(agreement(what, first, second, 1e-4, reason))
             times = alternate(
                 [
-                    contender(NOTHING, two.replace(weights=(1.0,))),
-                    contender("two passes", two),
-                    contender("one pass", one),
+                    contender(NOTHING, renderer, feed, two.replace(weights=(1.0,))),
+                    contender("two passes", renderer, feed, two),
+                    contender("one pass", renderer, feed, one),
                 ],
                 plan.times(ROUNDS),
             )
             section.times[f"{taps} taps"] = times
-            nothing = times[NOTHING].median if clock is None else 0.0
+            nothing = times[NOTHING].median
             passes = [times[name].median - nothing for name in ("two passes", "one pass")]
             ratio = f"{passes[1] / passes[0]:.1f}" if min(passes) > 0 else "too near to one tap's"
             milliseconds = (f"{1e3 * seconds:.2f}" for seconds in (nothing, *passes))

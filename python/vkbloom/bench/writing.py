@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import json
 import math
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from vkbloom.bench.results import Curve, Report, Section, Table
 
 __all__ = ["as_json", "as_markdown", "write"]
+
+# From this ratio of the largest to the smallest on, an axis is logarithmic.
+_WIDE: Final = 16
 
 
 def write(report: Report, path: Path) -> list[Path]:
@@ -163,16 +167,19 @@ def _draw_curves(report: Report, path: Path) -> list[Path]:
             by_chart.setdefault(curve.chart, []).append(curve)
     if not by_chart or find_spec("matplotlib") is None:
         return []
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  optional
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
+    # Without pyplot, which would look for a display.
+    figures = importlib.import_module("matplotlib.figure")
     written = []
     for chart, curves in by_chart.items():
-        figure = Figure(figsize=(6, 4), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = figures.Figure(figsize=(6, 4), layout="constrained")
         axes = figure.add_subplot()
         for curve in curves:
-            axes.loglog(curve.x, curve.milliseconds, marker="o", label=curve.label)
+            axes.plot(curve.x, curve.milliseconds, marker="o", label=curve.label)
+        if max(curves[0].x) > _WIDE * min(curves[0].x):
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0)
         axes.set_xlabel(chart)
         axes.set_ylabel("median, ms")
         axes.grid(visible=True, which="both", alpha=0.25)

@@ -74,7 +74,7 @@ def command(
 
     Peers (OpenCV, SciPy, scikit-image, PyTorch, CuPy, pygfx) take part where they are installed,
     and are listed as missing where they are not. Pictures are compared before they are timed; all
-    are timed in turn, A B A B. All of it takes about half an hour on two cores, which should have
+    are timed in turn, A B A B. All of it takes a quarter of an hour on two cores, which should have
     nothing else to do.
 
     The exit status is 1 if pictures differ that should be the same; the times of those are left
@@ -83,7 +83,7 @@ def command(
     target = Path(out)
     if target.suffix != ".md":
         raise click.UsageError(f"--out: {out!r} does not end in .md")
-    # Before half an hour is spent.
+    # Before a quarter of an hour is spent.
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=target.parent):
         pass
