@@ -95,7 +95,7 @@ def command(
                 rounds=rounds,
                 points=points,
                 threads=usable_cores() if threads is None else threads,
-                only=only,
+                only=tuple(dict.fromkeys(only)),
                 tell=lambda text: status.update(f"Timing {text}"),
             )
         # After each benchmark, so that an interrupted run keeps what it has.
