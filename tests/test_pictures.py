@@ -165,6 +165,33 @@ class TestHtml:
         assert ("Time of each pass" in page) == bool(timings)
         assert "nan%" not in page
 
+    def test_bright_floats_are_shown_with_less_exposure(self, tmp_path: Path) -> None:
+        # Of 100 pixels one is at 1000, which is left out as the brightest in a hundred; of the
+        # others all are 3: log2(3) rounded up to half stops is 2, and 3 / 4 is shown as 225.
+        image = np.full((10, 10, 4), 3, np.float16)
+        image[5, 5] = 1000
+        frames = make({"bloom": image, "scene": image / 3, "normal": image})
+        page = frames._repr_html_()
+        captions = re.findall(r"<span[^>]*>([^<]*)</span>", page)
+        assert captions == [
+            "10 x 10, float16, 3 to 1000, shown at -2 stops",
+            "10 x 10, float16, 1 to 333.2",
+            "10 x 10, float16, 3 to 1000",
+        ]
+        shown = self.pictures(page, tmp_path)
+        assert [picture[0, 0, 0] for picture in shown] == [225, 255, 255]
+        assert shown[0][5, 5, 0] == 255
+        # What has passed a curve is shown as it is.
+        mapped = make({"final": image}, settings=Separable(encoding="srgb"))
+        assert "stops" not in mapped._repr_html_()
+        assert "stops" in make({"final": image})._repr_html_()
+
+    def test_ranges_of_what_is_not_finite(self) -> None:
+        image = np.full((2, 2, 3), np.nan, np.float32)
+        assert ", nothing finite<" in make({"bloom": image})._repr_html_()
+        image[0, 0] = (-1, 0, np.inf)
+        assert ", -1 to 0, some not finite<" in make({"bloom": image})._repr_html_()
+
     def test_tags_are_closed(self, frames: Frames) -> None:
         for page in (frames._repr_html_(), make({}, timings={})._repr_html_()):
             for tag in ("div", "figure", "figcaption", "code", "span", "b"):

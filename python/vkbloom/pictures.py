@@ -52,7 +52,9 @@ def contact_sheet_html(frames: Frames) -> str:
     """Return a contact sheet of all framebuffers, with the pass times, as HTML.
 
     Pictures are as in `leading_png`, without alpha, so that nothing is hidden, and
-    averaged down to 320 pixels at most. Colours are those of the page.
+    averaged down to 320 pixels at most. Linear floats of which more than one pixel in a
+    hundred is brighter than 1 are shown with less exposure; the caption says how much, and
+    gives the range of all floats. Colours are those of the page.
 
     Parameters
     ----------
@@ -72,11 +74,14 @@ def contact_sheet_html(frames: Frames) -> str:
     for name, array in frames.items():
         height, width = array.shape[:2]
         shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
-        picture = _picture(frames, name, _scaled(width, height, shrink))[:, :, :3]
+        stops = _viewing_stops(frames, name)
+        picture = _picture(frames, name, _scaled(width, height, shrink), stops)[:, :, :3]
         data = base64.b64encode(_png(picture)).decode("ascii")
         # An enlarged level of a pyramid shall show its pixels.
         rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
-        label, size = html.escape(name), html.escape(_described(array))
+        label, size = html.escape(name), html.escape(_described(array) + _ranged(array))
+        if stops != 0:
+            size += f", shown at {stops:g} stops"
         page.append(
             '<figure style="margin:0">'
             f'<img src="data:image/png;base64,{data}" alt="{label}, {size}" '
@@ -199,8 +204,13 @@ def _labelled(
     return drawn
 
 
-def _picture(frames: Frames, name: str, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
+def _picture(
+    frames: Frames, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
+) -> NDArray[np.uint8]:
+    """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height).
+
+    Colours of light are multiplied by 2**stops.
+    """
     array = frames[name]
     values = np.atleast_3d(array).astype(np.float32)
     linear = False
@@ -213,6 +223,8 @@ def _picture(frames: Frames, name: str, size: tuple[int, int] | None = None) -> 
     elif name == "normal":
         shown = _clipped(values * np.float32(0.5) + np.float32(0.5))
     else:
+        if stops != 0:
+            values[:, :, :3] *= np.float32(2.0**stops)
         shown = _clipped(values)
         linear = name != "final" or frames.settings.encoding == "none"
     if size is not None:
@@ -221,6 +233,33 @@ def _picture(frames: Frames, name: str, size: tuple[int, int] | None = None) -> 
         shown[:, :, :3] = encode_srgb(shown[:, :, :3])
     picture: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
     return picture
+
+
+def _viewing_stops(frames: Frames, name: str) -> float:
+    """Return the exposure, 0 or negative in half stops, that leaves 99 % of the pixels below 1."""
+    array = frames[name]
+    is_light = array.ndim == 3 and array.dtype != np.uint8 and name not in ("normal", "position")
+    if not is_light or (name == "final" and frames.settings.encoding != "none"):
+        return 0.0
+    # Every so manieth row and column: a percentile of them all would take longer than the picture.
+    step = max(1, max(array.shape[:2]) // _THUMBNAIL_SIDE)
+    brightest = array[::step, ::step, :3].max(axis=2).astype(np.float32)
+    brightest = brightest[np.isfinite(brightest)]
+    peak = float(np.percentile(brightest, 99, method="lower")) if brightest.size else 0.0
+    return -math.ceil(2 * math.log2(peak)) / 2 if peak > 1 else 0.0
+
+
+def _ranged(array: NDArray[Any]) -> str:
+    """Return the range of finite floats in words, alpha left out; nothing for other numbers."""
+    if array.dtype == np.uint8:
+        return ""
+    values = np.atleast_3d(array)[:, :, :3]
+    finite = np.isfinite(values)
+    if not finite.any():
+        return ", nothing finite"
+    low = values.min(where=finite, initial=np.inf)
+    high = values.max(where=finite, initial=-np.inf)
+    return f", {low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
 
 
 def _aspect(arrays: Mapping[str, NDArray[Any]]) -> float:

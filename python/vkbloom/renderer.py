@@ -172,6 +172,13 @@ class Renderer:
     def __repr__(self) -> str:
         return f"<vkbloom.Renderer on {self.info.summary}{', closed' if self.closed else ''}>"
 
+    def _repr_html_(self) -> str:
+        """Return the table of `display.renderer_html`."""
+        # Late: notebooks need it, and nothing else.
+        from vkbloom import display  # noqa: PLC0415
+
+        return display.renderer_html(self)
+
     def render(
         self,
         scene: Scene,

@@ -333,8 +333,11 @@ class Scene:
         return f"Scene({'; '.join(f'{name}: {value}' for name, value in self._rows())})"
 
     def _repr_html_(self) -> str:
-        rows = "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in self._rows())
-        return f"<table>{rows}</table>"
+        """Return the page of `display.scene_html`."""
+        # Late: pictures are of no use where nobody looks.
+        from vkbloom import display  # noqa: PLC0415
+
+        return display.scene_html(self)
 
 
 def _number(name: str, value: object) -> float:

@@ -174,6 +174,13 @@ class Settings:
         """Return the fields by name, and ``method``; plain values that JSON can hold."""
         return {"method": self.method, **dataclasses.asdict(self)}
 
+    def _repr_html_(self) -> str:
+        """Return the table of `display.settings_html`."""
+        # Late, because pictures of frames are made there, and frames have settings.
+        from vkbloom import display  # noqa: PLC0415
+
+        return display.settings_html(self)
+
 
 def check_size(name: str, size: Any) -> tuple[int, int]:
     """Return (width, height) as two ints of at least 1, else raise TypeError or ValueError."""
