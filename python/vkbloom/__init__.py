@@ -19,6 +19,7 @@ from vkbloom._core import (
 )
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
+from vkbloom.grid import reductions
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
@@ -53,5 +54,6 @@ __all__ = [
     "adapters",
     "gaussian_weights",
     "presets",
+    "reductions",
     "reference",
 ]

@@ -123,9 +123,7 @@ class Settings:
     tonemap: ToneMap = _choice("tonemap")
     exposure: float = _number("exposure", unit="stop")
     encoding: Encoding = _choice("encoding")
-    bloom_size: tuple[int, int] | None = dataclasses.field(
-        default=None, metadata={"unit": "pixel"}
-    )
+    bloom_size: tuple[int, int] | None = dataclasses.field(default=None, metadata={"unit": "pixel"})
     bloom_scale: float = _number("bloom_scale")
     format: BloomFormat | None = None
 

@@ -1,0 +1,14 @@
+"""Grids of settings: every combination of some values, in memory, on disk, or over many machines.
+
+========================== ========================================================================
+module                     job
+========================== ========================================================================
+axes, sources              what varies, and what it is rendered from
+order                      the order of visiting, and blocks of points
+passes                     passes counted: the cost of a step, the cost of a point alone
+plan                       the grid as asked for, and what a renderer says of it
+filling, reductions        blocks of points rendered into arrays, and figures of frames
+memory                     the grid as one Dataset
+progress                   the progress bar
+========================== ========================================================================
+"""
