@@ -20,6 +20,8 @@ from vkbloom._core import (
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
 from vkbloom.grid import reductions
+from vkbloom.grid.checking import GridReport, check_grid
+from vkbloom.grid.zarr_grid import grid_to_zarr
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
@@ -39,6 +41,7 @@ __all__ = [
     "Error",
     "FilamentBloom",
     "Frames",
+    "GridReport",
     "HdrpBloom",
     "KinoBloom",
     "OutOfMemoryError",
@@ -52,7 +55,9 @@ __all__ = [
     "UrpBloom",
     "ValidationError",
     "adapters",
+    "check_grid",
     "gaussian_weights",
+    "grid_to_zarr",
     "presets",
     "reductions",
     "reference",

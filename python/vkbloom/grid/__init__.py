@@ -9,6 +9,10 @@ passes                     passes counted: the cost of a step, the cost of a poi
 plan                       the grid as asked for, and what a renderer says of it
 filling, reductions        blocks of points rendered into arrays, and figures of frames
 memory                     the grid as one Dataset
+zarr_grid                  the grid as a Zarr store
+store, keys, identity      what is in the store, its bytes, and whether it is the same grid again
+checking                   a store looked through
+running, cluster           blocks rendered in this process, or by the workers of a Dask cluster
 progress                   the progress bar
 ========================== ========================================================================
 """

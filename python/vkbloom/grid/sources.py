@@ -121,7 +121,7 @@ class ImageSource:
         return {
             "kind": "image",
             "images": [
-                {"shape": list(image.shape), "dtype": image.dtype.name, "sha256": _digest(image)}
+                {"shape": list(image.shape), "dtype": image.dtype.name, "sha256": digest(image)}
                 for image in self.images
             ],
         }
@@ -174,7 +174,7 @@ class SceneSource:
         """Return size, shading, time and a digest of the scene."""
         return {
             "kind": "scene",
-            "sha256": _digest(self.scene),
+            "sha256": digest(self.scene),
             "size": list(self.size),
             "shading": self.shading,
             "time": self.place,
@@ -241,7 +241,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     return ImageSource([_check_image(image) for image in images], tuple(labels))
 
 
-def _digest(value: object) -> str:
+def digest(value: object) -> str:
     """Return a SHA-256 of plain values, arrays, and dataclasses of such."""
     found = hashlib.sha256()
 
