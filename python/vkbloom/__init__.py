@@ -21,6 +21,8 @@ from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
 from vkbloom.grid import reductions
 from vkbloom.grid.checking import GridReport, check_grid
+from vkbloom.grid.curves import response_curves
+from vkbloom.grid.sheet import contact_sheet
 from vkbloom.grid.zarr_grid import grid_to_zarr
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
@@ -56,9 +58,11 @@ __all__ = [
     "ValidationError",
     "adapters",
     "check_grid",
+    "contact_sheet",
     "gaussian_weights",
     "grid_to_zarr",
     "presets",
     "reductions",
     "reference",
+    "response_curves",
 ]

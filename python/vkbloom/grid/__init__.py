@@ -11,8 +11,11 @@ filling, reductions        blocks of points rendered into arrays, and figures of
 memory                     the grid as one Dataset
 zarr_grid                  the grid as a Zarr store
 store, keys, identity      what is in the store, its bytes, and whether it is the same grid again
+image_files                the grid as image files
 checking                   a store looked through
+rendering                  a whole grid into whatever keeps it
 running, cluster           blocks rendered in this process, or by the workers of a Dask cluster
+sheet, curves, views       contact sheets and curves of a Dataset
 progress                   the progress bar
 ========================== ========================================================================
 """

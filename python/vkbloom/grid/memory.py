@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vkbloom.extras import import_extra
-from vkbloom.grid.filling import Filler
+from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import blocks, default_chunk
 from vkbloom.grid.plan import Grid, Layout, attributes_of, lay_out
 from vkbloom.grid.progress import Progress
@@ -62,6 +62,7 @@ def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.D
     }
     filler = Filler(grid, layout, renderer)
     with Progress(math.prod(shape), shown=progress) as shown:
+        shown.add(Tally(ran=layout.ran))
         for block in blocks(shape, chunk_of(grid, layout), layout.ranking):
             views = {name: array[block.slices] for name, array in arrays.items()}
             filler.fill(block, views, shown.add)

@@ -129,6 +129,8 @@ class Layout:
         Bytes of the frames that one point is compared with.
     structural : tuple of int
         The axes that change the passes or the framebuffers that there are.
+    ran : int
+        Passes that ran to find out what the reductions return.
     adapter, driver, version : str
     """
 
@@ -137,6 +139,7 @@ class Layout:
     coordinates: Mapping[str, tuple[NDArray[Any], Mapping[str, str]]]
     reference_size: int
     structural: tuple[int, ...]
+    ran: int
     adapter: str
     driver: str
     version: str
@@ -221,9 +224,10 @@ def lay_out(grid: Grid, renderer: Renderer) -> Layout:
         if len(variable.dims) == 3:
             labels = np.array(_CHANNELS[: variable.shape[2]])
             coordinates[variable.dims[2]] = (labels, {"long_name": "channel"})
-    reference_size = 0
+    reference_size = ran = 0
     if grid.reduce:
         sample = _sample(grid, renderer)
+        ran = len(sample.timings)
         for name, reduction in grid.reduce.items():
             value = _reduced(grid, name, sample)
             variables[name], own = _reduction_variable(name, reduction, value)
@@ -236,6 +240,7 @@ def lay_out(grid: Grid, renderer: Renderer) -> Layout:
         coordinates=coordinates,
         reference_size=reference_size,
         structural=structural,
+        ran=ran,
         adapter=renderer.info.name,
         driver=renderer.info.driver_info or renderer.info.driver,
         version=_version(),
@@ -409,6 +414,7 @@ def attributes_of(grid: Grid, layout: Layout) -> dict[str, Any]:
         "adapter": layout.adapter,
         "driver": layout.driver,
         "version": layout.version,
+        "axes": json.dumps([axis.name for axis in grid.axes]),
         "settings": json.dumps(grid.remaining_settings),
         "source": json.dumps({key: value for key, value in facts.items() if key != "sha256"}),
     }

@@ -38,8 +38,15 @@ class Sink(Protocol):
     """What keeps a grid."""
 
     @property
+    def done(self) -> NDArray[np.bool_]:
+        """The points that are there, in the grid's shape."""
+
+    @property
     def writer(self) -> Writer:
         """What can be sent to other processes."""
+
+    def missing(self) -> Iterable[Block]:
+        """Return the blocks that are not done, in the order of visiting."""
 
     def mark(self, written: Iterable[Block]) -> None:
         """Mark points as done; their data are on the disk."""

@@ -29,6 +29,7 @@ from vkbloom.grid.identity import FORMAT, differences, identity
 from vkbloom.grid.keys import Keys
 from vkbloom.grid.order import Block, Index, blocks, default_chunk
 from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of
+from vkbloom.grid.running import Writer
 
 __all__ = [
     "DONE",
@@ -214,7 +215,7 @@ class GridStore:
     ----------
     done : ndarray of bool, shape of the grid
         The points that are safely there.
-    writer : GridWriter
+    writer : Writer
     """
 
     def __init__(self, keys: Keys, grid: Grid, layout: Layout, chunk: Index) -> None:
@@ -223,9 +224,14 @@ class GridStore:
         self.layout = layout
         self.chunk = chunk
         self.done = np.zeros(grid.shape, np.bool_)
-        self.writer = GridWriter(
+        self._chunks = GridWriter(
             keys, {name: len(v.shape) for name, v in layout.variables.items()}, chunk
         )
+
+    @property
+    def writer(self) -> Writer:
+        """What writes blocks, in any process."""
+        return self._chunks
 
     def blocks(self) -> Iterable[Block]:
         """Return all blocks in the order of visiting."""
@@ -333,12 +339,12 @@ class GridStore:
         return mended
 
     def _problem(self, block: Block, held: set[str], *, verify: bool) -> str | None:
-        for name, key in zip(self.writer.trailing, self.writer.keys_of(block), strict=True):
+        for name, key in zip(self._chunks.trailing, self._chunks.keys_of(block), strict=True):
             if key not in held:
                 return f"{key} was missing"
             if verify:
                 try:
-                    self.writer.read(block, name)
+                    self._chunks.read(block, name)
                 except Exception as error:
                     return f"{key} was damaged ({reason(error)})"
         return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,11 +14,10 @@ from vkbloom.grid.identity import FORMAT
 from vkbloom.grid.keys import Keys, open_keys
 from vkbloom.grid.memory import chunk_of
 from vkbloom.grid.order import Index
-from vkbloom.grid.plan import Grid, Layout, ask, lay_out
-from vkbloom.grid.progress import Progress
-from vkbloom.grid.running import run_here
+from vkbloom.grid.plan import Grid, Layout, ask
+from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.store import IDENTITY, ROOT, GridStore, read_json
-from vkbloom.renderer import Renderer, Shading
+from vkbloom.renderer import Shading
 from vkbloom.settings import Settings
 
 if TYPE_CHECKING:
@@ -113,41 +111,22 @@ def grid_to_zarr(
     )
     if "done" in (axis.name for axis in grid.axes):
         raise ValueError("axes: 'done' is the name of the marks of the points")
-    with ExitStack() as stack:
-        renderer: Renderer | None = None
-        if client is None:
-            renderer = stack.enter_context(Renderer(adapter, validation=validation))
-            layout = lay_out(grid, renderer)
-        else:
-            from vkbloom.grid import cluster  # noqa: PLC0415  Dask is optional
+    if client is not None and not keys.is_shared:
+        raise ValueError("store: other processes cannot write to a store in memory")
 
-            cluster.check_client(client)
-            if not keys.is_shared:
-                raise ValueError("store: other processes cannot write to a store in memory")
-            layout = cluster.lay_out_there(client, grid, adapter, validation)
+    def prepared(layout: Layout) -> GridStore:
         kept = GridStore(keys, grid, layout, _chunk(grid, layout, chunks, keys))
         for text in kept.prepare(resume=resume, verify=verify):
             if on_mended is not None:
                 on_mended(text)
-        done = int(kept.done.sum())
-        shown = stack.enter_context(Progress(kept.done.size, done, shown=progress))
-        if renderer is not None:
-            run_here(grid, layout, kept, kept.missing(), renderer=renderer, progress=shown)
-        elif client is not None:
-            cluster.run_there(
-                client,
-                grid,
-                layout,
-                kept,
-                kept.missing(),
-                progress=shown,
-                missing=kept.done.size - done,
-                adapter=adapter,
-                validation=validation,
-            )
+        return kept
+
+    tally = render_grid(
+        grid, prepared, client=client, adapter=adapter, validation=validation, progress=progress
+    )
     dataset: xarray.Dataset = xr.open_zarr(keys.store)
     dataset.attrs.pop(IDENTITY, None)
-    return dataset.assign_attrs(passes_run=shown.tally.ran, passes_saved=shown.tally.saved)
+    return dataset.assign_attrs(passes_run=tally.ran, passes_saved=tally.saved)
 
 
 def _chunk(grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys) -> Index:
