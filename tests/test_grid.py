@@ -5,7 +5,10 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,8 @@ from framebuffers import noise
 
 import vkbloom
 from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, Settings, reductions
-from vkbloom.grid.filling import Tally
+from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.order import blocks
 from vkbloom.grid.plan import Grid, PassCounter, ask, lay_out
 from vkbloom.grid.progress import Progress
 
@@ -367,6 +371,19 @@ class TestReduce:
             assert dataset["fixed"].values[place] == reductions.PSNR(against=at_fixed)(frames)
         assert np.isinf(dataset["same"].values[:, :, 1]).all()
 
+    def test_few_frames_to_compare_with_are_held(self, renderer: Renderer, image: Any) -> None:
+        reduce = {"p": reductions.PSNR(against={"blur_scale": 1.0})}
+        grid = ask_for(image, {"exposure": [0, 1, 2], "blur_scale": [1, 2]}, reduce=reduce)
+        layout = lay_out(grid, renderer)
+        filler = Filler(grid, layout, renderer)
+        for block in blocks(grid.shape, (1, 2), layout.ranking):
+            arrays = {
+                name: np.empty((*block.shape, *variable.shape), variable.dtype)
+                for name, variable in layout.variables.items()
+            }
+            filler.fill(block, arrays)
+            assert len(filler._held) == 1
+
     @pytest.mark.parametrize(
         ("against", "told"),
         [({"blur_scale": 3.0}, "3.0 is not a value of the grid"), ({"knee": 0}, "not an axis")],
@@ -378,6 +395,24 @@ class TestReduce:
             renderer.grid(
                 image, None, {"blur_scale": [1.0]}, reduce={"s": reductions.SSIM(against=against)}
             )
+
+
+class TestExtras:
+    @pytest.mark.parametrize("missing", ["xarray", "zarr", "dask.array"])
+    def test_what_is_missing_is_named(
+        self, image: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str
+    ) -> None:
+        monkeypatch.setitem(sys.modules, missing, None)
+        with pytest.raises(ModuleNotFoundError, match=rf"{missing}: pip install vkbloom\[grid\]"):
+            vkbloom.grid_to_zarr(image, None, {"exposure": [0]}, tmp_path / "a.zarr")
+        assert not (tmp_path / "a.zarr").exists()
+
+    def test_importing_the_package_needs_none(self) -> None:
+        code = (
+            "import sys; sys.modules.update(dict.fromkeys(['xarray', 'zarr', 'dask', 'distributed',"
+            " 'matplotlib', 'tqdm'])); import vkbloom"
+        )
+        subprocess.run([sys.executable, "-c", code], check=True)
 
 
 class TestProgress:

@@ -329,9 +329,10 @@ def damage_truncated(store: Path) -> None:
 
 
 def damage_flipped(store: Path) -> None:
-    path = store / "energy" / "c.0.1.1.0"
+    path = store / "final" / "c.0.1.1.0.0.0"
     content = bytearray(path.read_bytes())
-    content[9] ^= 1
+    # Among the values, where nothing but the checksum can tell.
+    content[len(content) // 2] ^= 1
     path.write_bytes(content)
 
 
@@ -372,7 +373,7 @@ class TestDamaged:
         ("damage", "told"),
         [
             (damage_truncated, f"final/c.0.1.1.0.0.0 is damaged .*, of {NAMED}"),
-            (damage_flipped, f"energy/c.0.1.1.0 is damaged .*, of {NAMED}"),
+            (damage_flipped, f"final/c.0.1.1.0.0.0 is damaged .*, of {NAMED}"),
             (damage_missing, f"mean/c.0.1.1 is missing, of {NAMED}"),
             (damage_metadata, "bloom/zarr.json is missing, of all points"),
             (damage_half_metadata, "final/zarr.json is damaged, of all points"),

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
-from vkbloom._core import DeviceLostError
+from vkbloom._core import DeviceLostError, Error
 from vkbloom.extras import import_extra
 from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import Block
@@ -201,6 +201,8 @@ def run_there(
 
     Raises
     ------
+    Error
+        Every worker that took a run died.
     Exception
         What a run failed with after some more tries; other runs that were done are kept.
     """
@@ -230,8 +232,10 @@ def run_there(
             take(future)
             # Workers may come and go.
             submit(_AHEAD * max(1, len(client.nthreads())) - len(under_way))
-    except BaseException:
+    except BaseException as error:
         _stop(client, under_way, take)
+        if isinstance(error, distributed.KilledWorker):
+            raise Error(f"too many workers died: {error}") from error
         raise
     finally:
         client.unregister_worker_plugin(_PLUGIN)

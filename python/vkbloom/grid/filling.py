@@ -100,12 +100,15 @@ class Filler:
         if self._references:
             total.add(Tally(ran=self._hold_references(order)))
             on_point(total)
+        # Before the points, as a renderer may be at work on some ahead of those it has given.
+        alone = [self._counter.alone(index) for index in order]
         path = (grid.point(index) for index in order)
-        for index, frames in visit(self._renderer, grid.source, path, grid.wanted):
+        found = visit(self._renderer, grid.source, path, grid.wanted)
+        for (index, frames), passes in zip(found, alone, strict=True):
             place = tuple(i - start for i, start in zip(index, block.start, strict=True))
             for name, array in arrays.items():
                 self._put(name, index, frames, array, place)
-            count = Tally(1, len(frames.timings), self._counter.alone(index))
+            count = Tally(1, len(frames.timings), passes)
             total.add(count)
             on_point(count)
         return total

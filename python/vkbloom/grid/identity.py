@@ -40,7 +40,7 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
         "version": layout.version,
         "adapter": layout.adapter,
         "driver": layout.driver,
-        "source": grid.source.describe(),
+        "source": grid.source.description,
         "settings": grid.remaining_settings,
         "axes": {axis.name: axis.values for axis in grid.axes},
         "order of axes": [axis.name for axis in grid.axes],

@@ -409,7 +409,7 @@ def _reduction_variable(
 
 def attributes_of(grid: Grid, layout: Layout) -> dict[str, Any]:
     """Return the attributes that a Dataset of the grid has."""
-    facts = {key: value for key, value in grid.source.describe().items() if key != "images"}
+    facts = {key: value for key, value in grid.source.description.items() if key != "images"}
     return {
         "adapter": layout.adapter,
         "driver": layout.driver,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import itertools
 import math
@@ -116,8 +117,9 @@ class ImageSource:
         height, width = self.images[int(place)].shape[:2]
         return width, height
 
-    def describe(self) -> dict[str, Any]:
-        """Return shapes, dtypes and digests."""
+    @functools.cached_property
+    def description(self) -> dict[str, Any]:
+        """What identifies the source: shapes, dtypes and digests."""
         return {
             "kind": "image",
             "images": [
@@ -170,8 +172,9 @@ class SceneSource:
         """Return (width, height) of the frame."""
         return self.size
 
-    def describe(self) -> dict[str, Any]:
-        """Return size, shading, time and a digest of the scene."""
+    @functools.cached_property
+    def description(self) -> dict[str, Any]:
+        """What identifies the source: size, shading, time and a digest of the scene."""
         return {
             "kind": "scene",
             "sha256": digest(self.scene),
