@@ -19,6 +19,11 @@ from vkbloom._core import (
 )
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.frames import Frames
+from vkbloom.grid import reductions
+from vkbloom.grid.checking import GridReport, check_grid
+from vkbloom.grid.curves import response_curves
+from vkbloom.grid.sheet import contact_sheet
+from vkbloom.grid.zarr_grid import grid_to_zarr
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
@@ -38,6 +43,7 @@ __all__ = [
     "Error",
     "FilamentBloom",
     "Frames",
+    "GridReport",
     "HdrpBloom",
     "KinoBloom",
     "OutOfMemoryError",
@@ -51,7 +57,12 @@ __all__ = [
     "UrpBloom",
     "ValidationError",
     "adapters",
+    "check_grid",
+    "contact_sheet",
     "gaussian_weights",
+    "grid_to_zarr",
     "presets",
+    "reductions",
     "reference",
+    "response_curves",
 ]

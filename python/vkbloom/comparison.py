@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
@@ -14,7 +14,10 @@ from vkbloom.extras import import_extra
 from vkbloom.settings import check_number
 from vkbloom.srgb import decode_srgb
 
-__all__ = ["Comparison", "Limits", "compare", "difference"]
+__all__ = ["METRICS", "Comparison", "Limits", "compare", "difference"]
+
+#: What `compare` computes beside the errors.
+METRICS: Final = ("ssim", "psnr", "flip")
 
 _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
 # Taps to a side of scikit-image's default window.
@@ -198,6 +201,7 @@ def compare(
     threshold: float = 0.0,
     allow_nan: bool = False,
     data_range: float | None = None,
+    metrics: Sequence[str] = METRICS,
 ) -> Comparison:
     """Compare two images.
 
@@ -214,6 +218,9 @@ def compare(
     data_range : float, optional
         Of SSIM and PSNR. By default 1 for integers, and for floats what their values span
         together with 0 and 1, so that images within 0..1 have 1.
+    metrics : sequence of str
+        Which of SSIM, PSNR and FLIP to compute, under their names in `Comparison`; the others
+        are left None.
 
     Returns
     -------
@@ -229,10 +236,13 @@ def compare(
         An image is no array of one of these types.
     ValueError
         An image has another number of dimensions or no pixel, `threshold` or `data_range` is out
-        of range.
+        of range, or `metrics` names something else.
     ModuleNotFoundError
-        scikit-image or OpenImageIO is missing.
+        scikit-image (for SSIM and PSNR) or OpenImageIO (for FLIP) is missing.
     """
+    for name in metrics:
+        if name not in METRICS:
+            raise ValueError(f"metrics: {name!r} is not one of {', '.join(METRICS)}")
     check_number("threshold", threshold, 0.0, math.inf)
     if data_range is not None and not 0 < data_range < math.inf:
         raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
@@ -242,7 +252,7 @@ def compare(
         return Comparison(
             mismatches=mismatches,
             threshold=threshold,
-            not_computed=dict.fromkeys(("ssim", "psnr", "flip"), "the images are no match"),
+            not_computed=dict.fromkeys(metrics, "the images are no match"),
         )
     pair = _pair(a, b)
     unequal, common = pair.unequal, ~pair.valid & ~pair.unequal
@@ -252,7 +262,7 @@ def compare(
         mismatches += (f"NaN or infinity in both images, {_places(common)}",)
     if data_range is None:
         data_range = 1.0 if pair.is_integer else _span(pair)
-    computed, not_computed = _metrics(pair, data_range)
+    computed, not_computed = _metrics(pair, data_range, metrics)
     over = (pair.error > threshold) | unequal
     place, values = _largest(pair)
     is_any = bool(pair.valid.any())
@@ -386,53 +396,58 @@ def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, flo
     return (x, y, channel), (float(pair.a[index]), float(pair.b[index]))
 
 
-def _metrics(pair: _Pair, data_range: float) -> tuple[dict[str, float], dict[str, str]]:
+def _metrics(
+    pair: _Pair, data_range: float, wanted: Sequence[str]
+) -> tuple[dict[str, float], dict[str, str]]:
     """Return the metrics that can be computed, and why the others cannot, by their names."""
     computed: dict[str, float] = {}
     reasons: dict[str, str] = {}
-    metrics = import_extra("skimage.metrics", "quality", "Comparing images")
-    oiio = import_extra("OpenImageIO", "images", "Comparing images")
-    # Extreme floats end in a figure that is not finite, which is looked at below.
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        if min(pair.a.shape[:2]) < _SSIM_WINDOW:
-            reasons["ssim"] = f"a side is under the window's {_SSIM_WINDOW} pixels"
-        else:
-            computed["ssim"] = float(
-                metrics.structural_similarity(
-                    pair.a,
-                    pair.b,
-                    win_size=_SSIM_WINDOW,
-                    data_range=data_range,
-                    channel_axis=-1,
-                )
-            )
-        if not pair.valid.any():
-            reasons["psnr"] = "no values to compare"
-        elif not pair.error.any():
-            computed["psnr"] = math.inf
-        else:
-            computed["psnr"] = float(
-                metrics.peak_signal_noise_ratio(
-                    pair.a[pair.valid], pair.b[pair.valid], data_range=data_range
-                )
-            )
-    if hasattr(oiio.ImageBufAlgo, "FLIP_diff"):
-        computed["flip"] = _flip(oiio, pair)
-    else:
-        reasons["flip"] = "OpenImageIO 3.2 is needed"
-    for name, value in list(computed.items()):
-        if math.isnan(value) or value == -math.inf:
+    for name in wanted:
+        # Extreme floats end in a figure that is not finite.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            value = _METRICS[name](pair, data_range)
+        if isinstance(value, str):
+            reasons[name] = value
+        elif math.isnan(value) or value == -math.inf:
             reasons[name] = "the values are too large"
-            del computed[name]
+        else:
+            computed[name] = value
     return computed, reasons
 
 
-def _flip(oiio: Any, pair: _Pair) -> float:
-    """Return the mean of OpenImageIO's FLIP.
+def _ssim(pair: _Pair, data_range: float) -> float | str:
+    metrics = import_extra("skimage.metrics", "quality", "Comparing images")
+    if min(pair.a.shape[:2]) < _SSIM_WINDOW:
+        return f"a side is under the window's {_SSIM_WINDOW} pixels"
+    return float(
+        metrics.structural_similarity(
+            pair.a, pair.b, win_size=_SSIM_WINDOW, data_range=data_range, channel_axis=-1
+        )
+    )
+
+
+def _psnr(pair: _Pair, data_range: float) -> float | str:
+    metrics = import_extra("skimage.metrics", "quality", "Comparing images")
+    if not pair.valid.any():
+        return "no values to compare"
+    if not pair.error.any():
+        return math.inf
+    return float(
+        metrics.peak_signal_noise_ratio(
+            pair.a[pair.valid], pair.b[pair.valid], data_range=data_range
+        )
+    )
+
+
+def _flip(pair: _Pair, data_range: float) -> float | str:
+    """Return the mean of OpenImageIO's FLIP, whose range is fixed.
 
     Sources: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020;
     "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021.
     """
+    oiio = import_extra("OpenImageIO", "images", "Comparing images")
+    if not hasattr(oiio.ImageBufAlgo, "FLIP_diff"):
+        return "OpenImageIO 3.2 is needed"
     colours = 3 if pair.a.shape[2] >= 3 else 1
     largest = np.finfo(np.float32).max
     buffers = []
@@ -444,3 +459,8 @@ def _flip(oiio: Any, pair: _Pair) -> float:
         buffers.append(oiio.ImageBuf(np.repeat(limited, 3 // colours, axis=2)))
     errors = oiio.ImageBufAlgo.FLIP_diff(*buffers, hdr=0 if pair.is_integer else 1)
     return float(errors.get_pixels().mean(dtype=np.float64))
+
+
+_METRICS: Final[Mapping[str, Callable[[_Pair, float], float | str]]] = dict(
+    zip(METRICS, (_ssim, _psnr, _flip), strict=True)
+)

@@ -126,7 +126,7 @@ def _cross(scene: Scene) -> str:
     for name, place, face in zip(
         ("+x", "-x", "+y", "-y", "+z", "-z"), _CROSS, small.astype(np.uint8), strict=True
     ):
-        data = base64.b64encode(pictures._png(np.ascontiguousarray(face))).decode("ascii")
+        data = base64.b64encode(pictures.png(np.ascontiguousarray(face))).decode("ascii")
         cells.append(
             f'<img src="data:image/png;base64,{data}" alt="sky {name}" title="{name}" '
             f'style="grid-area:{place};width:{_FACE_SIDE}px;height:{_FACE_SIDE}px;margin:0">'

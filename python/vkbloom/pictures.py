@@ -22,7 +22,16 @@ from vkbloom.srgb import encode_srgb
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
 
-__all__ = ["contact_sheet_html", "contact_sheet_png", "leading_png"]
+__all__ = [
+    "contact_sheet_html",
+    "contact_sheet_png",
+    "in_range",
+    "labelled",
+    "leading_png",
+    "png",
+    "scaled",
+    "shown_picture",
+]
 
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
 
@@ -45,7 +54,7 @@ def leading_png(frames: Frames) -> bytes:
     bytes
         An 8-bit PNG file of 1, 3 or 4 channels, of the framebuffer's size.
     """
-    return _png(_picture(frames, leading(frames)))
+    return png(_picture(frames, leading(frames)))
 
 
 def contact_sheet_html(frames: Frames) -> str:
@@ -75,8 +84,8 @@ def contact_sheet_html(frames: Frames) -> str:
         height, width = array.shape[:2]
         shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
         stops = _viewing_stops(frames, name)
-        picture = _picture(frames, name, _scaled(width, height, shrink), stops)[:, :, :3]
-        data = base64.b64encode(_png(picture)).decode("ascii")
+        picture = _picture(frames, name, scaled(width, height, shrink), stops)[:, :, :3]
+        data = base64.b64encode(png(picture)).decode("ascii")
         # An enlarged level of a pyramid shall show its pixels.
         rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
         label, size = html.escape(name), html.escape(_described(array) + _ranged(array))
@@ -151,8 +160,8 @@ def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> byt
     ValueError
         If `columns` or `width` is out of range, or `frames` is empty.
     """
-    columns = _in_range("columns", columns, 1, 32)
-    width = _in_range("width", width, 128, 4096)
+    columns = in_range("columns", columns, 1, 32)
+    width = in_range("width", width, 128, 4096)
     if not frames:
         raise ValueError("frames: a contact sheet needs one framebuffer at least")
     columns = min(columns, len(frames))
@@ -176,20 +185,28 @@ def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> byt
         left = gap + column * (width + gap)
         top = gap + 2 * text + row * (height + caption + gap)
         fit = min(width / array.shape[1], height / array.shape[0])
-        picture = _picture(frames, name, _scaled(array.shape[1], array.shape[0], fit))[:, :, :3]
+        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))[:, :, :3]
         y = top + (height - picture.shape[0]) // 2
         x = left + (width - picture.shape[1]) // 2
         sheet[top : top + height, left : left + width] = 40
         sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
         baseline = top + height + text + text // 4
         labels += [(left, baseline, name), (left, baseline + text + 2, _described(array))]
-    return _png(_labelled(sheet, labels, text))
+    return png(labelled(sheet, labels, text))
 
 
-def _labelled(
+def labelled(
     sheet: NDArray[np.uint8], labels: Iterable[tuple[int, int, str]], size: int
 ) -> NDArray[np.uint8]:
-    """Draw texts at (x, baseline y), in light grey; without a font, leave them out."""
+    """Draw texts at (x, baseline y), in light grey; without a font, leave them out.
+
+    Parameters
+    ----------
+    sheet : ndarray, shape (H, W, 3)
+    labels : iterable of (int, int, str)
+    size : int
+        Of the letters, in pixels.
+    """
     try:
         oiio = import_extra("OpenImageIO", "images", "A labelled contact sheet")
     except ModuleNotFoundError as error:
@@ -207,11 +224,36 @@ def _labelled(
 def _picture(
     frames: Frames, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
 ) -> NDArray[np.uint8]:
-    """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height).
+    is_encoded = frames.settings.encoding != "none"
+    return shown_picture(frames[name], name, size, is_encoded=is_encoded, stops=stops)
 
-    Colours of light are multiplied by 2**stops.
+
+def shown_picture(
+    array: NDArray[Any],
+    name: str,
+    size: tuple[int, int] | None = None,
+    *,
+    is_encoded: bool,
+    stops: float = 0.0,
+) -> NDArray[np.uint8]:
+    """Return a framebuffer as an 8-bit picture, shown as in `leading_png`.
+
+    Parameters
+    ----------
+    array : ndarray, shape (H, W, C) or (H, W)
+    name : str
+        Of the framebuffer.
+    size : (int, int), optional
+        Width and height that the picture shall have; by default those of the array.
+    is_encoded : bool
+        Whether `final` has an encoding already.
+    stops : float, default 0
+        Exposure that colours of light in floats are shown with; others are shown as they are.
+
+    Returns
+    -------
+    ndarray, shape (H, W, C)
     """
-    array = frames[name]
     values = np.atleast_3d(array).astype(np.float32)
     linear = False
     if array.dtype == np.uint8:
@@ -226,7 +268,7 @@ def _picture(
         if stops != 0:
             values[:, :, :3] *= np.float32(2.0**stops)
         shown = _clipped(values)
-        linear = name != "final" or frames.settings.encoding == "none"
+        linear = name != "final" or not is_encoded
     if size is not None:
         shown = _resized(shown, *size)
     if linear:
@@ -275,7 +317,8 @@ def _described(array: NDArray[Any]) -> str:
     return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}"
 
 
-def _in_range(field: str, value: int, low: int, high: int) -> int:
+def in_range(field: str, value: int, low: int, high: int) -> int:
+    """Return a whole number, else raise TypeError or ValueError that names the field."""
     try:
         index = operator.index(value)
     except TypeError:
@@ -301,7 +344,8 @@ def _stretched(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return _clipped((np.clip(values, low, high) - low) / span)
 
 
-def _scaled(width: int, height: int, factor: float) -> tuple[int, int]:
+def scaled(width: int, height: int, factor: float) -> tuple[int, int]:
+    """Return a size times a factor, of at least one pixel a side."""
     return max(1, round(width * factor)), max(1, round(height * factor))
 
 
@@ -319,11 +363,11 @@ def _resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.
     return image
 
 
-def _png(pixels: NDArray[np.uint8]) -> bytes:
+def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
     """Encode an (H, W, C) picture of 1, 3 or 4 channels as PNG (W3C PNG specification).
 
     Here so that notebooks show pictures with nothing but NumPy installed; files that users
-    save are written by OpenImageIO.
+    save are written by OpenImageIO. `level` is zlib's, 1 (quick) to 9 (small).
     """
     height, width, channels = pixels.shape
     rows = pixels.reshape(height, width * channels)
@@ -334,7 +378,7 @@ def _png(pixels: NDArray[np.uint8]) -> bytes:
     colour_type = {1: 0, 3: 2, 4: 6}[channels]
     chunks = (
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)),
-        (b"IDAT", zlib.compress(filtered.tobytes())),
+        (b"IDAT", zlib.compress(filtered.tobytes(), level)),
         (b"IEND", b""),
     )
     return b"\x89PNG\r\n\x1a\n" + b"".join(
