@@ -18,6 +18,7 @@ from vkbloom._core import (
     ValidationError,
 )
 from vkbloom.adapter import AdapterInfo, adapters
+from vkbloom.explorer import explore
 from vkbloom.frames import Frames
 from vkbloom.grid import reductions
 from vkbloom.grid.checking import GridReport, check_grid
@@ -59,6 +60,7 @@ __all__ = [
     "adapters",
     "check_grid",
     "contact_sheet",
+    "explore",
     "gaussian_weights",
     "grid_to_zarr",
     "presets",

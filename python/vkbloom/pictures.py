@@ -29,6 +29,7 @@ __all__ = [
     "labelled",
     "leading_png",
     "png",
+    "resized",
     "scaled",
     "shown_picture",
 ]
@@ -270,7 +271,7 @@ def shown_picture(
         shown = _clipped(values)
         linear = name != "final" or not is_encoded
     if size is not None:
-        shown = _resized(shown, *size)
+        shown = resized(shown, *size)
     if linear:
         shown[:, :, :3] = encode_srgb(shown[:, :, :3])
     picture: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
@@ -349,7 +350,7 @@ def scaled(width: int, height: int, factor: float) -> tuple[int, int]:
     return max(1, round(width * factor)), max(1, round(height * factor))
 
 
-def _resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
+def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
     """Average groups of pixels where an (H, W, C) image shrinks, repeat them where it grows."""
     for axis, wanted in ((0, height), (1, width)):
         count = image.shape[axis]

@@ -1,0 +1,104 @@
+"""``vkbloom explore``: the page of `vkbloom.explore`, without a notebook."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import webbrowser
+from collections.abc import Callable
+from typing import Any, Final
+
+import click
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import SIZE
+from vkbloom.cli.image_files import read_picture, subimage_option
+from vkbloom.cli.program import blaming_the_call, given
+from vkbloom.cli.scene_options import scene_options
+from vkbloom.cli.settings_options import settings_options
+from vkbloom.explorer.session import Session
+from vkbloom.extras import import_extra
+from vkbloom.renderer import SHADINGS, Shading
+
+_LARGEST_PORT: Final = 65535
+
+
+@click.command()
+@click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
+@click.option(
+    "--port",
+    type=click.IntRange(0, _LARGEST_PORT),
+    default=0,
+    show_default="any that is free",
+    help="Of 127.0.0.1, to listen on.",
+)
+@click.option("--open/--no-open", "opens", default=True, help="Whether to open a browser.")
+@click.option(
+    "--size",
+    type=SIZE,
+    default="1280x720",
+    show_default=True,
+    help="A scene's own size and aspect; it is rendered as large as it is shown.",
+)
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
+@subimage_option
+@device_options
+@scene_options
+@settings_options
+def command(
+    *,
+    source: str | None,
+    port: int,
+    opens: bool,
+    size: tuple[int, int],
+    shading: Shading,
+    subimage: int,
+    adapter: str,
+    validation: bool,
+    scene: Callable[[], vkbloom.Scene],
+    settings: vkbloom.Settings,
+) -> None:
+    """Look at the bloom of IMAGE, or of a scene, in a browser while its settings change.
+
+    The page is served on 127.0.0.1, to whoever knows its address, until Ctrl-C. Colours of IMAGE
+    are decoded as by vkbloom apply.
+    """
+    import_extra("tornado", "notebook", "explore")
+    if source is not None and (given("base") or given("shading") or given("size")):
+        raise click.UsageError("--scene, --shading and --size do not go with an IMAGE")
+    looked_at: vkbloom.Scene | NDArray[Any] = (
+        scene() if source is None else read_picture(source, subimage, None).pixels
+    )
+    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+
+        def new_session() -> Session:
+            return Session(looked_at, settings, size=size, shading=shading, renderer=renderer)
+
+        with blaming_the_call():
+            # What is wrong with the arguments is said here, not on the page.
+            new_session()
+        click.echo(f"Rendering on {renderer.info.summary}")
+        with contextlib.suppress(KeyboardInterrupt):
+            asyncio.run(_serve(new_session, port, opens))
+
+
+async def _serve(new_session: Callable[[], Session], port: int, opens: bool) -> None:
+    # Needs tornado, whose absence `command` has explained.
+    from vkbloom.explorer.server import Server  # noqa: PLC0415
+
+    server = Server(new_session, port)
+    stopped = asyncio.Event()
+    # Without a handler of its own, Ctrl-C would come between the loop's own steps.
+    with contextlib.suppress(NotImplementedError):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+    click.echo(f"{server.url}\nCtrl-C stops it.")
+    if opens:
+        webbrowser.open(server.url)
+    try:
+        await stopped.wait()
+    finally:
+        await server.stop()

@@ -1,0 +1,197 @@
+"""What can be set on the page: controls made from the settings' fields; settings as code."""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Mapping
+from typing import Any, Final, Literal
+
+from vkbloom import _core
+from vkbloom.descriptions import described_parameters
+from vkbloom.presets import presets
+from vkbloom.settings import Settings
+
+__all__ = ["METHODS", "as_code", "controls", "settings_from"]
+
+#: The settings of each method, by its name.
+METHODS: Final[dict[str, type[Settings]]] = {
+    kind.method: kind for kind in Settings.__subclasses__()
+}
+
+# Where a slider ends, of fields whose range is wider than what one looks at. A method's own come
+# before those of the field; the number beside the slider takes the whole range.
+_SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
+    "threshold": (0, 4),
+    "intensity": (0, 4),
+    "bevy.intensity": (0, 1),
+    "filament.intensity": (0, 1),
+    "hdrp.intensity": (0, 1),
+    "exposure": (-8, 8),
+    "bloom_scale": (0.05, 1),
+    "blur_scale": (0.1, 2),
+    "blur_strength": (0, 4),
+    "radius": (0, 4),
+    "kino.radius": (1, 7),
+    "unreal.radius": (0, 1),
+    "offset": (0, 8),
+    "highlight": (10, 5000),
+    "clamp_max": (0, 100),
+    "smooth_width": (0.01, 1),
+    "max_mip_dimension": (16, 1024),
+    "resolution": (16, 1024),
+    "filament.levels": (1, 12),
+    "levels": (1, 10),
+    "loops": (1, 8),
+    "dither_seed": (0, 100),
+}
+# Of all methods' fields those that stand first, beside the numbers that are a method's own.
+_FIRST: Final = ("bloom", "threshold", "intensity", "exposure", "tonemap")
+_STEPS_OF_A_SLIDER: Final = 200
+
+
+def controls() -> dict[str, Any]:
+    """Describe methods and presets.
+
+    Returns
+    -------
+    dict
+        "methods": by name, the "defaults" and, for each field that has a control, its "name",
+        "kind" ("bool", "number", "choice"), "help", whether it stands "first", and whether it is
+        "optional", which is to say may be None. Numbers have "from", "to" and "step" of their
+        slider, "low" and "high" of what is accepted, and "whole"; choices have "choices".
+        "presets": settings by name, as `Settings.as_dict` gives them.
+    """
+    return {
+        "methods": {
+            name: {"defaults": kind().as_dict(), "fields": _fields(kind)}
+            for name, kind in METHODS.items()
+        },
+        "presets": {name: settings.as_dict() for name, settings in presets.items()},
+    }
+
+
+def _fields(kind: type[Settings]) -> list[dict[str, Any]]:
+    annotations = typing.get_type_hints(kind)
+    texts = described_parameters(Settings) | described_parameters(kind)
+    shared = {field.name for field in dataclasses.fields(Settings)}
+    found = []
+    for field in dataclasses.fields(kind):
+        control = _control(kind, field, annotations[field.name])
+        if control is not None:
+            own = field.name not in shared
+            # Whole numbers of which there are two are rather switches.
+            slides = (
+                control["kind"] == "number" and control["from"] + control["step"] < control["to"]
+            )
+            control |= {
+                "name": field.name,
+                "help": texts.get(field.name, ""),
+                "first": field.name in _FIRST or (own and slides),
+            }
+            found.append((field.name != "bloom", not own, control))
+    # A method's own come first, but for the switch: they are why one chose it.
+    return [control for _, _, control in sorted(found, key=lambda entry: entry[:2])]
+
+
+def _control(
+    kind: type[Settings], field: dataclasses.Field[Any], annotation: Any
+) -> dict[str, Any] | None:
+    """Return the control of a field; None of weights, layers, sizes and what a method refuses."""
+    parts = typing.get_args(annotation)
+    optional = type(None) in parts
+    if optional:
+        (annotation,) = (part for part in parts if part is not type(None))
+    if annotation is bool:
+        return {"kind": "bool"}
+    if typing.get_origin(annotation) is Literal:
+        choices = [
+            choice for choice in typing.get_args(annotation) if _takes(kind, field.name, choice)
+        ]
+        return {"kind": "choice", "choices": choices, "optional": optional}
+    if field.name not in _core.VALUES:
+        return None
+    _, low, high = _core.VALUES[field.name]
+    start, end = _SLIDERS.get(f"{kind.method}.{field.name}", _SLIDERS.get(field.name, (low, high)))
+    if not (_takes(kind, field.name, start) and _takes(kind, field.name, end)):
+        return None
+    whole = annotation is int
+    return {
+        "kind": "number",
+        "optional": optional,
+        "whole": whole,
+        "low": low,
+        "high": high,
+        "from": start,
+        "to": end,
+        "step": 1 if whole else _round_step((end - start) / _STEPS_OF_A_SLIDER),
+    }
+
+
+def _takes(kind: type[Settings], name: str, value: Any) -> bool:
+    """Return whether a method takes a value, all else being its default."""
+    try:
+        kind(**{name: value})
+    except ValueError:
+        return False
+    return True
+
+
+def _round_step(step: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above a step."""
+    for power in range(3, -9, -1):
+        for digit in (5, 2, 1):
+            # The decimal that is meant, not a product near it.
+            if (round_one := float(f"{digit}e{power}")) <= step * (1 + 1e-9):
+                return round_one
+    raise ValueError(f"step: {step!r} is too small")
+
+
+def settings_from(fields: object) -> Settings:
+    """Return the settings that a page asks for.
+
+    Parameters
+    ----------
+    fields : mapping of str to object
+        As `Settings.as_dict` gives them, and JSON keeps them; what is missing is the default.
+
+    Raises
+    ------
+    TypeError, ValueError
+        There is no such method or field, or a value is of another type or out of range.
+    """
+    if not isinstance(fields, Mapping):
+        raise TypeError(f"settings: fields by name are needed, not {type(fields).__name__}")
+    values = dict(fields)
+    method = values.pop("method", None)
+    if not isinstance(method, str) or method not in METHODS:
+        raise ValueError(f"method: {method!r} is not one of {', '.join(METHODS)}")
+    return METHODS[method](**values)
+
+
+def as_code(settings: Settings) -> str:
+    """Return Python that makes some settings, given ``import vkbloom``.
+
+    Parameters
+    ----------
+    settings : Settings
+
+    Returns
+    -------
+    str
+        A preset by its name, else the method with the fields that are not the default.
+    """
+    for name, preset in presets.items():
+        if settings == preset and settings != type(settings)():
+            return f"vkbloom.presets[{name!r}]".replace("'", '"')
+    changed = ", ".join(
+        f"{field.name}={_literal(getattr(settings, field.name))}"
+        for field in dataclasses.fields(settings)
+        if getattr(settings, field.name) != field.default
+    )
+    return f"vkbloom.{type(settings).__name__}({changed})"
+
+
+def _literal(value: object) -> str:
+    # The choices' names need no escapes.
+    return f'"{value}"' if isinstance(value, str) else repr(value)

@@ -1,0 +1,208 @@
+"""The page on a server of its own, for this machine's user alone.
+
+It listens on 127.0.0.1. That keeps other machines out, but neither other users of this machine nor
+other sites in the user's own browser, so that every address has a token in it that nobody can
+guess, requests must name the server as their host (a foreign name that points here does not), and
+the socket must be opened by the page itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import secrets
+import socket
+import struct
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
+from typing import Any, Final
+
+from tornado.httpserver import HTTPServer
+from tornado.httputil import HTTPServerRequest
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from vkbloom.explorer.session import Session
+
+__all__ = ["Server"]
+
+_ADDRESS: Final = "127.0.0.1"
+_FILES: Final = resources.files("vkbloom.explorer")
+_TYPES: Final = {
+    "": ("page.html", "text/html; charset=utf-8"),
+    "page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "start.js": ("start.js", "text/javascript; charset=utf-8"),
+    "page.css": ("page.css", "text/css; charset=utf-8"),
+}
+# Nothing from elsewhere is loaded, and nobody frames the page.
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+# A page's messages are settings: longer ones are no page's.
+_LARGEST_MESSAGE: Final = 1 << 16
+
+
+class Server:
+    """Serves the page until it is stopped.
+
+    Parameters
+    ----------
+    new_session : callable
+        Makes the session of each page that is opened. They may share a renderer.
+    port : int, default 0
+        To listen on; 0: any that is free.
+
+    Attributes
+    ----------
+    url : str
+        Of the page.
+
+    Raises
+    ------
+    OSError
+        The port is taken.
+
+    Notes
+    -----
+    To be made and used in a running event loop.
+    """
+
+    def __init__(self, new_session: Callable[[], Session], port: int = 0) -> None:
+        listening = socket.create_server((_ADDRESS, port))
+        listening.setblocking(False)
+        self.port: int = listening.getsockname()[1]
+        self.token = secrets.token_urlsafe(24)
+        self.url = f"http://{_ADDRESS}:{self.port}/{self.token}/"
+        # One thread: the renderer takes one call at a time.
+        self._worker = ThreadPoolExecutor(1, "vkbloom-explore")
+        shared = {"server": self, "new_session": new_session, "worker": self._worker}
+        self._http = HTTPServer(
+            Application(
+                [
+                    (r"/([^/]+)/socket", _Socket, shared),
+                    (r"/([^/]+)/([a-z.]*)", _File, {"server": self}),
+                ],
+                websocket_max_message_size=_LARGEST_MESSAGE,
+                log_function=lambda handler: None,
+            )
+        )
+        self._http.add_socket(listening)
+
+    def allows(self, request: HTTPServerRequest, token: str) -> bool:
+        """Return whether a request names this server and knows the token."""
+        return request.host in self._hosts and hmac.compare_digest(
+            token.encode(), self.token.encode()
+        )
+
+    def is_origin(self, origin: str) -> bool:
+        """Return whether a page's origin is this server."""
+        return origin in {f"http://{host}" for host in self._hosts}
+
+    @property
+    def _hosts(self) -> set[str]:
+        return {f"{_ADDRESS}:{self.port}", f"localhost:{self.port}"}
+
+    async def stop(self) -> None:
+        """Stop listening and close all pages' sockets."""
+        self._http.stop()
+        await self._http.close_all_connections()
+        self._worker.shutdown()
+
+
+class _File(RequestHandler):
+    """The page and what it is made of."""
+
+    def initialize(self, server: Server) -> None:
+        self._server = server
+
+    def set_default_headers(self) -> None:
+        self.set_header("Content-Security-Policy", _POLICY)
+        self.set_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.set_header("Referrer-Policy", "no-referrer")
+        self.set_header("X-Content-Type-Options", "nosniff")
+        self.set_header("Cache-Control", "no-store")
+        self.clear_header("Server")
+
+    def get(self, token: str, name: str) -> None:
+        if not self._server.allows(self.request, token):
+            raise HTTPError(403)
+        if name not in _TYPES:
+            raise HTTPError(404)
+        file, kind = _TYPES[name]
+        self.set_header("Content-Type", kind)
+        self.finish((_FILES / file).read_bytes())
+
+
+class _Socket(WebSocketHandler):
+    """One page: its newest message is answered, older ones that still wait are dropped."""
+
+    def initialize(
+        self, server: Server, new_session: Callable[[], Session], worker: ThreadPoolExecutor
+    ) -> None:
+        self._server = server
+        self._new_session = new_session
+        self._worker = worker
+        self._waiting: dict[str, dict[str, Any]] = {}
+        self._answers: asyncio.Future[None] | None = None
+
+    def check_origin(self, origin: str) -> bool:
+        return self._server.is_origin(origin)
+
+    def prepare(self) -> None:
+        # A browser always names the origin of who opens a socket; tornado lets those without pass.
+        token, origin = self.path_args[0], self.request.headers.get("Origin", "")
+        if not (self._server.allows(self.request, token) and self.check_origin(origin)):
+            raise HTTPError(403)
+
+    def open(self, *arguments: str) -> None:
+        # Pictures are small messages that somebody waits for.
+        self.set_nodelay(True)
+        self._session = self._new_session()
+
+    def on_message(self, message: str | bytes) -> None:
+        try:
+            asked = json.loads(message)
+            kind = str(asked["kind"])
+        except (ValueError, TypeError, KeyError):
+            self.close(1003, "a message with a kind is needed")
+            return
+        newest = dict(asked)
+        older = self._waiting.get(kind, {}).get("sides")
+        newer = newest.get("sides")
+        if isinstance(older, dict) and isinstance(newer, dict):
+            # A side that the newest leaves out has still not been shown.
+            newest["sides"] = older | newer
+        self._waiting[kind] = newest
+        # Not awaited here, where the next message would not be read until the answer is sent.
+        if self._answers is None or self._answers.done():
+            self._answers = asyncio.ensure_future(self._answer())
+
+    async def _answer(self) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            while self._waiting:
+                asked = self._waiting.pop(next(iter(self._waiting)))
+                header, pictures = await loop.run_in_executor(
+                    self._worker, self._session.answer, asked
+                )
+                await self.write_message(_packed(header, pictures), binary=True)
+        except WebSocketClosedError:
+            self._waiting.clear()
+        except Exception:
+            # Not one of those that a session answers with: the page shall not wait for ever.
+            self.close(1011, "the server failed")
+            raise
+
+    def on_close(self) -> None:
+        self._waiting.clear()
+
+
+def _packed(header: dict[str, Any], buffers: list[bytes]) -> bytes:
+    """Return a message: the header's length (uint32, little-endian), the header, the buffers."""
+    text = json.dumps(
+        {**header, "buffers": [len(buffer) for buffer in buffers]}, allow_nan=False
+    ).encode()
+    return b"".join([struct.pack("<I", len(text)), text, *buffers])

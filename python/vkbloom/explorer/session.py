@@ -1,0 +1,260 @@
+"""One viewer of a source: takes the messages of a page, gives pictures and values.
+
+The same for a notebook and for a page of its own; what carries the messages is none of its
+concern. Messages are plain values that JSON can hold:
+
+======== ============================================= =========================================
+kind     asked                                         answered
+======== ============================================= =========================================
+setup                                                  controls, both sides' settings, source
+frame    sides: settings of "a", "b" or both;          of each side: a picture (a buffer), the
+         framebuffer, size, time, stops; at            framebuffer's facts, settings as code, the
+                                                       values under the pointer; or an error
+probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
+======== ============================================= =========================================
+
+``view`` and ``id`` come back as they were sent. A page asks for its next frame when it has the one
+before, so that between the two only the newest change counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom.explorer.controls import as_code, controls, settings_from
+from vkbloom.explorer.shown import picture_of, reduced, texts_of
+from vkbloom.renderer import SHADINGS, Renderer, _check_image, _check_settings
+from vkbloom.settings import check_number, check_size
+
+if TYPE_CHECKING:
+    from vkbloom.frames import Frames
+    from vkbloom.renderer import Shading
+    from vkbloom.scene import Scene
+    from vkbloom.settings import Settings
+
+__all__ = ["SIDES", "Session"]
+
+SIDES: Final = ("a", "b")
+
+_LARGEST_SIDE: Final = 8192
+# Views come without taking leave; what the pointer needs of more than these is forgotten.
+_VIEWS_KEPT: Final = 8
+_FAILURES: Final = (_core.Error, TypeError, ValueError, MemoryError)
+
+Answer = tuple[dict[str, Any], list[bytes]]
+
+
+class Session:
+    """A source and the two settings that it is looked at with.
+
+    Parameters
+    ----------
+    source, settings, against, size, shading, renderer
+        As for `vkbloom.explore`.
+    adapter : str
+        Of the renderer, where none is given.
+
+    Attributes
+    ----------
+    settings : dict of str to Settings
+        Of the sides "a" and "b".
+    frames : dict of str to Frames
+        The latest of each side that was shown.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `vkbloom.explore`.
+    """
+
+    def __init__(
+        self,
+        source: Scene | NDArray[Any],
+        settings: Settings | None = None,
+        *,
+        against: Settings | None = None,
+        size: tuple[int, int] = (1280, 720),
+        shading: Shading = "forward",
+        renderer: Renderer | None = None,
+        adapter: str = "auto",
+    ) -> None:
+        from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+        begun = _check_settings(settings)
+        self.settings: dict[str, Settings] = {
+            "a": begun,
+            "b": begun.replace(bloom=False) if against is None else _check_settings(against),
+        }
+        if shading not in SHADINGS:
+            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+        self._shading: Shading = shading
+        if isinstance(source, Scene):
+            self._scene: Scene | None = source
+            self._own_size = check_size("size", size)
+        else:
+            self._scene = None
+            # A copy, since the page may ask for it long after the caller has changed it.
+            self._image = np.array(_check_image(source), order="C")
+            self._own_size = (source.shape[1], source.shape[0])
+            self._reduced = (self._own_size, self._image)
+        if renderer is not None and renderer.closed:
+            raise ValueError("renderer: it is closed")
+        self.renderer = Renderer(adapter) if renderer is None else renderer
+        self._owned = renderer is None
+        self.frames: dict[str, Frames] = {}
+        self._shown: dict[object, dict[str, NDArray[Any]]] = {}
+
+    def close(self) -> None:
+        """Close the renderer, unless it was given; may be called twice."""
+        if self._owned:
+            self.renderer.close()
+
+    def answer(self, message: object) -> Answer:
+        """Return what a message asks for.
+
+        Parameters
+        ----------
+        message : mapping of str to object
+            See the table above.
+
+        Returns
+        -------
+        (dict, list of bytes)
+            The answer and its pictures; ``{"kind": "error", "error": ...}`` where the message
+            makes no sense.
+        """
+        kinds = {"setup": self._setup, "frame": self._frame, "probe": self._probe}
+        kind = message.get("kind") if isinstance(message, Mapping) else None
+        if not isinstance(message, Mapping) or not isinstance(kind, str) or kind not in kinds:
+            return {"kind": "error", "error": f"message: {message!r:.80} is not understood"}, []
+        try:
+            body, buffers = kinds[kind](message)
+        except _FAILURES as error:
+            kind, body, buffers = "error", {"error": _described(error)}, []
+        return {"kind": kind, "view": message.get("view"), "id": message.get("id"), **body}, buffers
+
+    def _setup(self, message: Mapping[str, Any]) -> Answer:
+        return {
+            **controls(),
+            "sides": {side: settings.as_dict() for side, settings in self.settings.items()},
+            "animated": self._scene is not None,
+            "own_size": self._own_size,
+            "adapter": self.renderer.info.summary,
+        }, []
+
+    def _frame(self, message: Mapping[str, Any]) -> Answer:
+        asked = message.get("sides")
+        if not isinstance(asked, Mapping) or not set(asked) <= set(SIDES):
+            raise ValueError(f"sides: {asked!r:.80} are not settings of a or b")
+        size = message.get("size")
+        size = self._own_size if size is None else check_size("size", size)
+        size = (min(size[0], _LARGEST_SIDE), min(size[1], _LARGEST_SIDE))
+        name = message.get("framebuffer", "final")
+        time, stops = message.get("time", 0.0), message.get("stops", 0.0)
+        check_number("time", time, -1e9, 1e9)
+        check_number("stops", stops, -32, 32)
+        at = None if message.get("at") is None else _place(message["at"])
+        arrays = self._arrays_of(message.get("view"))
+        sides: dict[str, Any] = {}
+        buffers: list[bytes] = []
+        for side in SIDES:
+            if side not in asked:
+                continue
+            try:
+                settings = settings_from(asked[side])
+                frames, names = self._render(settings, size, name, float(time))
+                (shown,) = frames
+                picture = picture_of(
+                    frames[shown],
+                    shown,
+                    is_encoded=settings.encoding != "none",
+                    stops=float(stops),
+                )
+            except _FAILURES as error:
+                # The other side, or the picture before, is still worth looking at.
+                sides[side] = {"error": _described(error)}
+                continue
+            self.settings[side], self.frames[side] = settings, frames
+            arrays[side] = frames[shown]
+            sides[side] = {
+                "framebuffer": shown,
+                "names": names,
+                "size": [frames[shown].shape[1], frames[shown].shape[0]],
+                "dtype": str(frames[shown].dtype),
+                "code": as_code(settings),
+                "passes": _finite(frames.timings),
+                "picture": len(buffers),
+            }
+            if at is not None:
+                sides[side]["probe"] = _probed(frames[shown], at)
+            buffers.append(picture)
+        return {"sides": sides}, buffers
+
+    def _probe(self, message: Mapping[str, Any]) -> Answer:
+        at = _place(message.get("at"))
+        arrays = self._arrays_of(message.get("view"))
+        return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
+
+    def _render(
+        self, settings: Settings, size: tuple[int, int], name: object, time: float
+    ) -> tuple[Frames, list[str]]:
+        """Return one framebuffer, the one of that name or else `final`, and the names of all."""
+        if self._scene is None:
+            image = self._image_of(size)
+            names = list(self.renderer._survey_apply(image, settings))
+            chosen = str(name) if name in names else "final"
+            return self.renderer.apply(image, settings, attachments=[chosen]), names
+        names = list(self.renderer._survey_render(self._scene, settings, size, self._shading))
+        chosen = str(name) if name in names else "final"
+        frames = self.renderer.render(
+            self._scene,
+            settings,
+            size,
+            shading=self._shading,
+            time=time,
+            attachments=[chosen],
+        )
+        return frames, names
+
+    def _image_of(self, size: tuple[int, int]) -> NDArray[Any]:
+        if self._reduced[0] != size:
+            self._reduced = (size, reduced(self._image, size))
+        return self._reduced[1]
+
+    def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:
+        """Return the framebuffers that a view shows, by side, to be read and written."""
+        arrays = self._shown.pop(str(view), {})
+        self._shown[str(view)] = arrays
+        while len(self._shown) > _VIEWS_KEPT:
+            del self._shown[next(iter(self._shown))]
+        return arrays
+
+
+def _finite(timings: Mapping[str, float]) -> dict[str, float]:
+    """Return the times that JSON can hold."""
+    return {name: seconds for name, seconds in timings.items() if math.isfinite(seconds)}
+
+
+def _described(error: BaseException) -> str:
+    return str(error) or type(error).__name__
+
+
+def _place(at: object) -> tuple[float, float]:
+    if not (isinstance(at, list | tuple) and len(at) == 2):
+        raise TypeError(f"at: (x, y) is needed, not {at!r:.80}")
+    for part in at:
+        check_number("at", part, 0, 1)
+    return float(at[0]), float(at[1])
+
+
+def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
+    height, width = array.shape[:2]
+    # 1 is the edge of the last pixel.
+    x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
+    return {"x": x, "y": y, "values": texts_of(array[y, x])}

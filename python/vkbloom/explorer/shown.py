@@ -1,0 +1,95 @@
+"""Framebuffers as PNG, quickly: what takes a contact sheet its time is the sRGB curve."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import pictures
+
+__all__ = ["picture_of", "reduced", "texts_of"]
+
+# Of zlib: the pictures go to this machine's browser or through a notebook's server, and waiting
+# for a smaller file costs more than sending a larger one.
+_LEVEL: Final = 1
+
+
+def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float) -> bytes:
+    """Return a framebuffer as PNG, shown as in `pictures.leading_png`, without alpha.
+
+    Parameters
+    ----------
+    array : ndarray, shape (H, W, C) or (H, W)
+    name : str
+        Of the framebuffer.
+    is_encoded : bool
+        Whether `final` has an encoding already.
+    stops : float
+        Exposure that colours of light in floats are shown with.
+
+    Returns
+    -------
+    bytes
+        An 8-bit PNG file of 1 or 3 channels. Of float32 colours, those between two levels may
+        be a level off, since they are looked up as half floats.
+    """
+    if array.dtype == np.uint8:
+        picture = array[:, :, :3]
+    elif array.ndim == 3 and name not in ("normal", "position"):
+        with np.errstate(over="ignore"):
+            halves = np.ascontiguousarray(array[:, :, :3]).astype(np.float16, copy=False)
+        picture = _levels(stops, name == "final" and is_encoded)[halves.view(np.uint16)]
+    else:
+        picture = pictures.shown_picture(array, name, is_encoded=is_encoded)[:, :, :3]
+    return pictures.png(picture, _LEVEL)
+
+
+@functools.lru_cache(maxsize=16)
+def _levels(stops: float, is_encoded: bool) -> NDArray[np.uint8]:
+    """Return the 8-bit level of every half float, by its bits."""
+    halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16).reshape(1, -1, 1)
+    with np.errstate(all="ignore"):
+        shown = pictures.shown_picture(
+            halves.repeat(3, axis=2), "final", is_encoded=is_encoded, stops=stops
+        )
+    return shown[0, :, 0]
+
+
+def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return an image whose pixels are averaged until it fits into a size.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, C)
+        uint8, float16 or float32.
+    size : (int, int)
+        Width and height.
+
+    Returns
+    -------
+    ndarray
+        Of the same dtype; the image itself where it fits.
+    """
+    height, width = image.shape[:2]
+    shrink = min(size[0] / width, size[1] / height)
+    if shrink >= 1:
+        return image
+    with np.errstate(invalid="ignore"):
+        small = pictures.resized(image.astype(np.float32), *pictures.scaled(width, height, shrink))
+    return np.rint(small).astype(np.uint8) if image.dtype == np.uint8 else small.astype(image.dtype)
+
+
+def texts_of(pixel: NDArray[Any]) -> list[str]:
+    """Return the numbers of a pixel in as many digits as tell them from their neighbours."""
+    return [_text(number) for number in np.atleast_1d(pixel)]
+
+
+def _text(number: Any) -> str:
+    if number.dtype.kind == "u" or not np.isfinite(number):
+        return str(number)
+    if number == 0 or 1e-4 <= abs(float(number)) < 1e6:
+        return np.format_float_positional(number, trim="0")
+    return np.format_float_scientific(number, trim="0")

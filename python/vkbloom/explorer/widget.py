@@ -1,0 +1,79 @@
+"""The page in a notebook: a widget whose messages a session answers."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import TYPE_CHECKING, Final
+
+import anywidget
+
+from vkbloom.renderer import _check_settings
+
+if TYPE_CHECKING:
+    from vkbloom.explorer.session import Session
+    from vkbloom.frames import Frames
+    from vkbloom.settings import Settings
+
+__all__ = ["Explorer"]
+
+_FILES: Final = resources.files("vkbloom.explorer")
+
+
+class Explorer(anywidget.AnyWidget):
+    """What `vkbloom.explore` returns: shown by the notebook, read and set by code.
+
+    Parameters
+    ----------
+    session : Session
+
+    Attributes
+    ----------
+    settings, against : Settings
+        Of A and of B, as they are on the page; setting them changes the page.
+    frames : Frames or None
+        The framebuffer of A that was shown last.
+    """
+
+    _esm = (_FILES / "page.js").read_text("utf-8")
+    _css = (_FILES / "page.css").read_text("utf-8")
+
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self._session = session
+        self.on_msg(self._received)
+
+    def _received(self, widget: object, message: object, buffers: object) -> None:
+        header, pictures = self._session.answer(message)
+        self.send(header, pictures)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of A."""
+        return self._session.settings["a"]
+
+    @settings.setter
+    def settings(self, settings: Settings) -> None:
+        self._set("a", settings)
+
+    @property
+    def against(self) -> Settings:
+        """The settings of B."""
+        return self._session.settings["b"]
+
+    @against.setter
+    def against(self, settings: Settings) -> None:
+        self._set("b", settings)
+
+    def _set(self, side: str, settings: Settings) -> None:
+        self._session.settings[side] = _check_settings(settings)
+        self.send({"kind": "settings", "sides": {side: settings.as_dict()}}, [])
+
+    @property
+    def frames(self) -> Frames | None:
+        """The framebuffer of A that was shown last."""
+        return self._session.frames.get("a")
+
+    def close(self) -> None:
+        """Remove the page from the notebook, and close the renderer unless it was given."""
+        super().close()
+        self._session.close()
