@@ -123,7 +123,7 @@ export function mount(parent, send) {
   let box = [0, 0]; // what the picture may take, in CSS pixels
 
   // The parts that stay; what depends on the setup is filled in by `build`.
-  const canvas = make("canvas", { width: 1, height: 1, ariaLabel: "the framebuffer" });
+  const canvas = make("canvas", { width: 1, height: 1, ariaLabel: "picture" });
   const divider = make("div", {
     className: "vkb-divider",
     tabIndex: 0,
