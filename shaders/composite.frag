@@ -15,7 +15,8 @@ layout(constant_id = 2) const int ENCODING = ENCODING_NONE;
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 3
+#include "fullscreen.glsl"
 
 vec3 composite(vec3 s, vec3 b)
 {
@@ -26,9 +27,9 @@ vec3 composite(vec3 s, vec3 b)
     return s + params.intensity * b;
 }
 
-void main()
+vec4 shade()
 {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    ivec2 pixel = PIXEL;
     vec4 source = texelFetch(scene, pixel, 0);
     // Curves that mix the channels must not spread one channel's NaN to the others.
     vec3 result = finite_or_zero(source.rgb);
@@ -36,5 +37,5 @@ void main()
         result = composite(result, texelFetch(bloom, pixel, 0).rgb);
     result = apply_encoding(apply_tonemap(result * exp2(params.exposure), TONEMAP), ENCODING);
     // NaN and infinity of the source stay at their own pixels, whatever the curve makes of them.
-    colour = vec4(mix(source.rgb, storable(result), is_finite(source.rgb)), source.a);
+    return vec4(mix(source.rgb, storable(result), is_finite(source.rgb)), source.a);
 }

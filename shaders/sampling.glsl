@@ -24,9 +24,9 @@ Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
     return Place(ivec2(texel) - 1, vec2(number - texel * divisor) / vec2(divisor));
 }
 
-// The place of this fragment, in a shader whose parameters hold SAMPLING_ROWS.
+// The place of this pixel, in a shader whose parameters hold SAMPLING_ROWS.
 #define PLACE_IN(source) \
-    place_in(source, ivec2(gl_FragCoord.xy), ivec2(params.target_width, params.target_height))
+    place_in(source, PIXEL, ivec2(params.target_width, params.target_height))
 
 vec4 fetch_clamped(sampler2D source, ivec2 texel)
 {
