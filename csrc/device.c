@@ -2,19 +2,28 @@
 
 static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
-    return VK(error, vkCreateDevice(device->adapter.physical,
-                                    &(VkDeviceCreateInfo){
-                                        .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                                        .queueCreateInfoCount = 1,
-                                        .pQueueCreateInfos =
-                                            &(VkDeviceQueueCreateInfo){
-                                                .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                                                .queueFamilyIndex = device->adapter.queue_family,
-                                                .queueCount = 1,
-                                                .pQueuePriorities = &(float){1.0f},
-                                            },
-                                    },
-                                    NULL, &device->handle));
+    VkPhysicalDeviceFeatures available;
+
+    vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
+    device->dispatch = available.shaderStorageImageWriteWithoutFormat;
+    return VK(error,
+              vkCreateDevice(device->adapter.physical,
+                             &(VkDeviceCreateInfo){
+                                 .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                 .pEnabledFeatures =
+                                     &(VkPhysicalDeviceFeatures){
+                                         .shaderStorageImageWriteWithoutFormat = device->dispatch,
+                                     },
+                                 .queueCreateInfoCount = 1,
+                                 .pQueueCreateInfos =
+                                     &(VkDeviceQueueCreateInfo){
+                                         .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                         .queueFamilyIndex = device->adapter.queue_family,
+                                         .queueCount = 1,
+                                         .pQueuePriorities = &(float){1.0f},
+                                     },
+                             },
+                             NULL, &device->handle));
 }
 
 static uint64_t timestamp_mask(const struct vkb_device *device)

@@ -14,6 +14,7 @@ struct vkb_device {
     VkQueue queue;
     VkPhysicalDeviceMemoryProperties memory;
     VkPhysicalDeviceLimits limits;
+    bool dispatch;            // compute shaders can write images of every format
     uint64_t timestamp_mask;  // 0: the queue has no timestamps
     bool lost;
 };

@@ -84,7 +84,7 @@ static bool write_recipe(struct run *run, uint32_t first, uint32_t end, struct v
         memcpy(&row, &run->graph->passes[i], sizeof row);
         for (uint32_t read = 0; read < row.read_count; ++read)
             versions[read] = run->slots[row.reads[read]]->version;
-        if (row.geometry != VKB_GEOMETRY_FULLSCREEN)
+        if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
             versions[VKB_MAX_READS] = run->frame->scene.serial;
         memset(row.reads, 0, sizeof row.reads);
         memset(row.targets, 0, sizeof row.targets);
@@ -125,9 +125,10 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     const struct vkb_pipelines *pipelines = &run->frame->pipelines;
+    const VkDescriptorSetLayout layout = vkb_pipelines_set_layout(pipelines, pass);
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
-    VkDescriptorImageInfo images[VKB_MAX_READS];
-    VkWriteDescriptorSet writes[VKB_MAX_READS + 1];
+    VkDescriptorImageInfo images[VKB_MAX_READS + 1];
+    VkWriteDescriptorSet writes[VKB_MAX_READS + 2];
     uint32_t write_count = 0;
 
     if (!VK(error, vk->vkAllocateDescriptorSets(
@@ -136,7 +137,7 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
                            .descriptorPool = run->frame->descriptors,
                            .descriptorSetCount = 1,
-                           .pSetLayouts = &pipelines->set_layouts[image_count],
+                           .pSetLayouts = &layout,
                        },
                        set)))
         return false;
@@ -161,15 +162,30 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
         images[i] = (VkDescriptorImageInfo){
             .sampler = pipelines->sampler,
             .imageView = image->view,
-            .imageLayout = vkb_access_layout(VKB_ACCESS_SAMPLED),
+            .imageLayout = vkb_access_layout(vkb_pass_reads_as(pass)),
         };
         writes[write_count++] = (VkWriteDescriptorSet){
             .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
             .dstSet = *set,
             .dstBinding = i + 1,
             .descriptorCount = 1,
-            .descriptorType = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .descriptorType = pass->loads ? VK_DESCRIPTOR_TYPE_STORAGE_IMAGE
+                                          : VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
             .pImageInfo = &images[i],
+        };
+    }
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
+        images[image_count] = (VkDescriptorImageInfo){
+            .imageView = run->slots[pass->targets[0]]->image.view,
+            .imageLayout = vkb_access_layout(VKB_ACCESS_DISPATCH_STORED),
+        };
+        writes[write_count++] = (VkWriteDescriptorSet){
+            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+            .dstSet = *set,
+            .dstBinding = image_count + 1,
+            .descriptorCount = 1,
+            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .pImageInfo = &images[image_count],
         };
     }
     vk->vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
@@ -188,12 +204,21 @@ static void draw_mesh(const struct run *run, const struct vkb_mesh *mesh)
     vk->vkCmdDrawIndexed(commands, mesh->index_count, 1, 0, 0, 0);
 }
 
-static void draw(const struct run *run, enum vkb_geometry geometry)
+static void dispatch(const struct run *run, const struct vkb_pass_row *pass)
+{
+    const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
+
+    run->device->vk.vkCmdDispatch(
+        run->frame->commands.buffer, (target->width + pass->block_width - 1) / pass->block_width,
+        (target->height + pass->block_height - 1) / pass->block_height, 1);
+}
+
+static void draw(const struct run *run, const struct vkb_pass_row *pass)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     VkCommandBuffer commands = run->frame->commands.buffer;
 
-    switch (geometry) {
+    switch (pass->geometry) {
     case VKB_GEOMETRY_FULLSCREEN:
         vk->vkCmdDraw(commands, 3, 1, 0, 0);
         break;
@@ -206,6 +231,9 @@ static void draw(const struct run *run, enum vkb_geometry geometry)
     case VKB_GEOMETRY_GLOW:
         draw_mesh(run, &run->frame->scene.glow);
         break;
+    case VKB_GEOMETRY_DISPATCH:
+        dispatch(run, pass);
+        break;
     }
 }
 
@@ -216,18 +244,30 @@ static bool record_pass(struct run *run, uint32_t index, VkRenderPass render_pas
     const struct vkb_pass_row *pass = &run->graph->passes[index];
     VkCommandBuffer commands = run->frame->commands.buffer;
     struct vkb_pipelines *pipelines = &run->frame->pipelines;
+    const VkPipelineBindPoint point = pass->geometry == VKB_GEOMETRY_DISPATCH
+                                        ? VK_PIPELINE_BIND_POINT_COMPUTE
+                                        : VK_PIPELINE_BIND_POINT_GRAPHICS;
     VkPipeline pipeline;
     VkDescriptorSet set;
 
     if (!vkb_pipelines_get(run->device, pipelines, pass, render_pass, &pipeline, error)
         || !write_descriptors(run, pass, &set, error))
         return false;
-    vk->vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline);
-    vk->vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS,
-                                pipelines->layouts[vkb_pass_descriptor_images(pass)], 0, 1, &set, 0,
-                                NULL);
-    draw(run, pass->geometry);
+    vk->vkCmdBindPipeline(commands, point, pipeline);
+    vk->vkCmdBindDescriptorSets(commands, point, vkb_pipelines_layout(pipelines, pass), 0, 1, &set,
+                                0, NULL);
+    draw(run, pass);
     return true;
+}
+
+static void transition_reads(struct run *run, uint32_t first, uint32_t end)
+{
+    for (uint32_t i = first; i < end; ++i) {
+        const struct vkb_pass_row *pass = &run->graph->passes[i];
+        for (uint32_t read = 0; read < pass->read_count; ++read)
+            vkb_image_transition(run->device, run->frame->commands.buffer,
+                                 &run->slots[pass->reads[read]]->image, vkb_pass_reads_as(pass));
+    }
 }
 
 // What the passes read, and the targets in the state that the render pass's dependencies go on
@@ -240,11 +280,7 @@ static void transition_images(struct run *run, uint32_t first, uint32_t end)
     const uint32_t use_count = vkb_graph_target_uses(run->graph, first, end, uses);
     const uint32_t depth_uses = use_count - pass->target_count;
 
-    for (uint32_t i = first; i < end; ++i)
-        for (uint32_t read = 0; read < run->graph->passes[i].read_count; ++read)
-            vkb_image_transition(run->device, commands,
-                                 &run->slots[run->graph->passes[i].reads[read]]->image,
-                                 VKB_ACCESS_SAMPLED);
+    transition_reads(run, first, end);
     for (uint32_t i = 0; i < use_count; ++i) {
         uint32_t target = i < depth_uses ? pass->depth : pass->targets[i - depth_uses];
         struct vkb_image *image = &run->slots[target]->image;
@@ -285,10 +321,27 @@ static void begin_render_pass(const struct run *run, VkRenderPass render_pass,
     vk->vkCmdSetScissor(commands, 0, 1, &(VkRect2D){.extent = extent});
 }
 
+static bool record_dispatch(struct run *run, uint32_t index, struct vkb_error *error)
+{
+    struct vkb_device *device = run->device;
+    struct vkb_frame *frame = run->frame;
+    VkCommandBuffer commands = frame->commands.buffer;
+
+    transition_reads(run, index, index + 1);
+    vkb_image_transition(device, commands, &run->slots[run->graph->passes[index].targets[0]]->image,
+                         VKB_ACCESS_DISPATCH_STORED);
+    vkb_timer_start(device, commands, &frame->timer, run->ran_count);
+    if (!record_pass(run, index, VK_NULL_HANDLE, error))
+        return false;
+    vkb_timer_stop(device, commands, &frame->timer, run->ran_count);
+    return true;
+}
+
 // Passes first..end-1 in one render pass, timed as one: within a render pass tiling devices and
 // lavapipe do not keep the order that single draws could be timed by.
-static bool record_group(struct run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
-                         uint32_t target_count, struct vkb_error *error)
+static bool record_render_pass(struct run *run, uint32_t first, uint32_t end,
+                               struct vkb_slot **targets, uint32_t target_count,
+                               struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
     struct vkb_frame *frame = run->frame;
@@ -296,10 +349,6 @@ static bool record_group(struct run *run, uint32_t first, uint32_t end, struct v
     VkRenderPass render_pass;
     VkFramebuffer framebuffer;
 
-    for (uint32_t i = 0; i < target_count; ++i)
-        if (!vkb_slot_begin_writing(&frame->slots, targets[i], run->recipe, run->recipe_size,
-                                    error))
-            return false;
     if (!vkb_pipelines_render_pass(device, &frame->pipelines, run->graph, first, end, &render_pass,
                                    error)
         || !vkb_slot_framebuffer(device, targets, target_count, render_pass, &framebuffer, error))
@@ -313,6 +362,21 @@ static bool record_group(struct run *run, uint32_t first, uint32_t end, struct v
             return false;
     device->vk.vkCmdEndRenderPass(commands);
     vkb_timer_stop(device, commands, &frame->timer, run->ran_count);
+    return true;
+}
+
+static bool record_group(struct run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
+                         uint32_t target_count, struct vkb_error *error)
+{
+    const bool is_dispatch = run->graph->passes[first].geometry == VKB_GEOMETRY_DISPATCH;
+
+    for (uint32_t i = 0; i < target_count; ++i)
+        if (!vkb_slot_begin_writing(&run->frame->slots, targets[i], run->recipe, run->recipe_size,
+                                    error))
+            return false;
+    if (is_dispatch ? !record_dispatch(run, first, error)
+                    : !record_render_pass(run, first, end, targets, target_count, error))
+        return false;
     run->ran[run->ran_count++] = first;
     return true;
 }
@@ -358,11 +422,12 @@ static bool reserve_descriptors(struct run *run, struct vkb_error *error)
                 &(VkDescriptorPoolCreateInfo){
                     .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
                     .maxSets = passes,
-                    .poolSizeCount = 2,
+                    .poolSizeCount = 3,
                     .pPoolSizes =
                         (VkDescriptorPoolSize[]){
                             {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, passes},
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, passes * VKB_MAX_READS},
+                            {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, passes * (VKB_MAX_READS + 1)},
                         },
                 },
                 NULL, &frame->descriptors)))

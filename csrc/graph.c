@@ -39,9 +39,10 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
     return true;
 }
 
-static bool same_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
+static bool share_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
 {
-    return a->target_count == b->target_count && a->depth == b->depth
+    return a->geometry != VKB_GEOMETRY_DISPATCH && b->geometry != VKB_GEOMETRY_DISPATCH
+        && a->target_count == b->target_count && a->depth == b->depth
         && memcmp(a->targets, b->targets, a->target_count * sizeof a->targets[0]) == 0;
 }
 
@@ -49,7 +50,7 @@ uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first)
 {
     uint32_t end = first + 1;
 
-    while (end < graph->pass_count && same_targets(&graph->passes[first], &graph->passes[end]))
+    while (end < graph->pass_count && share_targets(&graph->passes[first], &graph->passes[end]))
         ++end;
     return end;
 }
@@ -70,11 +71,18 @@ static bool writes(const struct vkb_pass_row *pass, uint32_t image)
     return pass->depth == image;
 }
 
+enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
+{
+    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
+        return VKB_ACCESS_SAMPLED;
+    return pass->loads ? VKB_ACCESS_DISPATCH_LOADED : VKB_ACCESS_DISPATCH_SAMPLED;
+}
+
 enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (reads(&graph->passes[i], image))
-            return VKB_ACCESS_SAMPLED;
+            return vkb_pass_reads_as(&graph->passes[i]);
     return graph->images[image].format == VKB_FORMAT_DEPTH32_FLOAT ? VKB_ACCESS_DEPTH_TARGET
                                                                    : VKB_ACCESS_COPY_SOURCE;
 }
@@ -183,7 +191,10 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
 
     if (pass->target_count > VKB_MAX_TARGETS || pass->read_count > VKB_MAX_READS
         || pass->constant_count > VKB_MAX_CONSTANTS
-        || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE))
+        || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
+        || (pass->geometry == VKB_GEOMETRY_DISPATCH
+            && (pass->target_count != 1 || pass->depth != VKB_NO_IMAGE || pass->blend
+                || pass->block_width == 0 || pass->block_height == 0)))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
                         pass->name);
     for (uint32_t i = 0; i < pass->read_count; ++i)

@@ -26,17 +26,19 @@ static VkImageUsageFlags image_usage(enum vkb_format format)
 {
     return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
          | VK_IMAGE_USAGE_SAMPLED_BIT
-         | (format == VKB_FORMAT_DEPTH32_FLOAT ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
-                                               : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT);
+         | (format == VKB_FORMAT_DEPTH32_FLOAT
+                ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
+                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_STORAGE_BIT);
 }
 
 static bool check_format(const struct vkb_device *device, enum vkb_format format,
                          struct vkb_error *error)
 {
-    const VkFormatFeatureFlags features =
-        format == VKB_FORMAT_DEPTH32_FLOAT
-            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
-            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT;
+    const VkFormatFeatureFlags features = format == VKB_FORMAT_DEPTH32_FLOAT
+                                            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
+                                            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT
+                                                  | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT
+                                                  | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
 
     if (vkb_device_supports(device, vkb_formats[format].vk, features))
         return true;
