@@ -28,6 +28,7 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
     vkb_slots_destroy(device, &frame->slots);
+    vkb_plan_memory_destroy(&frame->plan);
     vkb_timer_destroy(device, &frame->timer);
     device->vk.vkDestroyDescriptorPool(device->handle, frame->descriptors, NULL);
     vkb_buffer_destroy(device, &frame->uniforms);
@@ -37,30 +38,6 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     vkb_pipelines_destroy(device, &frame->pipelines);
     vkb_commands_destroy(device, &frame->commands);
     *frame = (struct vkb_frame){0};
-}
-
-// Marks the passes that the outputs depend on, from the last to the first, and their images.
-static void mark_needed(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
-                        bool *wanted)
-{
-    const struct vkb_graph *graph = run->graph;
-
-    for (uint32_t i = 0; i < output_count; ++i)
-        wanted[outputs[i].image] = true;
-    for (uint32_t i = graph->pass_count; i-- > 0;) {
-        const struct vkb_pass_row *pass = &graph->passes[i];
-        for (uint32_t target = 0; target < pass->target_count; ++target)
-            run->needed[i] |= wanted[pass->targets[target]];
-        run->needed[i] |= pass->depth != VKB_NO_IMAGE && wanted[pass->depth];
-        if (!run->needed[i])
-            continue;
-        for (uint32_t read = 0; read < pass->read_count; ++read)
-            wanted[pass->reads[read]] = true;
-        for (uint32_t target = 0; target < pass->target_count; ++target)
-            wanted[pass->targets[target]] = true;
-        if (pass->depth != VKB_NO_IMAGE)
-            wanted[pass->depth] = true;
-    }
 }
 
 static bool append(struct run *run, const void *bytes, size_t size, struct vkb_error *error)
@@ -509,8 +486,12 @@ static bool stage_input(struct run *run, const struct vkb_input *input, struct v
     if (!vkb_upload_stage(run->device, &run->frame->upload, input, &changed, error))
         return false;
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (run->graph->images[i].input)
+        if (run->graph->images[i].input) {
+            if (!vkb_slots_resolve(run->device, &run->frame->slots, &run->graph->images[i],
+                                   &run->slots[i], error))
+                return false;
             run->input = run->slots[i];
+        }
     run->send_input = run->input && (changed || !run->input->valid);
     return !run->send_input
         || vkb_slot_begin_writing(&run->frame->slots, run->input, NULL, 0, error);
@@ -527,14 +508,16 @@ static bool run_frame(struct run *run, const struct vkb_frame_source *source,
     if (source->scene
         && !vkb_scene_load(run->device, &frame->commands, source->scene, &frame->scene, error))
         return false;
-    mark_needed(run, outputs, output_count, wanted);
+    if (source->input && !stage_input(run, source->input, error))
+        return false;
+    if (!vkb_plan(run->graph, run->slots, outputs, output_count, &frame->plan, run->needed, wanted,
+                  error))
+        return false;
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
         if (wanted[i]
             && !vkb_slots_resolve(run->device, &frame->slots, &run->graph->images[i],
                                   &run->slots[i], error))
             return false;
-    if (source->input && !stage_input(run, source->input, error))
-        return false;
     if (!reserve(run, outputs, output_count, error)
         || !record_and_run(run, outputs, output_count, offsets, error)
         || !read_timings(run, timings, error))

@@ -41,8 +41,9 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
 
 static bool share_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
 {
-    return a->geometry != VKB_GEOMETRY_DISPATCH && b->geometry != VKB_GEOMETRY_DISPATCH
-        && a->target_count == b->target_count && a->depth == b->depth
+    return !a->alternative && !b->alternative && a->geometry != VKB_GEOMETRY_DISPATCH
+        && b->geometry != VKB_GEOMETRY_DISPATCH && a->target_count == b->target_count
+        && a->depth == b->depth
         && memcmp(a->targets, b->targets, a->target_count * sizeof a->targets[0]) == 0;
 }
 
@@ -175,7 +176,8 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
                         pass->name);
     // Earlier writers may only be those that share this pass's render pass.
     for (uint32_t i = pass_index; i-- > 0;) {
-        if (vkb_graph_group_end(graph, i) > pass_index)
+        if (vkb_graph_group_end(graph, i) > pass_index
+            || (pass->alternative && i == pass_index - 1))
             continue;
         if (writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
             return vkb_fail(error, VKB_ERROR_GENERAL,
@@ -196,6 +198,11 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
             && (pass->target_count != 1 || pass->depth != VKB_NO_IMAGE || pass->blend
                 || pass->block_width == 0 || pass->block_height == 0)))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
+                        pass->name);
+    if (pass->alternative
+        && (index == 0 || pass->target_count != 1
+            || graph->passes[index - 1].targets[0] != pass->targets[0]))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s is an alternative to nothing",
                         pass->name);
     for (uint32_t i = 0; i < pass->read_count; ++i)
         if (pass->reads[i] >= graph->image_count || !is_filled(graph, pass->reads[i], index))

@@ -52,7 +52,8 @@ struct vkb_pass_row {
     uint32_t constant_count;
     uint32_t reads[VKB_MAX_READS];
     uint32_t read_count;
-    bool loads;                          // a dispatch that reads storage images, without a sampler
+    bool loads;        // a dispatch that reads storage images, without a sampler
+    bool alternative;  // may run in place of the pass before it, which has the same target
     uint32_t block_width, block_height;  // of a dispatch: the pixels that a workgroup writes
     uint32_t targets[VKB_MAX_TARGETS];
     uint32_t target_count;

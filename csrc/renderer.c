@@ -1,4 +1,5 @@
 // The Renderer type: arguments in, arrays out, the GIL released around all device work.
+#include "forms.h"
 #include "frame.h"
 #include "module.h"
 
@@ -8,6 +9,7 @@ struct renderer {
     PyObject_HEAD
     PyThread_type_lock lock;  // held around all that touches the device
     bool open;
+    enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
 };
@@ -25,9 +27,9 @@ static struct vkb_module_state *state_of(PyObject *self)
     return PyType_GetModuleState(Py_TYPE(self));
 }
 
-// create(adapter, validation, read_cache): read_cache(driver_uuid) gives the bytes of an earlier
-// run's pipeline cache, or None.
-static bool create(struct renderer *self, const char *adapter, bool validation,
+// create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
+// earlier run's pipeline cache, or None.
+static bool create(struct renderer *self, const char *adapter, bool validation, const char *forms,
                    PyObject *read_cache, struct vkb_error *error)
 {
     bool done;
@@ -39,6 +41,12 @@ static bool create(struct renderer *self, const char *adapter, bool validation,
     Py_END_ALLOW_THREADS
     if (!done)
         return false;
+    self->forms = vkb_forms_by_name(forms, &self->device);
+    if (self->forms == VKB_FORMS_COUNT) {
+        vkb_device_destroy(&self->device);
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "VKBLOOM_FORM: %s is not one of auto, fragment, cpu, gpu", forms);
+    }
     PyObject *cache = PyObject_CallFunction(read_cache, "y#", self->device.adapter.driver_uuid,
                                             (Py_ssize_t)VK_UUID_SIZE);
     if (cache && cache != Py_None && PyBytes_AsStringAndSize(cache, (char **)&data, &size) < 0)
@@ -61,7 +69,7 @@ static bool create(struct renderer *self, const char *adapter, bool validation,
 
 static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject *keywords)
 {
-    const char *adapter;
+    const char *adapter, *forms;
     int validation;
     PyObject *read_cache;
     struct vkb_error error = {0};
@@ -70,7 +78,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(arguments, "spO:Renderer", &adapter, &validation, &read_cache))
+    if (!PyArg_ParseTuple(arguments, "spsO:Renderer", &adapter, &validation, &forms, &read_cache))
         return NULL;
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     struct renderer *self = (struct renderer *)allocate(type, 0);
@@ -80,7 +88,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     if (!self->lock)
         PyErr_NoMemory();
     else
-        self->open = create(self, adapter, validation, read_cache, &error);
+        self->open = create(self, adapter, validation, forms, read_cache, &error);
     if (self->open)
         return (PyObject *)self;
     if (error.kind != VKB_OK)
@@ -321,6 +329,7 @@ static PyObject *render(PyObject *object, PyObject *arguments)
         source.has_emission = scene.data.body.emission != NULL;
         if (require_open(self, &error)
             && vkb_build_scene(shading, &settings, &source, &graph, &error)
+            && vkb_forms_choose(self->forms, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
             result = run_graph(self, &graph, &(struct vkb_frame_source){.scene = &scene.data},
                                names, allocate);
@@ -351,6 +360,7 @@ static PyObject *apply(PyObject *object, PyObject *arguments)
             .channels = image.input.channels,
         };
         if (require_open(self, &error) && vkb_build_image(&settings, &source, &graph, &error)
+            && vkb_forms_choose(self->forms, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
             result = run_graph(self, &graph, &(struct vkb_frame_source){.input = &image.input},
                                names, allocate);

@@ -2,11 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 // The finished picture: scene and bloom, exposure, tone map, encoding.
 #include "block.glsl"
-#include "finite.glsl"
-#include "tonemap.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "storage.glsl"
+#include "composite.glsl"
 
 layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
 layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
@@ -18,24 +17,8 @@ layout(set = 0, binding = 2) uniform sampler2D bloom;
 #define TARGET_BINDING 3
 #include "fullscreen.glsl"
 
-vec3 composite(vec3 s, vec3 b)
-{
-    if (COMPOSITE == COMPOSITE_MIX)
-        return s + (b - s) * params.intensity;
-    if (COMPOSITE == COMPOSITE_SCREEN)
-        return 1.0 - (1.0 - clamp(s, 0.0, 1.0)) * (1.0 - clamp(params.intensity * b, 0.0, 1.0));
-    return s + params.intensity * b;
-}
-
 vec4 shade()
 {
-    ivec2 pixel = PIXEL;
-    vec4 source = texelFetch(scene, pixel, 0);
-    // Curves that mix the channels must not spread one channel's NaN to the others.
-    vec3 result = finite_or_zero(source.rgb);
-    if (COMPOSITE != COMPOSITE_OFF)
-        result = composite(result, texelFetch(bloom, pixel, 0).rgb);
-    result = apply_encoding(apply_tonemap(result * exp2(params.exposure), TONEMAP), ENCODING);
-    // NaN and infinity of the source stay at their own pixels, whatever the curve makes of them.
-    return vec4(mix(source.rgb, storable(result), is_finite(source.rgb)), source.a);
+    vec3 light = COMPOSITE == COMPOSITE_OFF ? vec3(0.0) : texelFetch(bloom, PIXEL, 0).rgb;
+    return finish(texelFetch(scene, PIXEL, 0), light, COMPOSITE, TONEMAP, ENCODING);
 }

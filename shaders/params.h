@@ -39,6 +39,28 @@
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, weights, 17)
 
+// The same blur where the source's pixels are the target's: one symmetric kernel on whole texels,
+// v0..v79 with zeros beyond its radius. `origin` is the place of the target's first pixel along the
+// line, in the source's.
+#define LINE_BLOCK(B, SETTING, INPUT, VEC4S) \
+    INPUT(B, int, radius) \
+    INPUT(B, int, origin) \
+    INPUT(B, float, limit) \
+    VEC4S(B, kernel, LINE_VEC4S)
+
+// An image's whole bloom in one pass: threshold, both blurs, composite. Kernels as above.
+#define WHOLE_BLOCK(B, SETTING, INPUT, VEC4S) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, knee) \
+    INPUT(B, float, intensity) \
+    INPUT(B, float, exposure) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, blur_limit) \
+    INPUT(B, int, down_radius) \
+    INPUT(B, int, across_radius) \
+    VEC4S(B, down, WHOLE_VEC4S) \
+    VEC4S(B, across, WHOLE_VEC4S)
+
 // The reduction of an image to the bloom buffer, with the threshold.
 #define EXTRACT_BLOCK(B, SETTING, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
@@ -83,6 +105,8 @@
     BLOCK(mesh, MESH_BLOCK) \
     BLOCK(extract, EXTRACT_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \
+    BLOCK(line, LINE_BLOCK) \
+    BLOCK(whole, WHOLE_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
@@ -119,6 +143,17 @@
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
 #define MAX_LAYERS 8
+
+// Kernels on whole texels, w0.. in vec4s: the longest half-kernel of a line, and of the whole bloom
+// in one pass. A line's shader reads LINE_OUTPUTS - 1 weights beyond the radius, which are 0.
+#define LINE_RADIUS 64
+#define LINE_OUTPUTS 8
+#define LINE_VEC4S 18
+#define STRIP_RADIUS 4
+#define STRIP_COLUMNS 8
+#define STRIP_ROWS 72
+#define TILE_RADIUS 16
+#define WHOLE_VEC4S 5
 
 // The levels that one pass gathers.
 #define GATHERED_LEVELS 5

@@ -41,7 +41,12 @@ def describe(
 
 class Renderer:
     def __new__(
-        cls, adapter: str, validation: bool, read_cache: Callable[[bytes], bytes | None], /
+        cls,
+        adapter: str,
+        validation: bool,
+        forms: str,
+        read_cache: Callable[[bytes], bytes | None],
+        /,
     ) -> Renderer: ...
     @property
     def closed(self) -> bool: ...

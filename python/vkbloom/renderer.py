@@ -137,7 +137,8 @@ class Renderer:
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        self._core = _core.Renderer(adapter, bool(validation), pipeline_cache.read)
+        forms = os.environ.get("VKBLOOM_FORM") or "auto"
+        self._core = _core.Renderer(adapter, bool(validation), forms, pipeline_cache.read)
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._saved_pipelines = 0

@@ -1,0 +1,312 @@
+#include "forms.h"
+
+#include "methods.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char *const form_names[VKB_FORMS_COUNT] = {
+    [VKB_FORMS_FRAGMENT] = "fragment",
+    [VKB_FORMS_CPU] = "cpu",
+    [VKB_FORMS_GPU] = "gpu",
+};
+
+enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *device)
+{
+    int forms = 0;
+
+    if (!device->dispatch)
+        return VKB_FORMS_FRAGMENT;
+    if (strcmp(name, "auto") == 0)
+        return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_FORMS_CPU
+                                                                          : VKB_FORMS_GPU;
+    while (forms < VKB_FORMS_COUNT && strcmp(form_names[forms], name) != 0)
+        ++forms;
+    return (enum vkb_forms)forms;
+}
+
+// A kernel on whole texels: the same blur where each pixel of the target lies on a texel.
+struct kernel {
+    float weights[LINE_VEC4S * 4];
+    int radius;
+};
+
+static float tap_weight(const struct vkb_pass_row *blur, int tap)
+{
+    return blur->params.blur.weights[tap / 4][tap % 4];
+}
+
+static double tap_step(const struct vkb_pass_row *blur)
+{
+    const struct vkb_blur_params *params = &blur->params.blur;
+    const double step = (double)params->blur_scale * params->layer_scale;
+    const bool ratio = blur->constants[0] == DIRECTION_VERTICAL && blur->constants[3] == TEXEL_X;
+    return ratio ? step * params->step_ratio : step;
+}
+
+// Taps between two texels are shared out to both. False where the kernel is longer than `limit`.
+static bool find_kernel(const struct vkb_pass_row *blur, int limit, struct kernel *kernel)
+{
+    const struct vkb_blur_params *params = &blur->params.blur;
+    const int taps = blur->constants[1];
+    const double step = tap_step(blur), strength = params->layer_strength;
+    const double side = strength * params->blur_strength;
+    double weights[LINE_VEC4S * 4] = {0};
+
+    if (ceil(taps * step) > limit)
+        return false;
+    weights[0] = tap_weight(blur, 0) * strength;
+    if (blur->constants[2] == 0)
+        weights[0] += 2.0 * side * tap_weight(blur, 0);
+    for (int tap = 1; tap <= taps; ++tap) {
+        const double at = tap * step, part = at - floor(at);
+        const int texel = (int)floor(at);
+        // On the centre's texel both sides of the pair come together.
+        weights[texel] += (texel == 0 ? 2.0 : 1.0) * (1.0 - part) * side * tap_weight(blur, tap);
+        if (part > 0.0)
+            weights[texel + 1] += part * side * tap_weight(blur, tap);
+    }
+    memset(kernel, 0, sizeof *kernel);
+    for (int i = 0; i <= limit; ++i) {
+        kernel->weights[i] = (float)weights[i];
+        if (weights[i] != 0.0)
+            kernel->radius = i;
+    }
+    return true;
+}
+
+static bool is_written_once(const struct vkb_graph *graph, uint32_t image)
+{
+    uint32_t writers = 0;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        for (uint32_t target = 0; target < graph->passes[i].target_count; ++target)
+            writers += graph->passes[i].targets[target] == image;
+    return writers == 1;
+}
+
+// Makes a dispatch of a pass over all pixels.
+static void dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
+                     uint32_t block_height)
+{
+    row->geometry = VKB_GEOMETRY_DISPATCH;
+    row->vertex = (enum vkb_shader)0;
+    row->shader = shader;
+    row->block_width = block_width;
+    row->block_height = block_height;
+}
+
+// A form takes a pass of `plain` to one or more passes of `graph`; false in *fits where it does not
+// suit the pass.
+struct form {
+    enum vkb_forms forms;
+    bool (*add)(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
+                struct vkb_graph *graph, bool *fits, struct vkb_error *error);
+};
+
+// Every pass over all pixels of one target as a compute shader.
+static bool add_pixels(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
+                       struct vkb_graph *graph, bool *fits, struct vkb_error *error)
+{
+    const enum vkb_shader shader = vkb_spirv[pass->shader].dispatch;
+    struct vkb_pass_row row;
+
+    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN && shader != pass->shader
+         && is_written_once(plain, pass->targets[0]);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    dispatch(&row, shader, 8, 8);
+    return vkb_graph_add_pass(graph, &row, error);
+}
+
+#define BY_FORMAT(shader) \
+    { \
+        [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
+        [VKB_FORMAT_RGBA16_FLOAT] = VKB_SHADER_##shader##_rgba16float, \
+        [VKB_FORMAT_RGBA32_FLOAT] = VKB_SHADER_##shader##_rgba32float, \
+    }
+
+static const enum vkb_shader line_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(line_comp);
+static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(strip_comp);
+
+// A line's row: `origin` is the place of the target's first pixel in the source.
+static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct vkb_pass_row *blur,
+                                    const struct kernel *kernel, uint32_t target, int origin)
+{
+    const bool vertical = blur->constants[0] == DIRECTION_VERTICAL;
+    struct vkb_pass_row row;
+
+    memcpy(&row, blur, sizeof row);
+    memset(&row.constants, 0, sizeof row.constants);
+    memset(&row.params, 0, sizeof row.params);
+    dispatch(&row, line_shaders[graph->images[blur->reads[0]].format],
+             vertical ? 8 : 8 * LINE_OUTPUTS, vertical ? LINE_OUTPUTS : 1);
+    row.loads = true;
+    row.targets[0] = target;
+    row.constants[0] = blur->constants[0];
+    row.constant_count = 1;
+    row.block = VKB_BLOCK_line;
+    row.params.line.radius = kernel->radius;
+    row.params.line.origin = origin;
+    row.params.line.limit = vkb_formats[graph->images[target].format].limit;
+    memcpy(row.params.line.kernel, kernel->weights, sizeof row.params.line.kernel);
+    return row;
+}
+
+static bool is_blur(const struct vkb_pass_row *pass)
+{
+    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader == VKB_SHADER_blur_frag
+        && pass->constants[0] != DIRECTION_BOTH;
+}
+
+// A blur whose source has the target's size, as a line.
+static bool add_line(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
+                     struct vkb_graph *graph, bool *fits, struct vkb_error *error)
+{
+    struct kernel kernel;
+
+    *fits = is_blur(pass) && vkb_same_size(plain, pass->reads[0], pass->targets[0])
+         && is_written_once(plain, pass->targets[0]) && find_kernel(pass, LINE_RADIUS, &kernel);
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = line_row(graph, pass, &kernel, pass->targets[0], 0);
+    return vkb_graph_add_pass(graph, &row, error);
+}
+
+// The chain of passes that gives an image its bloom where all have its size.
+struct chain {
+    const struct vkb_pass_row *extract, *down, *across, *composite;
+    struct kernel down_kernel, across_kernel;
+};
+
+static const struct vkb_pass_row *writer_of(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_pass_row *writer = NULL;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].target_count == 1 && graph->passes[i].targets[0] == image)
+            writer = &graph->passes[i];
+    return writer;
+}
+
+// The one blur of that direction that writes the image.
+static const struct vkb_pass_row *blur_of(const struct vkb_graph *graph, uint32_t image,
+                                          enum vkb_mode direction)
+{
+    const struct vkb_pass_row *pass = writer_of(graph, image);
+
+    return pass && is_blur(pass) && pass->constants[0] == (int32_t)direction
+                && is_written_once(graph, image) && vkb_same_size(graph, pass->reads[0], image)
+             ? pass
+             : NULL;
+}
+
+static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass, int radius,
+                       struct chain *chain)
+{
+    *chain = (struct chain){.composite = pass};
+    if (pass->shader != VKB_SHADER_composite_frag || pass->constants[0] == COMPOSITE_OFF
+        || !graph->images[pass->reads[0]].input)
+        return false;
+    chain->across = blur_of(graph, pass->reads[1], DIRECTION_HORIZONTAL);
+    if (chain->across)
+        chain->down = blur_of(graph, chain->across->reads[0], DIRECTION_VERTICAL);
+    if (chain->down)
+        chain->extract = writer_of(graph, chain->down->reads[0]);
+    return chain->extract && chain->extract->shader == VKB_SHADER_extract_frag
+        && chain->extract->constants[1] == SAMPLING_WHOLE
+        && chain->extract->reads[0] == pass->reads[0]
+        // A value that another format would round or clamp would need that format's rules.
+        && graph->images[chain->across->targets[0]].format == graph->images[pass->reads[0]].format
+        && find_kernel(chain->down, radius, &chain->down_kernel)
+        && find_kernel(chain->across, radius, &chain->across_kernel);
+}
+
+static struct vkb_pass_row whole_row(const struct vkb_graph *graph, const struct chain *chain)
+{
+    const enum vkb_format format = graph->images[chain->composite->targets[0]].format;
+    struct vkb_pass_row row;
+    struct vkb_whole_params *params = &row.params.whole;
+
+    memcpy(&row, chain->composite, sizeof row);
+    memset(&row.params, 0, sizeof row.params);
+    row.read_count = 1;
+    row.reads[1] = 0;
+    row.alternative = true;
+    row.constants[0] = chain->extract->constants[0];
+    for (int i = 0; i < 3; ++i)
+        row.constants[1 + i] = chain->composite->constants[i];
+    row.constants[4] = format == VKB_FORMAT_RGBA8_UNORM;
+    row.constant_count = 5;
+    row.block = VKB_BLOCK_whole;
+    params->threshold = chain->extract->params.extract.threshold;
+    params->knee = chain->extract->params.extract.knee;
+    params->intensity = chain->composite->params.composite.intensity;
+    params->exposure = chain->composite->params.composite.exposure;
+    params->limit = params->blur_limit = vkb_formats[format].limit;
+    params->down_radius = chain->down_kernel.radius;
+    params->across_radius = chain->across_kernel.radius;
+    memcpy(params->down, chain->down_kernel.weights, sizeof params->down);
+    memcpy(params->across, chain->across_kernel.weights, sizeof params->across);
+    return row;
+}
+
+// The composite as it is, and after it the whole bloom in strips as its alternative.
+static bool add_strips(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
+                       struct vkb_graph *graph, bool *fits, struct vkb_error *error)
+{
+    struct chain chain;
+
+    *fits = find_chain(plain, pass, STRIP_RADIUS, &chain);
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = whole_row(plain, &chain);
+    dispatch(&row, strip_shaders[plain->images[pass->reads[0]].format], 8 * STRIP_COLUMNS,
+             STRIP_ROWS);
+    row.loads = true;
+    return vkb_graph_add_pass(graph, pass, error) && vkb_graph_add_pass(graph, &row, error);
+}
+
+static const struct form forms_table[] = {
+    {VKB_FORMS_CPU, add_line},
+    {VKB_FORMS_CPU, add_strips},
+    {VKB_FORMS_GPU, add_pixels},
+};
+
+static bool add_in_its_form(enum vkb_forms forms, const struct vkb_graph *plain,
+                            const struct vkb_pass_row *pass, struct vkb_graph *graph,
+                            struct vkb_error *error)
+{
+    for (size_t i = 0; i < sizeof forms_table / sizeof forms_table[0]; ++i) {
+        bool fits = false;
+        if (forms_table[i].forms != forms)
+            continue;
+        if (!forms_table[i].add(plain, pass, graph, &fits, error))
+            return false;
+        if (fits)
+            return true;
+    }
+    return vkb_graph_add_pass(graph, pass, error);
+}
+
+bool vkb_forms_choose(enum vkb_forms forms, struct vkb_graph *graph, struct vkb_error *error)
+{
+    struct vkb_graph plain = *graph;
+    bool done = true;
+
+    if (forms == VKB_FORMS_FRAGMENT)
+        return true;
+    // The images stay, the passes are laid anew.
+    graph->passes = NULL;
+    graph->pass_count = 0;
+    graph->pass_capacity = 0;
+    for (uint32_t i = 0; done && i < plain.pass_count; ++i) {
+        // Adding an image may move them all.
+        plain.images = graph->images;
+        done = add_in_its_form(forms, &plain, &plain.passes[i], graph, error);
+    }
+    vkb_free(plain.passes);
+    return done;
+}

@@ -1,0 +1,81 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// An image's whole bloom for processors without fast shared memory: an invocation walks down a
+// strip COLUMNS wide and ROWS tall, with the vertical sums of the rows to come in registers. The
+// blurs have the order of the passes that this stands for, so that what their images would clamp is
+// clamped here; what they would round is not rounded.
+#include "block.glsl"
+#include "threshold.glsl"
+
+UNIFORM_BLOCK(WHOLE_BLOCK);
+#include "storage.glsl"
+#include "composite.glsl"
+
+layout(constant_id = 0) const int THRESHOLD_MODE = 0;
+layout(constant_id = 1) const int COMPOSITE = COMPOSITE_ADD;
+layout(constant_id = 2) const int TONEMAP = TONEMAP_NONE;
+layout(constant_id = 3) const int ENCODING = ENCODING_NONE;
+layout(constant_id = 4) const int UNORM = 0;
+
+layout(local_size_x = 8) in;
+layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
+layout(set = 0, binding = 2) uniform writeonly image2D target;
+
+const int RADIUS = STRIP_RADIUS;
+const int SUMS = 2 * RADIUS;
+const int LOADED = STRIP_COLUMNS + 2 * RADIUS;
+
+// What an image between the passes would hold of a value.
+vec3 kept(vec3 value)
+{
+    return UNORM != 0 ? clamp(value, 0.0, 1.0) : clamp(value, -params.blur_limit, params.blur_limit);
+}
+
+float down(int tap)
+{
+    return params.down[abs(tap) >> 2][abs(tap) & 3];
+}
+
+float across(int tap)
+{
+    return params.across[abs(tap) >> 2][abs(tap) & 3];
+}
+
+void main()
+{
+    ivec2 last = imageSize(image) - 1;
+    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(STRIP_COLUMNS, STRIP_ROWS);
+    int end = min(first.y + STRIP_ROWS, last.y + 1);
+    vec3 sums[SUMS][LOADED];
+    vec3 line[LOADED];
+
+    if (any(greaterThan(first, last)))
+        return;
+    for (int row = 0; row < SUMS; ++row)
+        for (int i = 0; i < LOADED; ++i)
+            sums[row][i] = vec3(0.0);
+    for (int y = first.y - RADIUS; y < end + RADIUS; ++y) {
+        int row = clamp(y, 0, last.y);
+        for (int i = 0; i < LOADED; ++i) {
+            ivec2 texel = ivec2(clamp(first.x + i - RADIUS, 0, last.x), row);
+            vec3 value = finite_or_zero(imageLoad(image, texel).rgb);
+            vec3 bright = kept(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee));
+            // The row that ends here, and those to come, each one place further.
+            line[i] = kept(sums[0][i] + down(RADIUS) * bright);
+            for (int tap = RADIUS - 1; tap > -RADIUS; --tap)
+                sums[RADIUS - 1 - tap][i] = sums[RADIUS - tap][i] + down(tap) * bright;
+            sums[SUMS - 1][i] = down(RADIUS) * bright;
+        }
+        if (y < first.y + RADIUS)
+            continue;
+        for (int i = 0; i < STRIP_COLUMNS; ++i) {
+            ivec2 pixel = ivec2(first.x + i, y - RADIUS);
+            vec3 bloom = across(0) * line[i + RADIUS];
+            for (int tap = 1; tap <= RADIUS; ++tap)
+                bloom += across(tap) * (line[i + RADIUS - tap] + line[i + RADIUS + tap]);
+            if (pixel.x <= last.x)
+                imageStore(target, pixel,
+                           finish(imageLoad(image, pixel), kept(bloom), COMPOSITE, TONEMAP, ENCODING));
+        }
+    }
+}
