@@ -101,24 +101,32 @@ static void dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t 
 // suit the pass.
 struct form {
     enum vkb_forms forms;
-    bool (*add)(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
-                struct vkb_graph *graph, bool *fits, struct vkb_error *error);
+    bool (*add)(enum vkb_forms forms, const struct vkb_graph *plain,
+                const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+                struct vkb_error *error);
 };
 
-// Every pass over all pixels of one target as a compute shader.
-static bool add_pixels(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
-                       struct vkb_graph *graph, bool *fits, struct vkb_error *error)
+// A pass over all pixels of one target: drawn on processors, on GPUs a compute shader, for some of
+// them (made to compute) draw slowly.
+static bool add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
+                           const struct vkb_pass_row *pass, struct vkb_error *error)
 {
-    const enum vkb_shader shader = vkb_spirv[pass->shader].dispatch;
     struct vkb_pass_row row;
 
-    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN && shader != pass->shader
-         && is_written_once(plain, pass->targets[0]);
-    if (!*fits)
-        return true;
     memcpy(&row, pass, sizeof row);
-    dispatch(&row, shader, 8, 8);
+    if (forms == VKB_FORMS_GPU)
+        dispatch(&row, vkb_spirv[pass->shader].dispatch, 8, 8);
     return vkb_graph_add_pass(graph, &row, error);
+}
+
+static bool add_pixels(enum vkb_forms forms, const struct vkb_graph *plain,
+                       const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+                       struct vkb_error *error)
+{
+    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
+         && vkb_spirv[pass->shader].dispatch != pass->shader
+         && is_written_once(plain, pass->targets[0]);
+    return !*fits || add_fullscreen(forms, graph, pass, error);
 }
 
 #define BY_FORMAT(shader) \
@@ -162,17 +170,59 @@ static bool is_blur(const struct vkb_pass_row *pass)
 }
 
 // A blur whose source has the target's size, as a line.
-static bool add_line(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
-                     struct vkb_graph *graph, bool *fits, struct vkb_error *error)
+static bool add_line(enum vkb_forms forms, const struct vkb_graph *plain,
+                     const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+                     struct vkb_error *error)
 {
     struct kernel kernel;
 
+    (void)forms;
     *fits = is_blur(pass) && vkb_same_size(plain, pass->reads[0], pass->targets[0])
          && is_written_once(plain, pass->targets[0]) && find_kernel(pass, LINE_RADIUS, &kernel);
     if (!*fits)
         return true;
     struct vkb_pass_row row = line_row(graph, pass, &kernel, pass->targets[0], 0);
     return vkb_graph_add_pass(graph, &row, error);
+}
+
+// A horizontal blur into a target of another size, its taps whole texels apart: such a blur
+// commutes with the filter between the sizes, so it runs in the source's size, and every pixel of
+// the target takes one sample of it instead of one a tap.
+static bool add_enlarged(enum vkb_forms forms, const struct vkb_graph *plain,
+                         const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+                         struct vkb_error *error)
+{
+    const struct vkb_image_row *source = &plain->images[pass->reads[0]];
+    const struct vkb_image_row *target = &plain->images[pass->targets[0]];
+    const struct vkb_sampling sampling = vkb_sampling_into(plain, pass->targets[0]);
+    struct kernel kernel;
+    uint32_t lines;
+
+    *fits = is_blur(pass) && pass->constants[0] == DIRECTION_HORIZONTAL
+         && !vkb_same_size(plain, pass->reads[0], pass->targets[0])
+         && is_written_once(plain, pass->targets[0]) && floor(tap_step(pass)) == tap_step(pass)
+         && find_kernel(pass, LINE_RADIUS, &kernel);
+    if (!*fits)
+        return true;
+    // In floats: what is between two rounded values must not be rounded before. The border holds
+    // what the filter takes from beyond the edges.
+    const struct vkb_size size = {source->width + 2, source->height};
+    const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
+    if (!vkb_add_target(graph, "bloom_lines", VKB_FORMAT_RGBA32_FLOAT, size, false, &lines, error))
+        return false;
+    struct vkb_pass_row line = line_row(graph, pass, &kernel, lines, -1);
+    struct vkb_pass_row row =
+        vkb_fullscreen_row(pass->name, VKB_SHADER_enlarge_frag, pass->targets[0]);
+    snprintf(line.name, sizeof line.name, "bloom_lines");
+    row.constants[0] = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
+    row.constant_count = 1;
+    row.reads[0] = lines;
+    row.read_count = 1;
+    row.block = VKB_BLOCK_extract;
+    row.params.extract.target_width = sampling.width;
+    row.params.extract.target_height = sampling.height;
+    row.params.extract.limit = sampling.limit;
+    return vkb_graph_add_pass(graph, &line, error) && add_fullscreen(forms, graph, &row, error);
 }
 
 // The chain of passes that gives an image its bloom where all have its size.
@@ -254,8 +304,9 @@ static struct vkb_pass_row whole_row(const struct vkb_graph *graph, const struct
 }
 
 // The composite as it is, and after it the whole bloom in strips as its alternative.
-static bool add_strips(const struct vkb_graph *plain, const struct vkb_pass_row *pass,
-                       struct vkb_graph *graph, bool *fits, struct vkb_error *error)
+static bool add_strips(enum vkb_forms forms, const struct vkb_graph *plain,
+                       const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+                       struct vkb_error *error)
 {
     struct chain chain;
 
@@ -266,12 +317,36 @@ static bool add_strips(const struct vkb_graph *plain, const struct vkb_pass_row 
     dispatch(&row, strip_shaders[plain->images[pass->reads[0]].format], 8 * STRIP_COLUMNS,
              STRIP_ROWS);
     row.loads = true;
-    return vkb_graph_add_pass(graph, pass, error) && vkb_graph_add_pass(graph, &row, error);
+    return add_fullscreen(forms, graph, pass, error) && vkb_graph_add_pass(graph, &row, error);
+}
+
+// The composite as it is, and after it one that takes the bloom from the lines that end in it.
+static bool add_from_lines(enum vkb_forms forms, const struct vkb_graph *plain,
+                           const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+                           struct vkb_error *error)
+{
+    const struct vkb_pass_row *enlarging = NULL;
+    struct vkb_pass_row row;
+
+    if (pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF)
+        enlarging = writer_of(graph, pass->reads[1]);
+    *fits = enlarging
+         && (enlarging->shader == VKB_SHADER_enlarge_frag
+             || enlarging->shader == VKB_SHADER_enlarge_dispatch);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.reads[1] = enlarging->reads[0];
+    row.constants[3] = BLOOM_LINES;
+    row.constants[4] = plain->images[pass->reads[1]].format == VKB_FORMAT_RGBA8_UNORM;
+    row.constant_count = 5;
+    row.alternative = true;
+    return add_fullscreen(forms, graph, pass, error) && add_fullscreen(forms, graph, &row, error);
 }
 
 static const struct form forms_table[] = {
-    {VKB_FORMS_CPU, add_line},
-    {VKB_FORMS_CPU, add_strips},
+    {VKB_FORMS_CPU, add_line},       {VKB_FORMS_CPU, add_enlarged}, {VKB_FORMS_CPU, add_strips},
+    {VKB_FORMS_CPU, add_from_lines}, {VKB_FORMS_GPU, add_enlarged}, {VKB_FORMS_GPU, add_from_lines},
     {VKB_FORMS_GPU, add_pixels},
 };
 
@@ -283,7 +358,7 @@ static bool add_in_its_form(enum vkb_forms forms, const struct vkb_graph *plain,
         bool fits = false;
         if (forms_table[i].forms != forms)
             continue;
-        if (!forms_table[i].add(plain, pass, graph, &fits, error))
+        if (!forms_table[i].add(forms, plain, pass, graph, &fits, error))
             return false;
         if (fits)
             return true;

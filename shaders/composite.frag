@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // The finished picture: scene and bloom, exposure, tone map, encoding.
 #include "block.glsl"
+#include "sampling.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "storage.glsl"
@@ -10,6 +11,8 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
 layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
 layout(constant_id = 2) const int ENCODING = ENCODING_NONE;
+layout(constant_id = 3) const int BLOOM = BLOOM_OWN;
+layout(constant_id = 4) const int UNORM = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
@@ -17,8 +20,18 @@ layout(set = 0, binding = 2) uniform sampler2D bloom;
 #define TARGET_BINDING 3
 #include "fullscreen.glsl"
 
+// The bloom from its image, or from the lines that end in it, within what that image would hold.
+vec3 bloom_light()
+{
+    if (BLOOM == BLOOM_OWN)
+        return texelFetch(bloom, PIXEL, 0).rgb;
+    int sampling = UNORM != 0 ? SAMPLING_FILTER : SAMPLING_FETCH;
+    vec3 light = sample_bordered(bloom, PIXEL, textureSize(scene, 0), sampling).rgb;
+    return UNORM != 0 ? clamp(light, 0.0, 1.0) : light;
+}
+
 vec4 shade()
 {
-    vec3 light = COMPOSITE == COMPOSITE_OFF ? vec3(0.0) : texelFetch(bloom, PIXEL, 0).rgb;
+    vec3 light = COMPOSITE == COMPOSITE_OFF ? vec3(0.0) : bloom_light();
     return finish(texelFetch(scene, PIXEL, 0), light, COMPOSITE, TONEMAP, ENCODING);
 }

@@ -199,6 +199,8 @@
     NAME(SAMPLING_WHOLE, 0, whole) \
     NAME(SAMPLING_FILTER, 1, filter) \
     NAME(SAMPLING_FETCH, 2, fetch) \
+    NAME(BLOOM_OWN, 0, own_image) \
+    NAME(BLOOM_LINES, 1, lines) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
     NAME(UPSAMPLE_CUBIC, 2, cubic)

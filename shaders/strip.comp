@@ -41,6 +41,12 @@ float across(int tap)
     return params.across[abs(tap) >> 2][abs(tap) & 3];
 }
 
+vec3 bright(ivec2 texel)
+{
+    vec3 value = finite_or_zero(imageLoad(image, texel).rgb);
+    return kept(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee));
+}
+
 void main()
 {
     ivec2 last = imageSize(image) - 1;
@@ -48,6 +54,7 @@ void main()
     int end = min(first.y + STRIP_ROWS, last.y + 1);
     vec3 sums[SUMS][LOADED];
     vec3 line[LOADED];
+    vec3 bloom[STRIP_COLUMNS];
 
     if (any(greaterThan(first, last)))
         return;
@@ -56,26 +63,30 @@ void main()
             sums[row][i] = vec3(0.0);
     for (int y = first.y - RADIUS; y < end + RADIUS; ++y) {
         int row = clamp(y, 0, last.y);
+        // In small loops, each of which drivers unroll; in one large one the sums would be memory.
+        for (int i = 0; i < LOADED; ++i)
+            line[i] = bright(ivec2(clamp(first.x + i - RADIUS, 0, last.x), row));
         for (int i = 0; i < LOADED; ++i) {
-            ivec2 texel = ivec2(clamp(first.x + i - RADIUS, 0, last.x), row);
-            vec3 value = finite_or_zero(imageLoad(image, texel).rgb);
-            vec3 bright = kept(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee));
+            vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
-            line[i] = kept(sums[0][i] + down(RADIUS) * bright);
-            for (int tap = RADIUS - 1; tap > -RADIUS; --tap)
-                sums[RADIUS - 1 - tap][i] = sums[RADIUS - tap][i] + down(tap) * bright;
-            sums[SUMS - 1][i] = down(RADIUS) * bright;
+            line[i] = kept(sums[0][i] + down(RADIUS) * added);
+            for (int tap = 1; tap < SUMS; ++tap)
+                sums[tap - 1][i] = sums[tap][i] + down(RADIUS - tap) * added;
+            sums[SUMS - 1][i] = down(RADIUS) * added;
         }
         if (y < first.y + RADIUS)
             continue;
         for (int i = 0; i < STRIP_COLUMNS; ++i) {
-            ivec2 pixel = ivec2(first.x + i, y - RADIUS);
-            vec3 bloom = across(0) * line[i + RADIUS];
+            vec3 sum = across(0) * line[i + RADIUS];
             for (int tap = 1; tap <= RADIUS; ++tap)
-                bloom += across(tap) * (line[i + RADIUS - tap] + line[i + RADIUS + tap]);
+                sum += across(tap) * (line[i + RADIUS - tap] + line[i + RADIUS + tap]);
+            bloom[i] = kept(sum);
+        }
+        for (int i = 0; i < STRIP_COLUMNS; ++i) {
+            ivec2 pixel = ivec2(first.x + i, y - RADIUS);
             if (pixel.x <= last.x)
                 imageStore(target, pixel,
-                           finish(imageLoad(image, pixel), kept(bloom), COMPOSITE, TONEMAP, ENCODING));
+                           finish(imageLoad(image, pixel), bloom[i], COMPOSITE, TONEMAP, ENCODING));
         }
     }
 }
