@@ -3,7 +3,6 @@
 #include "methods.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 static const char *const form_names[VKB_FORMS_COUNT] = {
@@ -25,6 +24,12 @@ enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *devi
         ++forms;
     return (enum vkb_forms)forms;
 }
+
+static const enum vkb_mode stored_as[VKB_FORMAT_COUNT] = {
+    [VKB_FORMAT_RGBA8_UNORM] = STORED_UNORM8,
+    [VKB_FORMAT_RGBA16_FLOAT] = STORED_HALF,
+    [VKB_FORMAT_RGBA32_FLOAT] = STORED_SINGLE,
+};
 
 // A kernel on whole texels: the same blur where each pixel of the target lies on a texel.
 struct kernel {
@@ -97,12 +102,18 @@ static void dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t 
     row->block_height = block_height;
 }
 
-// A form takes a pass of `plain` to one or more passes of `graph`; false in *fits where it does not
-// suit the pass.
+// The choice of forms for one graph: the passes of `plain` to those of `graph`.
+struct choice {
+    enum vkb_forms forms;
+    uint32_t max_size;  // of an image's side
+    struct vkb_graph plain;
+    struct vkb_graph *graph;
+};
+
+// A form adds what runs for a pass; false in *fits, and nothing added, where it does not suit it.
 struct form {
     enum vkb_forms forms;
-    bool (*add)(enum vkb_forms forms, const struct vkb_graph *plain,
-                const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+    bool (*add)(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
                 struct vkb_error *error);
 };
 
@@ -119,14 +130,13 @@ static bool add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
     return vkb_graph_add_pass(graph, &row, error);
 }
 
-static bool add_pixels(enum vkb_forms forms, const struct vkb_graph *plain,
-                       const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+static bool add_pixels(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
                        struct vkb_error *error)
 {
     *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
          && vkb_spirv[pass->shader].dispatch != pass->shader
-         && is_written_once(plain, pass->targets[0]);
-    return !*fits || add_fullscreen(forms, graph, pass, error);
+         && is_written_once(&choice->plain, pass->targets[0]);
+    return !*fits || add_fullscreen(choice->forms, choice->graph, pass, error);
 }
 
 #define BY_FORMAT(shader) \
@@ -170,37 +180,36 @@ static bool is_blur(const struct vkb_pass_row *pass)
 }
 
 // A blur whose source has the target's size, as a line.
-static bool add_line(enum vkb_forms forms, const struct vkb_graph *plain,
-                     const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+static bool add_line(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
                      struct vkb_error *error)
 {
     struct kernel kernel;
 
-    (void)forms;
-    *fits = is_blur(pass) && vkb_same_size(plain, pass->reads[0], pass->targets[0])
-         && is_written_once(plain, pass->targets[0]) && find_kernel(pass, LINE_RADIUS, &kernel);
+    *fits = is_blur(pass) && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+         && is_written_once(&choice->plain, pass->targets[0])
+         && find_kernel(pass, LINE_RADIUS, &kernel);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = line_row(graph, pass, &kernel, pass->targets[0], 0);
-    return vkb_graph_add_pass(graph, &row, error);
+    struct vkb_pass_row row = line_row(choice->graph, pass, &kernel, pass->targets[0], 0);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 // A horizontal blur into a target of another size, its taps whole texels apart: such a blur
 // commutes with the filter between the sizes, so it runs in the source's size, and every pixel of
 // the target takes one sample of it instead of one a tap.
-static bool add_enlarged(enum vkb_forms forms, const struct vkb_graph *plain,
-                         const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+static bool add_enlarged(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
                          struct vkb_error *error)
 {
-    const struct vkb_image_row *source = &plain->images[pass->reads[0]];
-    const struct vkb_image_row *target = &plain->images[pass->targets[0]];
-    const struct vkb_sampling sampling = vkb_sampling_into(plain, pass->targets[0]);
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const struct vkb_sampling sampling = vkb_sampling_into(&choice->plain, pass->targets[0]);
     struct kernel kernel;
     uint32_t lines;
 
     *fits = is_blur(pass) && pass->constants[0] == DIRECTION_HORIZONTAL
-         && !vkb_same_size(plain, pass->reads[0], pass->targets[0])
-         && is_written_once(plain, pass->targets[0]) && floor(tap_step(pass)) == tap_step(pass)
+         && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+         && is_written_once(&choice->plain, pass->targets[0])
+         && floor(tap_step(pass)) == tap_step(pass) && source->width + 2 <= choice->max_size
          && find_kernel(pass, LINE_RADIUS, &kernel);
     if (!*fits)
         return true;
@@ -208,12 +217,12 @@ static bool add_enlarged(enum vkb_forms forms, const struct vkb_graph *plain,
     // what the filter takes from beyond the edges.
     const struct vkb_size size = {source->width + 2, source->height};
     const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
-    if (!vkb_add_target(graph, "bloom_lines", VKB_FORMAT_RGBA32_FLOAT, size, false, &lines, error))
+    if (!vkb_add_target(choice->graph, "bloom_lines", VKB_FORMAT_RGBA32_FLOAT, size, false, &lines,
+                        error))
         return false;
-    struct vkb_pass_row line = line_row(graph, pass, &kernel, lines, -1);
+    struct vkb_pass_row line = line_row(choice->graph, pass, &kernel, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, VKB_SHADER_enlarge_frag, pass->targets[0]);
-    snprintf(line.name, sizeof line.name, "bloom_lines");
     row.constants[0] = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
     row.constant_count = 1;
     row.reads[0] = lines;
@@ -222,7 +231,8 @@ static bool add_enlarged(enum vkb_forms forms, const struct vkb_graph *plain,
     row.params.extract.target_width = sampling.width;
     row.params.extract.target_height = sampling.height;
     row.params.extract.limit = sampling.limit;
-    return vkb_graph_add_pass(graph, &line, error) && add_fullscreen(forms, graph, &row, error);
+    return vkb_graph_add_pass(choice->graph, &line, error)
+        && add_fullscreen(choice->forms, choice->graph, &row, error);
 }
 
 // The chain of passes that gives an image its bloom where all have its size.
@@ -288,14 +298,14 @@ static struct vkb_pass_row whole_row(const struct vkb_graph *graph, const struct
     row.constants[0] = chain->extract->constants[0];
     for (int i = 0; i < 3; ++i)
         row.constants[1 + i] = chain->composite->constants[i];
-    row.constants[4] = format == VKB_FORMAT_RGBA8_UNORM;
+    row.constants[4] = stored_as[format];
     row.constant_count = 5;
     row.block = VKB_BLOCK_whole;
     params->threshold = chain->extract->params.extract.threshold;
     params->knee = chain->extract->params.extract.knee;
     params->intensity = chain->composite->params.composite.intensity;
     params->exposure = chain->composite->params.composite.exposure;
-    params->limit = params->blur_limit = vkb_formats[format].limit;
+    params->limit = vkb_formats[format].limit;
     params->down_radius = chain->down_kernel.radius;
     params->across_radius = chain->across_kernel.radius;
     memcpy(params->down, chain->down_kernel.weights, sizeof params->down);
@@ -304,32 +314,31 @@ static struct vkb_pass_row whole_row(const struct vkb_graph *graph, const struct
 }
 
 // The composite as it is, and after it the whole bloom in strips as its alternative.
-static bool add_strips(enum vkb_forms forms, const struct vkb_graph *plain,
-                       const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+static bool add_strips(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
                        struct vkb_error *error)
 {
     struct chain chain;
 
-    *fits = find_chain(plain, pass, STRIP_RADIUS, &chain);
+    *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, &chain);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = whole_row(plain, &chain);
-    dispatch(&row, strip_shaders[plain->images[pass->reads[0]].format], 8 * STRIP_COLUMNS,
+    struct vkb_pass_row row = whole_row(&choice->plain, &chain);
+    dispatch(&row, strip_shaders[choice->plain.images[pass->reads[0]].format], 8 * STRIP_COLUMNS,
              STRIP_ROWS);
     row.loads = true;
-    return add_fullscreen(forms, graph, pass, error) && vkb_graph_add_pass(graph, &row, error);
+    return add_fullscreen(choice->forms, choice->graph, pass, error)
+        && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 // The composite as it is, and after it one that takes the bloom from the lines that end in it.
-static bool add_from_lines(enum vkb_forms forms, const struct vkb_graph *plain,
-                           const struct vkb_pass_row *pass, struct vkb_graph *graph, bool *fits,
+static bool add_from_lines(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
                            struct vkb_error *error)
 {
     const struct vkb_pass_row *enlarging = NULL;
     struct vkb_pass_row row;
 
     if (pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF)
-        enlarging = writer_of(graph, pass->reads[1]);
+        enlarging = writer_of(choice->graph, pass->reads[1]);
     *fits = enlarging
          && (enlarging->shader == VKB_SHADER_enlarge_frag
              || enlarging->shader == VKB_SHADER_enlarge_dispatch);
@@ -338,10 +347,11 @@ static bool add_from_lines(enum vkb_forms forms, const struct vkb_graph *plain,
     memcpy(&row, pass, sizeof row);
     row.reads[1] = enlarging->reads[0];
     row.constants[3] = BLOOM_LINES;
-    row.constants[4] = plain->images[pass->reads[1]].format == VKB_FORMAT_RGBA8_UNORM;
+    row.constants[4] = stored_as[choice->plain.images[pass->reads[1]].format];
     row.constant_count = 5;
     row.alternative = true;
-    return add_fullscreen(forms, graph, pass, error) && add_fullscreen(forms, graph, &row, error);
+    return add_fullscreen(choice->forms, choice->graph, pass, error)
+        && add_fullscreen(choice->forms, choice->graph, &row, error);
 }
 
 static const struct form forms_table[] = {
@@ -350,25 +360,30 @@ static const struct form forms_table[] = {
     {VKB_FORMS_GPU, add_pixels},
 };
 
-static bool add_in_its_form(enum vkb_forms forms, const struct vkb_graph *plain,
-                            const struct vkb_pass_row *pass, struct vkb_graph *graph,
+static bool add_in_its_form(const struct choice *choice, const struct vkb_pass_row *pass,
                             struct vkb_error *error)
 {
     for (size_t i = 0; i < sizeof forms_table / sizeof forms_table[0]; ++i) {
         bool fits = false;
-        if (forms_table[i].forms != forms)
+        if (forms_table[i].forms != choice->forms)
             continue;
-        if (!forms_table[i].add(forms, plain, pass, graph, &fits, error))
+        if (!forms_table[i].add(choice, pass, &fits, error))
             return false;
         if (fits)
             return true;
     }
-    return vkb_graph_add_pass(graph, pass, error);
+    return vkb_graph_add_pass(choice->graph, pass, error);
 }
 
-bool vkb_forms_choose(enum vkb_forms forms, struct vkb_graph *graph, struct vkb_error *error)
+bool vkb_forms_choose(enum vkb_forms forms, uint32_t max_size, struct vkb_graph *graph,
+                      struct vkb_error *error)
 {
-    struct vkb_graph plain = *graph;
+    struct choice choice = {
+        .forms = forms,
+        .max_size = max_size,
+        .plain = *graph,
+        .graph = graph,
+    };
     bool done = true;
 
     if (forms == VKB_FORMS_FRAGMENT)
@@ -377,11 +392,11 @@ bool vkb_forms_choose(enum vkb_forms forms, struct vkb_graph *graph, struct vkb_
     graph->passes = NULL;
     graph->pass_count = 0;
     graph->pass_capacity = 0;
-    for (uint32_t i = 0; done && i < plain.pass_count; ++i) {
+    for (uint32_t i = 0; done && i < choice.plain.pass_count; ++i) {
         // Adding an image may move them all.
-        plain.images = graph->images;
-        done = add_in_its_form(forms, &plain, &plain.passes[i], graph, error);
+        choice.plain.images = graph->images;
+        done = add_in_its_form(&choice, &choice.plain.passes[i], error);
     }
-    vkb_free(plain.passes);
+    vkb_free(choice.plain.passes);
     return done;
 }

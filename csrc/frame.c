@@ -1,5 +1,7 @@
 #include "frame.h"
 
+#include "plan.h"
+
 #include <string.h>
 
 // The state of one run.
@@ -8,7 +10,7 @@ struct run {
     struct vkb_frame *frame;
     const struct vkb_graph *graph;
     struct vkb_slot **slots;  // by the graph's image index
-    bool *needed;             // by pass
+    bool *needed, *current;   // by pass
     uint32_t *ran;            // the first pass of each render pass that was recorded
     uint32_t ran_count;
     struct vkb_slot *input;  // NULL: none, or none that is needed
@@ -28,7 +30,6 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
     vkb_slots_destroy(device, &frame->slots);
-    vkb_plan_memory_destroy(&frame->plan);
     vkb_timer_destroy(device, &frame->timer);
     device->vk.vkDestroyDescriptorPool(device->handle, frame->descriptors, NULL);
     vkb_buffer_destroy(device, &frame->uniforms);
@@ -70,6 +71,17 @@ static bool write_recipe(struct run *run, uint32_t first, uint32_t end, struct v
             return false;
     }
     return true;
+}
+
+// Whether the image is there and what the passes before `end` that write it would make.
+static bool is_current(const struct run *run, uint32_t image, uint32_t end)
+{
+    bool current = run->slots[image] != NULL;
+
+    for (uint32_t i = 0; i < end; ++i)
+        if (vkb_pass_writes(&run->graph->passes[i], image) && !run->graph->passes[i].alternative)
+            current = current && run->current[i];
+    return current;
 }
 
 // The slots of a pass's targets, the depth last; returns how many.
@@ -304,10 +316,11 @@ static bool record_dispatch(struct run *run, uint32_t index, struct vkb_error *e
     struct vkb_frame *frame = run->frame;
     VkCommandBuffer commands = frame->commands.buffer;
 
+    // Started before the barriers: on lavapipe a timestamp is taken at the next barrier.
+    vkb_timer_start(device, commands, &frame->timer, run->ran_count);
     transition_reads(run, index, index + 1);
     vkb_image_transition(device, commands, &run->slots[run->graph->passes[index].targets[0]]->image,
                          VKB_ACCESS_DISPATCH_STORED);
-    vkb_timer_start(device, commands, &frame->timer, run->ran_count);
     if (!record_pass(run, index, VK_NULL_HANDLE, error))
         return false;
     vkb_timer_stop(device, commands, &frame->timer, run->ran_count);
@@ -355,6 +368,35 @@ static bool record_group(struct run *run, uint32_t first, uint32_t end, struct v
                     : !record_render_pass(run, first, end, targets, target_count, error))
         return false;
     run->ran[run->ran_count++] = first;
+    return true;
+}
+
+// Finds out which passes have nothing to do, from the first to the last: their targets hold what
+// the recipe says, and all that they read is so too.
+static bool mark_current(struct run *run, struct vkb_error *error)
+{
+    const struct vkb_graph *graph = run->graph;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        run->slots[i] = vkb_slots_find(&run->frame->slots, &graph->images[i]);
+    for (uint32_t first = 0, end; first < graph->pass_count; first = end) {
+        struct vkb_slot *targets[VKB_MAX_TARGETS + 1] = {0};
+        const uint32_t target_count = target_slots(run, &graph->passes[first], targets);
+        bool found = true;
+
+        end = vkb_graph_group_end(graph, first);
+        for (uint32_t i = first; i < end; ++i)
+            for (uint32_t read = 0; read < graph->passes[i].read_count; ++read)
+                found = found && is_current(run, graph->passes[i].reads[read], first);
+        for (uint32_t i = 0; i < target_count; ++i)
+            found = found && targets[i];
+        if (found && !write_recipe(run, first, end, error))
+            return false;
+        for (uint32_t i = 0; i < target_count; ++i)
+            found = found && vkb_slot_up_to_date(targets[i], run->recipe, run->recipe_size);
+        for (uint32_t i = first; i < end; ++i)
+            run->current[i] = found;
+    }
     return true;
 }
 
@@ -443,14 +485,29 @@ static void end_writing(struct run *run)
         run->input->valid = true;
 }
 
-// One time a render pass, under the name of the image that it writes.
-static bool read_timings(const struct run *run, struct vkb_timing *timings, struct vkb_error *error)
+// One time a render pass, under the name of the image that it writes, or a dispatch, under its own.
+// What has the same name is steps of one thing: their times add up.
+static bool read_timings(const struct run *run, struct vkb_timing *timings, uint32_t *timing_count,
+                         struct vkb_error *error)
 {
     for (uint32_t i = 0; i < run->ran_count; ++i) {
         const struct vkb_pass_row *pass = &run->graph->passes[run->ran[i]];
-        memcpy(timings[i].name, run->slots[pass->targets[0]]->name, sizeof timings[i].name);
-        if (!vkb_timer_read(run->device, &run->frame->timer, i, &timings[i].seconds, error))
+        const char *name = pass->geometry == VKB_GEOMETRY_DISPATCH
+                             ? pass->name
+                             : run->slots[pass->targets[0]]->name;
+        uint32_t at = 0;
+        double seconds;
+        if (!vkb_timer_read(run->device, &run->frame->timer, i, &seconds, error))
             return false;
+        while (at < *timing_count && strcmp(timings[at].name, name) != 0)
+            ++at;
+        if (at < *timing_count) {
+            timings[at].seconds += seconds;
+            continue;
+        }
+        memcpy(timings[at].name, name, sizeof timings[at].name);
+        timings[at].seconds = seconds;
+        ++*timing_count;
     }
     return true;
 }
@@ -499,7 +556,8 @@ static bool stage_input(struct run *run, const struct vkb_input *input, struct v
 
 static bool run_frame(struct run *run, const struct vkb_frame_source *source,
                       const struct vkb_output *outputs, uint32_t output_count, bool *wanted,
-                      VkDeviceSize *offsets, struct vkb_timing *timings, struct vkb_error *error)
+                      VkDeviceSize *offsets, struct vkb_timing *timings, uint32_t *timing_count,
+                      struct vkb_error *error)
 {
     struct vkb_frame *frame = run->frame;
 
@@ -510,8 +568,8 @@ static bool run_frame(struct run *run, const struct vkb_frame_source *source,
         return false;
     if (source->input && !stage_input(run, source->input, error))
         return false;
-    if (!vkb_plan(run->graph, run->slots, outputs, output_count, &frame->plan, run->needed, wanted,
-                  error))
+    if (!mark_current(run, error)
+        || !vkb_plan(run->graph, outputs, output_count, run->current, run->needed, wanted, error))
         return false;
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
         if (wanted[i]
@@ -520,7 +578,7 @@ static bool run_frame(struct run *run, const struct vkb_frame_source *source,
             return false;
     if (!reserve(run, outputs, output_count, error)
         || !record_and_run(run, outputs, output_count, offsets, error)
-        || !read_timings(run, timings, error))
+        || !read_timings(run, timings, timing_count, error))
         return false;
     for (uint32_t i = 0; i < output_count; ++i)
         vkb_readback_fetch(&frame->readback, offsets[i], &run->slots[outputs[i].image]->image,
@@ -553,16 +611,17 @@ bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
         return true;
     done = (run.slots = vkb_alloc(error, graph->image_count, sizeof *run.slots))
         && (run.needed = vkb_alloc(error, graph->pass_count, sizeof *run.needed))
+        && (run.current = vkb_alloc(error, graph->pass_count, sizeof *run.current))
         && (run.ran = vkb_alloc(error, graph->pass_count, sizeof *run.ran))
         && (wanted = vkb_alloc(error, graph->image_count, sizeof *wanted))
         && (offsets = vkb_alloc(error, output_count, sizeof *offsets))
-        && run_frame(&run, source, outputs, output_count, wanted, offsets, timings, error);
-    if (done)
-        *timing_count = run.ran_count;
-    else
+        && run_frame(&run, source, outputs, output_count, wanted, offsets, timings, timing_count,
+                     error);
+    if (!done)
         recover(device, frame);
     vkb_free(run.slots);
     vkb_free(run.needed);
+    vkb_free(run.current);
     vkb_free(run.ran);
     vkb_free(run.recipe);
     vkb_free(wanted);

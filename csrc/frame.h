@@ -6,7 +6,7 @@
 #include "commands.h"
 #include "graph.h"
 #include "pipeline.h"
-#include "plan.h"
+#include "readback.h"
 #include "scene.h"
 #include "slots.h"
 #include "timing.h"
@@ -22,7 +22,6 @@ struct vkb_frame {
     struct vkb_buffer uniforms;
     struct vkb_timer timer;
     struct vkb_slots slots;
-    struct vkb_plan_memory plan;
     VkDescriptorPool descriptors;
     uint32_t descriptor_capacity;  // in passes
 };

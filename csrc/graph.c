@@ -64,7 +64,7 @@ static bool reads(const struct vkb_pass_row *pass, uint32_t image)
     return false;
 }
 
-static bool writes(const struct vkb_pass_row *pass, uint32_t image)
+bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
 {
     for (uint32_t i = 0; i < pass->target_count; ++i)
         if (pass->targets[i] == image)
@@ -132,7 +132,7 @@ uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
 static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
 {
     for (uint32_t i = 0; i < pass_index; ++i)
-        if (writes(&graph->passes[i], image))
+        if (vkb_pass_writes(&graph->passes[i], image))
             return true;
     return graph->images[image].input;
 }
@@ -179,7 +179,7 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
         if (vkb_graph_group_end(graph, i) > pass_index
             || (pass->alternative && i == pass_index - 1))
             continue;
-        if (writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
+        if (vkb_pass_writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
             return vkb_fail(error, VKB_ERROR_GENERAL,
                             "graph: pass %s writes %s, which pass %s used before", pass->name,
                             row->name, graph->passes[i].name);

@@ -86,6 +86,8 @@ bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_size, struct vk
 // The index after the last pass that shares a render pass with pass `first`.
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 
+bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
+
 // How a pass reads its images.
 enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass);
 

@@ -329,7 +329,8 @@ static PyObject *render(PyObject *object, PyObject *arguments)
         source.has_emission = scene.data.body.emission != NULL;
         if (require_open(self, &error)
             && vkb_build_scene(shading, &settings, &source, &graph, &error)
-            && vkb_forms_choose(self->forms, &graph, &error)
+            && vkb_forms_choose(self->forms, self->device.limits.maxFramebufferWidth, &graph,
+                                &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
             result = run_graph(self, &graph, &(struct vkb_frame_source){.scene = &scene.data},
                                names, allocate);
@@ -360,7 +361,8 @@ static PyObject *apply(PyObject *object, PyObject *arguments)
             .channels = image.input.channels,
         };
         if (require_open(self, &error) && vkb_build_image(&settings, &source, &graph, &error)
-            && vkb_forms_choose(self->forms, &graph, &error)
+            && vkb_forms_choose(self->forms, self->device.limits.maxFramebufferWidth, &graph,
+                                &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
             result = run_graph(self, &graph, &(struct vkb_frame_source){.input = &image.input},
                                names, allocate);

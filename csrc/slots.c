@@ -67,6 +67,19 @@ static struct vkb_slot *add_slot(struct vkb_slots *slots, const char *name, stru
     return slot;
 }
 
+static bool fits(const struct vkb_slot *slot, const struct vkb_image_row *row)
+{
+    return slot->image.handle && slot->image.format == row->format
+        && slot->image.width == row->width && slot->image.height == row->height;
+}
+
+struct vkb_slot *vkb_slots_find(const struct vkb_slots *slots, const struct vkb_image_row *row)
+{
+    struct vkb_slot *slot = find_slot(slots, row->name);
+
+    return slot && fits(slot, row) ? slot : NULL;
+}
+
 bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
                        const struct vkb_image_row *row, struct vkb_slot **resolved,
                        struct vkb_error *error)
@@ -76,8 +89,7 @@ bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
     if (!slot && !(slot = add_slot(slots, row->name, error)))
         return false;
     *resolved = slot;
-    if (slot->image.handle && slot->image.format == row->format && slot->image.width == row->width
-        && slot->image.height == row->height)
+    if (fits(slot, row))
         return true;
     slot->valid = false;
     slot->image_id = ++slots->clock;

@@ -27,6 +27,9 @@ struct vkb_slots {
 
 void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots);
 
+// The slot of an image row where it holds an image of the row's size and format, else NULL.
+struct vkb_slot *vkb_slots_find(const struct vkb_slots *slots, const struct vkb_image_row *row);
+
 // The slot of an image row, with an image of the row's size and format in it.
 bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
                        const struct vkb_image_row *row, struct vkb_slot **slot,

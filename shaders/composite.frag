@@ -12,7 +12,7 @@ layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
 layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
 layout(constant_id = 2) const int ENCODING = ENCODING_NONE;
 layout(constant_id = 3) const int BLOOM = BLOOM_OWN;
-layout(constant_id = 4) const int UNORM = 0;
+layout(constant_id = 4) const int BLOOM_FORMAT = STORED_SINGLE;
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
@@ -20,14 +20,14 @@ layout(set = 0, binding = 2) uniform sampler2D bloom;
 #define TARGET_BINDING 3
 #include "fullscreen.glsl"
 
-// The bloom from its image, or from the lines that end in it, within what that image would hold.
+// The bloom from its image, or from the lines that end in it, as that image would give it back.
 vec3 bloom_light()
 {
     if (BLOOM == BLOOM_OWN)
         return texelFetch(bloom, PIXEL, 0).rgb;
-    int sampling = UNORM != 0 ? SAMPLING_FILTER : SAMPLING_FETCH;
+    int sampling = BLOOM_FORMAT == STORED_UNORM8 ? SAMPLING_FILTER : SAMPLING_FETCH;
     vec3 light = sample_bordered(bloom, PIXEL, textureSize(scene, 0), sampling).rgb;
-    return UNORM != 0 ? clamp(light, 0.0, 1.0) : light;
+    return as_stored(light, BLOOM_FORMAT);
 }
 
 vec4 shade()

@@ -55,7 +55,6 @@
     INPUT(B, float, intensity) \
     INPUT(B, float, exposure) \
     INPUT(B, float, limit) \
-    INPUT(B, float, blur_limit) \
     INPUT(B, int, down_radius) \
     INPUT(B, int, across_radius) \
     VEC4S(B, down, WHOLE_VEC4S) \
@@ -199,6 +198,9 @@
     NAME(SAMPLING_WHOLE, 0, whole) \
     NAME(SAMPLING_FILTER, 1, filter) \
     NAME(SAMPLING_FETCH, 2, fetch) \
+    NAME(STORED_UNORM8, 0, unorm8) \
+    NAME(STORED_HALF, 1, half) \
+    NAME(STORED_SINGLE, 2, single) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
     NAME(UPSAMPLE_TENT, 0, tent) \

@@ -1,9 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // An image's whole bloom for processors without fast shared memory: an invocation walks down a
-// strip COLUMNS wide and ROWS tall, with the vertical sums of the rows to come in registers. The
-// blurs have the order of the passes that this stands for, so that what their images would clamp is
-// clamped here; what they would round is not rounded.
+// strip, with the vertical sums of the rows to come in registers. All is added up in the order of
+// the passes that this stands for, and rounded as their images would, so that it does not show in a
+// picture which of the two made it.
 #include "block.glsl"
 #include "threshold.glsl"
 
@@ -15,7 +15,7 @@ layout(constant_id = 0) const int THRESHOLD_MODE = 0;
 layout(constant_id = 1) const int COMPOSITE = COMPOSITE_ADD;
 layout(constant_id = 2) const int TONEMAP = TONEMAP_NONE;
 layout(constant_id = 3) const int ENCODING = ENCODING_NONE;
-layout(constant_id = 4) const int UNORM = 0;
+layout(constant_id = 4) const int FORMAT = STORED_SINGLE;
 
 layout(local_size_x = 8) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
@@ -24,12 +24,6 @@ layout(set = 0, binding = 2) uniform writeonly image2D target;
 const int RADIUS = STRIP_RADIUS;
 const int SUMS = 2 * RADIUS;
 const int LOADED = STRIP_COLUMNS + 2 * RADIUS;
-
-// What an image between the passes would hold of a value.
-vec3 kept(vec3 value)
-{
-    return UNORM != 0 ? clamp(value, 0.0, 1.0) : clamp(value, -params.blur_limit, params.blur_limit);
-}
 
 float down(int tap)
 {
@@ -44,7 +38,7 @@ float across(int tap)
 vec3 bright(ivec2 texel)
 {
     vec3 value = finite_or_zero(imageLoad(image, texel).rgb);
-    return kept(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee));
+    return as_stored(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee), FORMAT);
 }
 
 void main()
@@ -69,7 +63,7 @@ void main()
         for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
-            line[i] = kept(sums[0][i] + down(RADIUS) * added);
+            line[i] = as_stored(sums[0][i] + down(RADIUS) * added, FORMAT);
             for (int tap = 1; tap < SUMS; ++tap)
                 sums[tap - 1][i] = sums[tap][i] + down(RADIUS - tap) * added;
             sums[SUMS - 1][i] = down(RADIUS) * added;
@@ -77,10 +71,10 @@ void main()
         if (y < first.y + RADIUS)
             continue;
         for (int i = 0; i < STRIP_COLUMNS; ++i) {
-            vec3 sum = across(0) * line[i + RADIUS];
-            for (int tap = 1; tap <= RADIUS; ++tap)
-                sum += across(tap) * (line[i + RADIUS - tap] + line[i + RADIUS + tap]);
-            bloom[i] = kept(sum);
+            vec3 sum = vec3(0.0);
+            for (int tap = -RADIUS; tap <= RADIUS; ++tap)
+                sum += across(tap) * line[i + RADIUS + tap];
+            bloom[i] = as_stored(sum, FORMAT);
         }
         for (int i = 0; i < STRIP_COLUMNS; ++i) {
             ivec2 pixel = ivec2(first.x + i, y - RADIUS);
