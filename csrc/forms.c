@@ -3,6 +3,7 @@
 #include "methods.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 static const char *const form_names[VKB_FORMS_COUNT] = {
@@ -148,6 +149,8 @@ static bool add_pixels(const struct choice *choice, const struct vkb_pass_row *p
 
 static const enum vkb_shader line_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(line_comp);
 static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(strip_comp);
+static const enum vkb_shader halve_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(halve_comp);
+static const enum vkb_shader double_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(double_comp);
 
 // A line's row: `origin` is the place of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct vkb_pass_row *blur,
@@ -217,8 +220,9 @@ static bool add_enlarged(const struct choice *choice, const struct vkb_pass_row 
     // what the filter takes from beyond the edges.
     const struct vkb_size size = {source->width + 2, source->height};
     const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
-    if (!vkb_add_target(choice->graph, "bloom_lines", VKB_FORMAT_RGBA32_FLOAT, size, false, &lines,
-                        error))
+    char name[VKB_NAME_SIZE];
+    snprintf(name, sizeof name, "%.24s_lines", pass->name);
+    if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, &lines, error))
         return false;
     struct vkb_pass_row line = line_row(choice->graph, pass, &kernel, lines, -1);
     struct vkb_pass_row row =
@@ -354,9 +358,90 @@ static bool add_from_lines(const struct choice *choice, const struct vkb_pass_ro
         && add_fullscreen(choice->forms, choice->graph, &row, error);
 }
 
+static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t small)
+{
+    return graph->images[large].width == 2 * graph->images[small].width
+        && graph->images[large].height == 2 * graph->images[small].height;
+}
+
+static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
+                           uint32_t rows)
+{
+    dispatch(row, shader, 8 * columns, rows);
+    row->loads = true;
+    memset(row->constants, 0, sizeof row->constants);
+    row->constant_count = 0;
+}
+
+// The 13 taps from a level of exactly twice the size. Where fireflies are filtered the groups have
+// weights of their own, so that the kernel does not fall apart into separable ones.
+static bool add_halved(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
+                       struct vkb_error *error)
+{
+    const struct vkb_graph *plain = &choice->plain;
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == VKB_SHADER_pyramid_down_frag && pass->constants[1] == 0
+         && is_twice(plain, pass->reads[0], pass->targets[0]);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    load_in_strips(&row, halve_shaders[plain->images[pass->reads[0]].format], HALVE_COLUMNS,
+                   HALVE_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// What the taps of an upsampling to twice the size are on whole texels: those of a pixel at a
+// quarter of a texel after a texel's centre, from the texel before it. The tent's outer taps are up
+// to one texel away; a bilinear sample is a tent of no width.
+static void find_up_taps(double radius, float taps[4])
+{
+    static const double shares[3] = {0.25, 0.5, 0.25};
+    double sums[4] = {0};
+
+    for (int tap = 0; tap < 3; ++tap) {
+        const double at = 1.25 + (tap - 1) * radius, part = at - floor(at);
+        const int texel = (int)floor(at);
+        sums[texel] += shares[tap] * (1.0 - part);
+        if (part > 0.0)
+            sums[texel + 1] += shares[tap] * part;
+    }
+    for (int i = 0; i < 4; ++i)
+        taps[i] = (float)sums[i];
+}
+
+static bool add_doubled(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
+                        struct vkb_error *error)
+{
+    const struct vkb_graph *plain = &choice->plain;
+    const struct vkb_pyramid_params *params = &pass->params.pyramid;
+    const int kernel = pass->constants[2];
+    const double radius = kernel == UPSAMPLE_TENT ? params->step_x : 0.0;
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == VKB_SHADER_pyramid_up_frag && kernel != UPSAMPLE_CUBIC
+         && is_twice(plain, pass->targets[0], pass->reads[0]) && radius <= 1.0
+         && (kernel != UPSAMPLE_TENT || params->step_x == params->step_y);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    load_in_strips(&row, double_shaders[plain->images[pass->reads[0]].format], DOUBLE_COLUMNS,
+                   DOUBLE_ROWS);
+    row.constants[0] = pass->constants[1];
+    row.constant_count = 1;
+    find_up_taps(radius, row.params.pyramid.taps[0]);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 static const struct form forms_table[] = {
-    {VKB_FORMS_CPU, add_line},       {VKB_FORMS_CPU, add_enlarged}, {VKB_FORMS_CPU, add_strips},
-    {VKB_FORMS_CPU, add_from_lines}, {VKB_FORMS_GPU, add_enlarged}, {VKB_FORMS_GPU, add_from_lines},
+    {VKB_FORMS_CPU, add_line},
+    {VKB_FORMS_CPU, add_enlarged},
+    {VKB_FORMS_CPU, add_strips},
+    {VKB_FORMS_CPU, add_from_lines},
+    {VKB_FORMS_CPU, add_halved},
+    {VKB_FORMS_CPU, add_doubled},
+    {VKB_FORMS_GPU, add_enlarged},
+    {VKB_FORMS_GPU, add_from_lines},
     {VKB_FORMS_GPU, add_pixels},
 };
 

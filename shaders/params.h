@@ -66,14 +66,16 @@
     THRESHOLD_ROWS(B, SETTING)
 
 // A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
-// the steps the distance of the tent's taps in texels of the smaller level.
+// the steps the distance of the tent's taps in texels of the smaller level. `taps` are the same
+// weights on whole texels, where a level is exactly twice as large as the one below.
 #define PYRAMID_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, radius, 1.0, 0.0, 16.0) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
     INPUT(B, float, step_x) \
-    INPUT(B, float, step_y)
+    INPUT(B, float, step_y) \
+    VEC4S(B, taps, 1)
 
 // The first pass of a published method, from the frame.
 #define PREFILTER_BLOCK(B, SETTING, INPUT, VEC4S) \
@@ -151,6 +153,10 @@
 #define STRIP_RADIUS 4
 #define STRIP_COLUMNS 8
 #define STRIP_ROWS 72
+#define HALVE_COLUMNS 4
+#define HALVE_ROWS 16
+#define DOUBLE_COLUMNS 4
+#define DOUBLE_ROWS 32
 #define TILE_RADIUS 16
 #define WHOLE_VEC4S 5
 

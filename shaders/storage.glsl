@@ -23,7 +23,7 @@ vec3 storable(vec3 value)
 vec3 as_stored(vec3 value, int format)
 {
     if (format == STORED_UNORM8)
-        return roundEven(255.0 * clamp(value, 0.0, 1.0)) / 255.0;
+        return roundEven(255.0 * clamp(value, 0.0, 1.0)) * (1.0 / 255.0);
     if (format == STORED_HALF)
         return nearest_half(clamp(value, -HALF_LIMIT, HALF_LIMIT));
     return value;
