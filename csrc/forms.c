@@ -299,16 +299,15 @@ static struct vkb_pass_row whole_row(const struct vkb_graph *graph, const struct
     row.read_count = 1;
     row.reads[1] = 0;
     row.alternative = true;
-    row.constants[0] = chain->extract->constants[0];
-    for (int i = 0; i < 3; ++i)
-        row.constants[1 + i] = chain->composite->constants[i];
-    row.constants[4] = stored_as[format];
-    row.constant_count = 5;
+    row.constants[4] = chain->extract->constants[0];
+    row.constants[5] = stored_as[format];
+    row.constant_count = 6;
     row.block = VKB_BLOCK_whole;
     params->threshold = chain->extract->params.extract.threshold;
     params->knee = chain->extract->params.extract.knee;
     params->intensity = chain->composite->params.composite.intensity;
     params->exposure = chain->composite->params.composite.exposure;
+    params->noise_seed = chain->composite->params.composite.noise_seed;
     params->limit = vkb_formats[format].limit;
     params->down_radius = chain->down_kernel.radius;
     params->across_radius = chain->across_kernel.radius;
@@ -350,9 +349,9 @@ static bool add_from_lines(const struct choice *choice, const struct vkb_pass_ro
         return true;
     memcpy(&row, pass, sizeof row);
     row.reads[1] = enlarging->reads[0];
-    row.constants[3] = BLOOM_LINES;
-    row.constants[4] = stored_as[choice->plain.images[pass->reads[1]].format];
-    row.constant_count = 5;
+    row.constants[4] = BLOOM_LINES;
+    row.constants[5] = stored_as[choice->plain.images[pass->reads[1]].format];
+    row.constant_count = 6;
     row.alternative = true;
     return add_fullscreen(choice->forms, choice->graph, pass, error)
         && add_fullscreen(choice->forms, choice->graph, &row, error);
@@ -434,15 +433,9 @@ static bool add_doubled(const struct choice *choice, const struct vkb_pass_row *
 }
 
 static const struct form forms_table[] = {
-    {VKB_FORMS_CPU, add_line},
-    {VKB_FORMS_CPU, add_enlarged},
-    {VKB_FORMS_CPU, add_strips},
-    {VKB_FORMS_CPU, add_from_lines},
-    {VKB_FORMS_CPU, add_halved},
-    {VKB_FORMS_CPU, add_doubled},
-    {VKB_FORMS_GPU, add_enlarged},
-    {VKB_FORMS_GPU, add_from_lines},
-    {VKB_FORMS_GPU, add_pixels},
+    {VKB_FORMS_CPU, add_line},       {VKB_FORMS_CPU, add_enlarged},   {VKB_FORMS_CPU, add_strips},
+    {VKB_FORMS_CPU, add_from_lines}, {VKB_FORMS_CPU, add_halved},     {VKB_FORMS_CPU, add_doubled},
+    {VKB_FORMS_GPU, add_enlarged},   {VKB_FORMS_GPU, add_from_lines}, {VKB_FORMS_GPU, add_pixels},
 };
 
 static bool add_in_its_form(const struct choice *choice, const struct vkb_pass_row *pass,

@@ -12,7 +12,7 @@ enum {
     VKB_NAME_SIZE = 32,
     VKB_MAX_READS = GATHERED_LEVELS,
     VKB_MAX_TARGETS = 4,
-    VKB_MAX_CONSTANTS = 5,
+    VKB_MAX_CONSTANTS = 6,
 };
 
 #define VKB_NO_IMAGE UINT32_MAX
@@ -38,15 +38,22 @@ enum vkb_geometry {
     VKB_GEOMETRY_DISPATCH,
 };
 
+static inline bool vkb_is_mesh(enum vkb_geometry geometry)
+{
+    return geometry == VKB_GEOMETRY_BODY || geometry == VKB_GEOMETRY_GLOW;
+}
+
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
 enum vkb_blend { VKB_BLEND_NONE, VKB_BLEND_ADD };
 
 // Bindings: 0 the parameter block, then the images read in their order, then the target of a
-// dispatch; a skybox reads the scene's cubemap at binding 1. Passes that draw and follow each other
-// with the same targets share a render pass; the first one's load op counts.
+// dispatch; a skybox reads the scene's cubemap at binding 1, textured triangles the base colour's
+// texture and the emission's. Passes that draw and follow each other with the same targets share a
+// render pass; the first one's load op counts.
 struct vkb_pass_row {
     char name[VKB_NAME_SIZE];
     enum vkb_geometry geometry;
+    bool textured;  // draws the mesh's triangles that have textures, not those that have none
     enum vkb_shader vertex, shader;        // a dispatch has no vertex shader
     int32_t constants[VKB_MAX_CONSTANTS];  // specialization constants 0, 1, ...
     uint32_t constant_count;

@@ -50,10 +50,11 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
                        const struct vkb_pass_row *pass, VkRenderPass render_pass,
                        VkPipeline *pipeline, struct vkb_error *error);
 
-// How many images the pass reads by descriptor, the skybox's cubemap counted in.
+// How many images the pass reads by descriptor, the scene's cubemap or textures counted in.
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
 
 enum vkb_binding_kind vkb_pass_binding_kind(const struct vkb_pass_row *pass);
+VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass);
 
 // The layout of the descriptors that fit the pass, and the pipeline layout of just them.
 VkDescriptorSetLayout vkb_pipelines_set_layout(const struct vkb_pipelines *pipelines,

@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The finished picture: scene and bloom, exposure, tone map, encoding.
+// The finished picture: scene and bloom, exposure, tone map, encoding, dither.
 #include "block.glsl"
 #include "sampling.glsl"
 
@@ -8,11 +8,8 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "storage.glsl"
 #include "composite.glsl"
 
-layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
-layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
-layout(constant_id = 2) const int ENCODING = ENCODING_NONE;
-layout(constant_id = 3) const int BLOOM = BLOOM_OWN;
-layout(constant_id = 4) const int BLOOM_FORMAT = STORED_SINGLE;
+layout(constant_id = 4) const int BLOOM = BLOOM_OWN;
+layout(constant_id = 5) const int BLOOM_FORMAT = STORED_SINGLE;
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
@@ -33,5 +30,5 @@ vec3 bloom_light()
 vec4 shade()
 {
     vec3 light = COMPOSITE == COMPOSITE_OFF ? vec3(0.0) : bloom_light();
-    return finish(texelFetch(scene, PIXEL, 0), light, COMPOSITE, TONEMAP, ENCODING);
+    return finish(texelFetch(scene, PIXEL, 0), light, PIXEL);
 }

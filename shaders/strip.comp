@@ -11,11 +11,8 @@ UNIFORM_BLOCK(WHOLE_BLOCK);
 #include "storage.glsl"
 #include "composite.glsl"
 
-layout(constant_id = 0) const int THRESHOLD_MODE = 0;
-layout(constant_id = 1) const int COMPOSITE = COMPOSITE_ADD;
-layout(constant_id = 2) const int TONEMAP = TONEMAP_NONE;
-layout(constant_id = 3) const int ENCODING = ENCODING_NONE;
-layout(constant_id = 4) const int FORMAT = STORED_SINGLE;
+layout(constant_id = 4) const int THRESHOLD_MODE = 0;
+layout(constant_id = 5) const int FORMAT = STORED_SINGLE;
 
 layout(local_size_x = 8) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
@@ -80,7 +77,7 @@ void main()
             ivec2 pixel = ivec2(first.x + i, y - RADIUS);
             if (pixel.x <= last.x)
                 imageStore(target, pixel,
-                           finish(imageLoad(image, pixel), bloom[i], COMPOSITE, TONEMAP, ENCODING));
+                           finish(imageLoad(image, pixel), bloom[i], pixel));
         }
     }
 }
