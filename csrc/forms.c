@@ -106,7 +106,7 @@ static void dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t 
 // The choice of forms for one graph: the passes of `plain` to those of `graph`.
 struct choice {
     enum vkb_forms forms;
-    uint32_t max_size;  // of an image's side
+    const VkPhysicalDeviceLimits *limits;
     struct vkb_graph plain;
     struct vkb_graph *graph;
 };
@@ -212,7 +212,8 @@ static bool add_enlarged(const struct choice *choice, const struct vkb_pass_row 
     *fits = is_blur(pass) && pass->constants[0] == DIRECTION_HORIZONTAL
          && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
          && is_written_once(&choice->plain, pass->targets[0])
-         && floor(tap_step(pass)) == tap_step(pass) && source->width + 2 <= choice->max_size
+         && floor(tap_step(pass)) == tap_step(pass)
+         && source->width + 2 <= choice->limits->maxFramebufferWidth
          && find_kernel(pass, LINE_RADIUS, &kernel);
     if (!*fits)
         return true;
@@ -357,6 +358,29 @@ static bool add_from_lines(const struct choice *choice, const struct vkb_pass_ro
         && add_fullscreen(choice->forms, choice->graph, &row, error);
 }
 
+// The same in tiles, for kernels of up to TILE_RADIUS in three steps.
+static bool add_tiles(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
+                      struct vkb_error *error)
+{
+    const size_t shared = 3 * sizeof(float) * TILE_ROWS * TILE_LOADED;
+    struct chain chain;
+    int radius = TILE_RADIUS / 4;
+
+    *fits = choice->limits->maxComputeSharedMemorySize >= shared
+         && choice->limits->maxComputeWorkGroupInvocations >= TILE_LOADED * TILE_RUNS
+         && find_chain(&choice->plain, pass, TILE_RADIUS, &chain);
+    if (!*fits)
+        return true;
+    while (radius < chain.down_kernel.radius || radius < chain.across_kernel.radius)
+        radius *= 2;
+    struct vkb_pass_row row = whole_row(&choice->plain, &chain);
+    dispatch(&row, VKB_SHADER_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
+    row.constants[6] = radius;
+    row.constant_count = 7;
+    return add_fullscreen(choice->forms, choice->graph, pass, error)
+        && vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t small)
 {
     return graph->images[large].width == 2 * graph->images[small].width
@@ -435,7 +459,8 @@ static bool add_doubled(const struct choice *choice, const struct vkb_pass_row *
 static const struct form forms_table[] = {
     {VKB_FORMS_CPU, add_line},       {VKB_FORMS_CPU, add_enlarged},   {VKB_FORMS_CPU, add_strips},
     {VKB_FORMS_CPU, add_from_lines}, {VKB_FORMS_CPU, add_halved},     {VKB_FORMS_CPU, add_doubled},
-    {VKB_FORMS_GPU, add_enlarged},   {VKB_FORMS_GPU, add_from_lines}, {VKB_FORMS_GPU, add_pixels},
+    {VKB_FORMS_GPU, add_enlarged},   {VKB_FORMS_GPU, add_from_lines}, {VKB_FORMS_GPU, add_tiles},
+    {VKB_FORMS_GPU, add_pixels},
 };
 
 static bool add_in_its_form(const struct choice *choice, const struct vkb_pass_row *pass,
@@ -453,12 +478,12 @@ static bool add_in_its_form(const struct choice *choice, const struct vkb_pass_r
     return vkb_graph_add_pass(choice->graph, pass, error);
 }
 
-bool vkb_forms_choose(enum vkb_forms forms, uint32_t max_size, struct vkb_graph *graph,
-                      struct vkb_error *error)
+bool vkb_forms_choose(enum vkb_forms forms, const VkPhysicalDeviceLimits *limits,
+                      struct vkb_graph *graph, struct vkb_error *error)
 {
     struct choice choice = {
         .forms = forms,
-        .max_size = max_size,
+        .limits = limits,
         .plain = *graph,
         .graph = graph,
     };

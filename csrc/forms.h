@@ -15,8 +15,8 @@ enum vkb_forms {
 // VKB_FORMS_COUNT where there are none.
 enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *device);
 
-// Gives each pass of a graph its form, with images of at most `max_size` a side.
-bool vkb_forms_choose(enum vkb_forms forms, uint32_t max_size, struct vkb_graph *graph,
-                      struct vkb_error *error);
+// Gives each pass of a graph its form, within the device's limits.
+bool vkb_forms_choose(enum vkb_forms forms, const VkPhysicalDeviceLimits *limits,
+                      struct vkb_graph *graph, struct vkb_error *error);
 
 #endif

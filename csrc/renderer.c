@@ -331,8 +331,7 @@ static PyObject *render(PyObject *object, PyObject *arguments)
         source.glow_textured = scene.data.glow.surface_count > 0;
         if (require_open(self, &error)
             && vkb_build_scene(shading, &settings, &source, &graph, &error)
-            && vkb_forms_choose(self->forms, self->device.limits.maxFramebufferWidth, &graph,
-                                &error)
+            && vkb_forms_choose(self->forms, &self->device.limits, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
             result = run_graph(self, &graph, &(struct vkb_frame_source){.scene = &scene.data},
                                names, allocate);
@@ -363,8 +362,7 @@ static PyObject *apply(PyObject *object, PyObject *arguments)
             .channels = image.input.channels,
         };
         if (require_open(self, &error) && vkb_build_image(&settings, &source, &graph, &error)
-            && vkb_forms_choose(self->forms, self->device.limits.maxFramebufferWidth, &graph,
-                                &error)
+            && vkb_forms_choose(self->forms, &self->device.limits, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))
             result = run_graph(self, &graph, &(struct vkb_frame_source){.input = &image.input},
                                names, allocate);

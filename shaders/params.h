@@ -161,6 +161,9 @@
 #define HALVE_ROWS 16
 #define DOUBLE_COLUMNS 4
 #define DOUBLE_ROWS 32
+#define TILE_LOADED 64
+#define TILE_ROWS 32
+#define TILE_RUNS 4
 #define TILE_RADIUS 16
 #define WHOLE_VEC4S 5
 

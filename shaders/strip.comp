@@ -1,18 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // An image's whole bloom for processors without fast shared memory: an invocation walks down a
-// strip, with the vertical sums of the rows to come in registers. All is added up in the order of
-// the passes that this stands for, and rounded as their images would, so that it does not show in a
-// picture which of the two made it.
-#include "block.glsl"
-#include "threshold.glsl"
-
-UNIFORM_BLOCK(WHOLE_BLOCK);
-#include "storage.glsl"
-#include "composite.glsl"
-
-layout(constant_id = 4) const int THRESHOLD_MODE = 0;
-layout(constant_id = 5) const int FORMAT = STORED_SINGLE;
+// strip, with the vertical sums of the rows to come in registers.
+#include "whole.glsl"
 
 layout(local_size_x = 8) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
@@ -21,22 +11,6 @@ layout(set = 0, binding = 2) uniform writeonly image2D target;
 const int RADIUS = STRIP_RADIUS;
 const int SUMS = 2 * RADIUS;
 const int LOADED = STRIP_COLUMNS + 2 * RADIUS;
-
-float down(int tap)
-{
-    return params.down[abs(tap) >> 2][abs(tap) & 3];
-}
-
-float across(int tap)
-{
-    return params.across[abs(tap) >> 2][abs(tap) & 3];
-}
-
-vec3 bright(ivec2 texel)
-{
-    vec3 value = finite_or_zero(imageLoad(image, texel).rgb);
-    return as_stored(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee), FORMAT);
-}
 
 void main()
 {
@@ -56,7 +30,7 @@ void main()
         int row = clamp(y, 0, last.y);
         // In small loops, each of which drivers unroll; in one large one the sums would be memory.
         for (int i = 0; i < LOADED; ++i)
-            line[i] = bright(ivec2(clamp(first.x + i - RADIUS, 0, last.x), row));
+            line[i] = bright(imageLoad(image, ivec2(clamp(first.x + i - RADIUS, 0, last.x), row)).rgb);
         for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
