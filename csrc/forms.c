@@ -151,6 +151,7 @@ static const enum vkb_shader line_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(line_com
 static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(strip_comp);
 static const enum vkb_shader halve_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(halve_comp);
 static const enum vkb_shader double_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(double_comp);
+static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(double_final_comp);
 
 // A line's row: `origin` is the place of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct vkb_pass_row *blur,
@@ -268,6 +269,17 @@ static const struct vkb_pass_row *blur_of(const struct vkb_graph *graph, uint32_
              : NULL;
 }
 
+// The extraction of an image's bright parts in its own size and format that writes `image`, if any.
+static const struct vkb_pass_row *extract_of(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_pass_row *pass = writer_of(graph, image);
+
+    return pass && pass->shader == VKB_SHADER_extract_frag && pass->constants[1] == SAMPLING_WHOLE
+                && graph->images[pass->reads[0]].format == graph->images[image].format
+             ? pass
+             : NULL;
+}
+
 static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass, int radius,
                        struct chain *chain)
 {
@@ -279,12 +291,8 @@ static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row 
     if (chain->across)
         chain->down = blur_of(graph, chain->across->reads[0], DIRECTION_VERTICAL);
     if (chain->down)
-        chain->extract = writer_of(graph, chain->down->reads[0]);
-    return chain->extract && chain->extract->shader == VKB_SHADER_extract_frag
-        && chain->extract->constants[1] == SAMPLING_WHOLE
-        && chain->extract->reads[0] == pass->reads[0]
-        // A value that another format would round or clamp would need that format's rules.
-        && graph->images[chain->across->targets[0]].format == graph->images[pass->reads[0]].format
+        chain->extract = extract_of(graph, chain->down->reads[0]);
+    return chain->extract && chain->extract->reads[0] == pass->reads[0]
         && find_kernel(chain->down, radius, &chain->down_kernel)
         && find_kernel(chain->across, radius, &chain->across_kernel);
 }
@@ -396,6 +404,28 @@ static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uin
     row->constant_count = 0;
 }
 
+// Where the larger level is what is extracted of an image: from the image itself, as an alternative
+// to `halving`, which `pass` became.
+static bool add_halved_image(const struct choice *choice, const struct vkb_pass_row *pass,
+                             const struct vkb_pass_row *halving, struct vkb_error *error)
+{
+    const struct vkb_pass_row *extract = extract_of(&choice->plain, pass->reads[0]);
+    struct vkb_pass_row row;
+
+    if (!extract)
+        return true;
+    memcpy(&row, halving, sizeof row);
+    row.reads[0] = extract->reads[0];
+    row.alternative = true;
+    row.constants[0] = 1;
+    row.constants[1] = extract->constants[0];
+    row.constants[2] = stored_as[choice->plain.images[pass->reads[0]].format];
+    row.constant_count = 3;
+    row.params.pyramid.threshold = extract->params.extract.threshold;
+    row.params.pyramid.knee = extract->params.extract.knee;
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 // The 13 taps from a level of exactly twice the size. Where fireflies are filtered the groups have
 // weights of their own, so that the kernel does not fall apart into separable ones.
 static bool add_halved(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
@@ -411,7 +441,8 @@ static bool add_halved(const struct choice *choice, const struct vkb_pass_row *p
     memcpy(&row, pass, sizeof row);
     load_in_strips(&row, halve_shaders[plain->images[pass->reads[0]].format], HALVE_COLUMNS,
                    HALVE_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && add_halved_image(choice, pass, &row, error);
 }
 
 // What the taps of an upsampling to twice the size are on whole texels: those of a pixel at a
@@ -433,18 +464,25 @@ static void find_up_taps(double radius, float taps[4])
         taps[i] = (float)sums[i];
 }
 
+static bool doubles(const struct vkb_graph *graph, const struct vkb_pass_row *pass, double *radius)
+{
+    const struct vkb_pyramid_params *params = &pass->params.pyramid;
+    const int kernel = pass->constants[2];
+
+    *radius = kernel == UPSAMPLE_TENT ? params->step_x : 0.0;
+    return pass->shader == VKB_SHADER_pyramid_up_frag && kernel != UPSAMPLE_CUBIC
+        && is_twice(graph, pass->targets[0], pass->reads[0]) && *radius <= 1.0
+        && (kernel != UPSAMPLE_TENT || params->step_x == params->step_y);
+}
+
 static bool add_doubled(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
                         struct vkb_error *error)
 {
     const struct vkb_graph *plain = &choice->plain;
-    const struct vkb_pyramid_params *params = &pass->params.pyramid;
-    const int kernel = pass->constants[2];
-    const double radius = kernel == UPSAMPLE_TENT ? params->step_x : 0.0;
     struct vkb_pass_row row;
+    double radius;
 
-    *fits = pass->shader == VKB_SHADER_pyramid_up_frag && kernel != UPSAMPLE_CUBIC
-         && is_twice(plain, pass->targets[0], pass->reads[0]) && radius <= 1.0
-         && (kernel != UPSAMPLE_TENT || params->step_x == params->step_y);
+    *fits = doubles(plain, pass, &radius);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -456,10 +494,49 @@ static bool add_doubled(const struct choice *choice, const struct vkb_pass_row *
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
+// The composite as it is, and after it one that doubles the last level itself.
+static bool add_doubled_final(const struct choice *choice, const struct vkb_pass_row *pass,
+                              bool *fits, struct vkb_error *error)
+{
+    const struct vkb_graph *plain = &choice->plain;
+    const struct vkb_pass_row *up = NULL;
+    struct vkb_pass_row row;
+    struct vkb_double_final_params *params = &row.params.double_final;
+    double radius;
+
+    if (pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF)
+        up = writer_of(plain, pass->reads[1]);
+    *fits = up && doubles(plain, up, &radius) && up->constants[1] == 0
+         && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format;
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    memset(&row.params, 0, sizeof row.params);
+    dispatch(&row, double_final_shaders[plain->images[up->reads[0]].format], 8 * DOUBLE_COLUMNS,
+             DOUBLE_ROWS);
+    row.loads = true;
+    row.alternative = true;
+    row.reads[0] = up->reads[0];
+    row.reads[1] = pass->reads[0];
+    row.constants[4] = stored_as[plain->images[pass->reads[1]].format];
+    row.constant_count = 5;
+    row.block = VKB_BLOCK_double_final;
+    params->coarse = up->params.pyramid.coarse;
+    params->intensity = pass->params.composite.intensity;
+    params->exposure = pass->params.composite.exposure;
+    params->noise_seed = pass->params.composite.noise_seed;
+    params->limit = vkb_formats[plain->images[pass->targets[0]].format].limit;
+    find_up_taps(radius, params->taps[0]);
+    return vkb_graph_add_pass(choice->graph, pass, error)
+        && vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 static const struct form forms_table[] = {
-    {VKB_FORMS_CPU, add_line},       {VKB_FORMS_CPU, add_enlarged},   {VKB_FORMS_CPU, add_strips},
-    {VKB_FORMS_CPU, add_from_lines}, {VKB_FORMS_CPU, add_halved},     {VKB_FORMS_CPU, add_doubled},
-    {VKB_FORMS_GPU, add_enlarged},   {VKB_FORMS_GPU, add_from_lines}, {VKB_FORMS_GPU, add_tiles},
+    {VKB_FORMS_CPU, add_line},          {VKB_FORMS_CPU, add_enlarged},
+    {VKB_FORMS_CPU, add_strips},        {VKB_FORMS_CPU, add_from_lines},
+    {VKB_FORMS_CPU, add_halved},        {VKB_FORMS_CPU, add_doubled},
+    {VKB_FORMS_CPU, add_doubled_final}, {VKB_FORMS_GPU, add_enlarged},
+    {VKB_FORMS_GPU, add_from_lines},    {VKB_FORMS_GPU, add_tiles},
     {VKB_FORMS_GPU, add_pixels},
 };
 

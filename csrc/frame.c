@@ -73,15 +73,14 @@ static bool write_recipe(struct run *run, uint32_t first, uint32_t end, struct v
     return true;
 }
 
-// Whether the image is there and what the passes before `end` that write it would make.
+// Whether the image is there and holds what a pass before `end` would make.
 static bool is_current(const struct run *run, uint32_t image, uint32_t end)
 {
-    bool current = run->slots[image] != NULL;
+    bool current = run->graph->images[image].input;
 
     for (uint32_t i = 0; i < end; ++i)
-        if (vkb_pass_writes(&run->graph->passes[i], image) && !run->graph->passes[i].alternative)
-            current = current && run->current[i];
-    return current;
+        current = current || (run->current[i] && vkb_pass_writes(&run->graph->passes[i], image));
+    return current && run->slots[image];
 }
 
 // The slots of a pass's targets, the depth last; returns how many.

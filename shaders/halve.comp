@@ -4,15 +4,32 @@
 // texels, as the sum of two separable kernels, (1 1 1 1) / 4 and (1 1 2 2 1 1) / 8 a side, each with
 // half of the weight. An invocation walks down a strip and loads each texel once.
 #include "block.glsl"
+#include "finite.glsl"
+#include "threshold.glsl"
 
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "storage.glsl"
+
+// From the image itself, past the threshold, in place of what is extracted of it.
+layout(constant_id = 0) const int EXTRACT = 0;
+layout(constant_id = 1) const int THRESHOLD_MODE = 0;
+layout(constant_id = 2) const int FORMAT = STORED_SINGLE;
 
 layout(local_size_x = 8) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = 2) uniform writeonly image2D target;
 
 const int LOADED = 2 * HALVE_COLUMNS + 4;
+
+vec3 load(ivec2 texel)
+{
+    vec3 value = imageLoad(source, texel).rgb;
+    if (EXTRACT == 0)
+        return value;
+    vec3 bright =
+        apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
+    return as_stored(bright, FORMAT);
+}
 
 void main()
 {
@@ -34,7 +51,7 @@ void main()
             vec3 texels[LOADED];
             for (int i = 0; i < LOADED; ++i) {
                 int column = clamp(2 * first.x + i - 2, 0, last.x);
-                texels[i] = imageLoad(source, ivec2(column, row)).rgb;
+                texels[i] = load(ivec2(column, row));
             }
             for (int i = 0; i < HALVE_COLUMNS; ++i) {
                 vec3 inner = texels[2 * i + 2] + texels[2 * i + 3];

@@ -68,7 +68,8 @@
 
 // A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
 // the steps the distance of the tent's taps in texels of the smaller level. `taps` are the same
-// weights on whole texels, where a level is exactly twice as large as the one below.
+// weights on whole texels, where a level is exactly twice as large as the one below; the
+// threshold is of a first level that starts from the image itself.
 #define PYRAMID_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, radius, 1.0, 0.0, 16.0) \
     SAMPLING_ROWS(B, INPUT) \
@@ -76,6 +77,17 @@
     INPUT(B, float, coarse) \
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, knee) \
+    VEC4S(B, taps, 1)
+
+// The end of a pyramid together with the composite.
+#define DOUBLE_FINAL_BLOCK(B, SETTING, INPUT, VEC4S) \
+    INPUT(B, float, coarse) \
+    INPUT(B, float, intensity) \
+    INPUT(B, float, exposure) \
+    INPUT(B, float, limit) \
+    INPUT(B, int, noise_seed) \
     VEC4S(B, taps, 1)
 
 // The first pass of a published method, from the frame.
@@ -111,6 +123,7 @@
     BLOCK(line, LINE_BLOCK) \
     BLOCK(whole, WHOLE_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
+    BLOCK(double_final, DOUBLE_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
