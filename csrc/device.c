@@ -66,20 +66,31 @@ bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
     return (properties.optimalTilingFeatures & features) == features;
 }
 
-bool vkb_device_run(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
-                    struct vkb_error *error)
+static bool remember_loss(struct vkb_device *device, bool done, const struct vkb_error *error)
 {
-    const struct VolkDeviceTable *vk = &device->vk;
+    if (!done && error->kind == VKB_ERROR_DEVICE_LOST)
+        device->lost = true;
+    return done;
+}
+
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
+                       struct vkb_error *error)
+{
     VkSubmitInfo submit = {
         .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
         .commandBufferCount = 1,
         .pCommandBuffers = &commands,
     };
-    bool done = VK(error, vk->vkQueueSubmit(device->queue, 1, &submit, fence))
-             && VK(error, vk->vkWaitForFences(device->handle, 1, &fence, VK_TRUE, UINT64_MAX))
+    bool done = VK(error, device->vk.vkQueueSubmit(device->queue, 1, &submit, fence));
+
+    return remember_loss(device, done, error);
+}
+
+bool vkb_device_wait(struct vkb_device *device, VkFence fence, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    bool done = VK(error, vk->vkWaitForFences(device->handle, 1, &fence, VK_TRUE, UINT64_MAX))
              && VK(error, vk->vkResetFences(device->handle, 1, &fence));
 
-    if (!done && error->kind == VKB_ERROR_DEVICE_LOST)
-        device->lost = true;
-    return done;
+    return remember_loss(device, done, error);
 }

@@ -27,9 +27,11 @@ void vkb_device_destroy(struct vkb_device *device);
 bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
                          VkFormatFeatureFlags features);
 
-// Submits the recorded commands and waits until the device has run them; `fence` is unsignalled
-// before and after. A lost device is remembered.
-bool vkb_device_run(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
-                    struct vkb_error *error);
+// Submits the recorded commands; `fence`, unsignalled before, is signalled when the device has run
+// them and all that was submitted before. A lost device is remembered.
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
+                       struct vkb_error *error);
+// Waits for the fence and leaves it unsignalled. A lost device is remembered.
+bool vkb_device_wait(struct vkb_device *device, VkFence fence, struct vkb_error *error);
 
 #endif

@@ -2,18 +2,18 @@
 
 #include <string.h>
 
-// The state of one run.
+// The state of one submission, and of the point that is being recorded.
 struct run {
     struct vkb_device *device;
     struct vkb_frame *frame;
-    const struct vkb_graph *graph;
-    struct vkb_slot **slots;  // by the graph's image index
-    bool *needed;             // by pass
-    uint32_t *ran;            // the first pass of each render pass that was recorded
-    uint32_t ran_count;
-    struct vkb_slot *input;  // NULL: none, or none that is needed
-    bool send_input;         // the device does not have it yet
-    VkDeviceSize uniform_used;
+    struct vkb_flight *flight;
+    struct vkb_point *point;
+    const struct vkb_graph *graph;  // the point's
+    struct vkb_slot **slots;        // by the graph's image index
+    bool *wanted;                   // by image
+    bool *needed;                   // by pass
+    struct vkb_slot *input;         // NULL: none
+    bool send_input;                // the device does not have it yet
     unsigned char *recipe;
     size_t recipe_size, recipe_capacity;
 };
@@ -27,26 +27,24 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
+    vkb_flights_destroy(device, &frame->flights);
     vkb_slots_destroy(device, &frame->slots);
-    vkb_timer_destroy(device, &frame->timer);
-    device->vk.vkDestroyDescriptorPool(device->handle, frame->descriptors, NULL);
-    vkb_buffer_destroy(device, &frame->uniforms);
-    vkb_readback_destroy(device, &frame->readback);
     vkb_upload_destroy(device, &frame->upload);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
-    vkb_commands_destroy(device, &frame->commands);
     *frame = (struct vkb_frame){0};
 }
 
 // Marks the passes that the outputs depend on, from the last to the first, and their images.
-static void mark_needed(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
-                        bool *wanted)
+static void mark_needed(struct run *run)
 {
     const struct vkb_graph *graph = run->graph;
+    bool *wanted = run->wanted;
 
-    for (uint32_t i = 0; i < output_count; ++i)
-        wanted[outputs[i].image] = true;
+    memset(wanted, 0, graph->image_count * sizeof *wanted);
+    memset(run->needed, 0, graph->pass_count * sizeof *run->needed);
+    for (uint32_t i = 0; i < run->point->output_count; ++i)
+        wanted[run->point->outputs[i].image] = true;
     for (uint32_t i = graph->pass_count; i-- > 0;) {
         const struct vkb_pass_row *pass = &graph->passes[i];
         for (uint32_t target = 0; target < pass->target_count; ++target)
@@ -112,11 +110,11 @@ static uint32_t target_slots(const struct run *run, const struct vkb_pass_row *p
 static VkDeviceSize write_params(struct run *run, const struct vkb_pass_row *pass)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
-    const VkDeviceSize offset = run->uniform_used;
+    const VkDeviceSize offset = run->flight->uniform_used;
     const size_t size = vkb_block_sizes[pass->block];
 
-    memcpy((char *)run->frame->uniforms.mapped + offset, &pass->params, size);
-    run->uniform_used = (offset + size + align - 1) / align * align;
+    memcpy((char *)run->flight->uniforms.mapped + offset, &pass->params, size);
+    run->flight->uniform_used = (offset + size + align - 1) / align * align;
     return offset;
 }
 
@@ -134,14 +132,14 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
                        run->device->handle,
                        &(VkDescriptorSetAllocateInfo){
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                           .descriptorPool = run->frame->descriptors,
+                           .descriptorPool = run->flight->descriptors,
                            .descriptorSetCount = 1,
                            .pSetLayouts = &pipelines->set_layouts[image_count],
                        },
                        set)))
         return false;
     VkDescriptorBufferInfo params = {
-        .buffer = run->frame->uniforms.handle,
+        .buffer = run->flight->uniforms.handle,
         .offset = write_params(run, pass),
         .range = vkb_block_sizes[pass->block],
     };
@@ -179,7 +177,7 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
 static void draw_mesh(const struct run *run, const struct vkb_mesh *mesh)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
 
     if (mesh->index_count == 0)
         return;
@@ -191,7 +189,7 @@ static void draw_mesh(const struct run *run, const struct vkb_mesh *mesh)
 static void draw(const struct run *run, enum vkb_geometry geometry)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
 
     switch (geometry) {
     case VKB_GEOMETRY_FULLSCREEN:
@@ -214,7 +212,7 @@ static bool record_pass(struct run *run, uint32_t index, VkRenderPass render_pas
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     const struct vkb_pass_row *pass = &run->graph->passes[index];
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
     struct vkb_pipelines *pipelines = &run->frame->pipelines;
     VkPipeline pipeline;
     VkDescriptorSet set;
@@ -234,7 +232,7 @@ static bool record_pass(struct run *run, uint32_t index, VkRenderPass render_pas
 // from.
 static void transition_images(struct run *run, uint32_t first, uint32_t end)
 {
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
     const struct vkb_pass_row *pass = &run->graph->passes[first];
     struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
     const uint32_t use_count = vkb_graph_target_uses(run->graph, first, end, uses);
@@ -260,7 +258,7 @@ static void begin_render_pass(const struct run *run, VkRenderPass render_pass,
                               VkExtent2D extent)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
     VkClearValue clears[VKB_MAX_TARGETS + 1];
 
     for (uint32_t i = 0; i < pass->target_count; ++i)
@@ -285,6 +283,15 @@ static void begin_render_pass(const struct run *run, VkRenderPass render_pass,
     vk->vkCmdSetScissor(commands, 0, 1, &(VkRect2D){.extent = extent});
 }
 
+// The render pass just recorded goes by the name of the image that it writes.
+static void add_timing(struct run *run, uint32_t first)
+{
+    const struct vkb_graph *graph = run->graph;
+    struct vkb_timing *timing = &run->point->timings[run->point->timing_count++];
+
+    memcpy(timing->name, graph->images[graph->passes[first].targets[0]].name, sizeof timing->name);
+}
+
 // Passes first..end-1 in one render pass, timed as one: within a render pass tiling devices and
 // lavapipe do not keep the order that single draws could be timed by.
 static bool record_group(struct run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
@@ -292,7 +299,8 @@ static bool record_group(struct run *run, uint32_t first, uint32_t end, struct v
 {
     struct vkb_device *device = run->device;
     struct vkb_frame *frame = run->frame;
-    VkCommandBuffer commands = frame->commands.buffer;
+    struct vkb_flight *flight = run->flight;
+    VkCommandBuffer commands = flight->commands.buffer;
     VkRenderPass render_pass;
     VkFramebuffer framebuffer;
 
@@ -302,18 +310,21 @@ static bool record_group(struct run *run, uint32_t first, uint32_t end, struct v
             return false;
     if (!vkb_pipelines_render_pass(device, &frame->pipelines, run->graph, first, end, &render_pass,
                                    error)
-        || !vkb_slot_framebuffer(device, targets, target_count, render_pass, &framebuffer, error))
+        || !vkb_slots_framebuffer(device, &frame->slots, targets, target_count, render_pass,
+                                  &framebuffer, error))
         return false;
     transition_images(run, first, end);
-    vkb_timer_start(device, commands, &frame->timer, run->ran_count);
+    vkb_timer_start(device, commands, &flight->timer);
     begin_render_pass(run, render_pass, framebuffer, &run->graph->passes[first],
                       (VkExtent2D){targets[0]->image.width, targets[0]->image.height});
     for (uint32_t i = first; i < end; ++i)
         if (!record_pass(run, i, render_pass, error))
             return false;
     device->vk.vkCmdEndRenderPass(commands);
-    vkb_timer_stop(device, commands, &frame->timer, run->ran_count);
-    run->ran[run->ran_count++] = first;
+    vkb_timer_stop(device, commands, &flight->timer);
+    add_timing(run, first);
+    for (uint32_t i = 0; i < target_count; ++i)
+        targets[i]->valid = true;
     return true;
 }
 
@@ -341,17 +352,16 @@ static bool record_passes(struct run *run, struct vkb_error *error)
     return true;
 }
 
-static bool reserve_descriptors(struct run *run, struct vkb_error *error)
+static bool reserve_descriptors(struct run *run, uint32_t passes, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    struct vkb_frame *frame = run->frame;
-    const uint32_t passes = run->graph->pass_count;
+    struct vkb_flight *flight = run->flight;
 
-    if (passes <= frame->descriptor_capacity)
-        return VK(error, vk->vkResetDescriptorPool(run->device->handle, frame->descriptors, 0));
-    vk->vkDestroyDescriptorPool(run->device->handle, frame->descriptors, NULL);
-    frame->descriptors = VK_NULL_HANDLE;
-    frame->descriptor_capacity = 0;
+    if (passes <= flight->descriptor_capacity)
+        return VK(error, vk->vkResetDescriptorPool(run->device->handle, flight->descriptors, 0));
+    vk->vkDestroyDescriptorPool(run->device->handle, flight->descriptors, NULL);
+    flight->descriptors = VK_NULL_HANDLE;
+    flight->descriptor_capacity = 0;
     if (!VK(error,
             vk->vkCreateDescriptorPool(
                 run->device->handle,
@@ -365,75 +375,56 @@ static bool reserve_descriptors(struct run *run, struct vkb_error *error)
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, passes * VKB_MAX_READS},
                         },
                 },
-                NULL, &frame->descriptors)))
+                NULL, &flight->descriptors)))
         return false;
-    frame->descriptor_capacity = passes;
+    flight->descriptor_capacity = passes;
     return true;
 }
 
-static bool reserve(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
+// Room for all that the points can need.
+static bool reserve(struct run *run, const struct vkb_point *points, uint32_t point_count,
                     struct vkb_error *error)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
     const VkDeviceSize params = (sizeof(union vkb_params) + align - 1) / align * align;
+    struct vkb_flight *flight = run->flight;
     VkDeviceSize readback = 0;
+    uint32_t passes = 0;
 
-    for (uint32_t i = 0; i < output_count; ++i) {
-        const struct vkb_image_row *row = &run->graph->images[outputs[i].image];
-        readback += vkb_readback_size(row->format, row->width, row->height);
+    for (uint32_t i = 0; i < point_count; ++i) {
+        const struct vkb_point *point = &points[i];
+        passes += point->graph.pass_count;
+        for (uint32_t output = 0; output < point->output_count; ++output) {
+            const struct vkb_image_row *row = &point->graph.images[point->outputs[output].image];
+            readback += vkb_readback_size(row->format, row->width, row->height);
+        }
     }
-    return reserve_descriptors(run, error)
-        && vkb_timer_reserve(run->device, run->graph->pass_count, &run->frame->timer, error)
+    return reserve_descriptors(run, passes, error)
+        && vkb_timer_reserve(run->device, passes, &flight->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
-                              params * run->graph->pass_count, &run->frame->uniforms, error)
-        && vkb_readback_begin(run->device, &run->frame->readback, readback, error);
+                              params * passes, &flight->uniforms, error)
+        && vkb_readback_begin(run->device, &flight->readback, readback, error);
 }
 
-// The images that this run wrote now hold what their recipes say.
-static void end_writing(struct run *run)
+// The slot of the graph's image. One that other commands may still use is replaced only when those
+// have run; the points of this flight have the same images.
+static bool resolve(struct run *run, uint32_t image, struct vkb_error *error)
 {
-    struct vkb_slot *targets[VKB_MAX_TARGETS + 1] = {0};
+    const struct vkb_image_row *row = &run->graph->images[image];
+    struct vkb_slots *slots = &run->frame->slots;
 
-    for (uint32_t i = 0; i < run->ran_count; ++i)
-        for (uint32_t t = target_slots(run, &run->graph->passes[run->ran[i]], targets); t-- > 0;)
-            targets[t]->valid = true;
-    if (run->input)
-        run->input->valid = true;
+    return (!vkb_slots_replaces(slots, row)
+            || vkb_flights_land(run->device, &run->frame->flights, error))
+        && vkb_slots_resolve(run->device, slots, row, &run->slots[image], error);
 }
 
-// One time a render pass, under the name of the image that it writes.
-static bool read_timings(const struct run *run, struct vkb_timing *timings, struct vkb_error *error)
+static bool load_scene(struct run *run, const struct vkb_scene_data *data, struct vkb_error *error)
 {
-    for (uint32_t i = 0; i < run->ran_count; ++i) {
-        const struct vkb_pass_row *pass = &run->graph->passes[run->ran[i]];
-        memcpy(timings[i].name, run->slots[pass->targets[0]]->name, sizeof timings[i].name);
-        if (!vkb_timer_read(run->device, &run->frame->timer, i, &timings[i].seconds, error))
-            return false;
-    }
-    return true;
-}
+    struct vkb_scene *scene = &run->frame->scene;
 
-static bool record_and_run(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
-                           VkDeviceSize *offsets, struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_frame *frame = run->frame;
-    VkCommandBuffer commands = frame->commands.buffer;
-
-    if (!vkb_commands_begin(device, &frame->commands, error))
-        return false;
-    vkb_timer_reset(device, commands, &frame->timer);
-    if (run->send_input)
-        vkb_upload_record(device, commands, &frame->upload, &run->input->image);
-    if (!record_passes(run, error))
-        return false;
-    for (uint32_t i = 0; i < output_count; ++i)
-        vkb_readback_record(device, commands, &frame->readback,
-                            &run->slots[outputs[i].image]->image, &offsets[i]);
-    vkb_barrier_record_host_read(device, commands);
-    return vkb_buffer_flush(device, &frame->uniforms, error)
-        && vkb_commands_run(device, &frame->commands, error)
-        && vkb_buffer_invalidate(device, &frame->readback.staging, error);
+    return scene->serial == data->serial
+        || (vkb_flights_land(run->device, &run->frame->flights, error)
+            && vkb_scene_load(run->device, &run->flight->commands, data, scene, error));
 }
 
 // Stages the image and finds out whether the device has it already.
@@ -441,83 +432,152 @@ static bool stage_input(struct run *run, const struct vkb_input *input, struct v
 {
     bool changed;
 
-    if (!vkb_upload_stage(run->device, &run->frame->upload, input, &changed, error))
-        return false;
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (run->graph->images[i].input)
+        if (run->graph->images[i].input) {
+            if (!resolve(run, i, error))
+                return false;
             run->input = run->slots[i];
-    run->send_input = run->input && (changed || !run->input->valid);
+        }
+    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->flights, input, &changed,
+                          error))
+        return false;
+    run->send_input = changed || !run->input->valid;
     return !run->send_input
         || vkb_slot_begin_writing(&run->frame->slots, run->input, NULL, 0, error);
 }
 
-static bool run_frame(struct run *run, const struct vkb_frame_source *source,
-                      const struct vkb_output *outputs, uint32_t output_count, bool *wanted,
-                      VkDeviceSize *offsets, struct vkb_timing *timings, struct vkb_error *error)
+static void record_input(struct run *run)
 {
-    struct vkb_frame *frame = run->frame;
+    vkb_upload_record(run->device, run->flight->commands.buffer, &run->frame->upload,
+                      &run->input->image);
+    run->input->valid = true;
+}
 
-    if (!frame->commands.pool && !vkb_commands_create(run->device, &frame->commands, error))
-        return false;
-    if (source->scene
-        && !vkb_scene_load(run->device, &frame->commands, source->scene, &frame->scene, error))
-        return false;
-    mark_needed(run, outputs, output_count, wanted);
+static bool record_point(struct run *run, struct vkb_point *point, struct vkb_error *error)
+{
+    struct vkb_flight *flight = run->flight;
+
+    run->point = point;
+    run->graph = &point->graph;
+    point->timing_count = 0;
+    point->first_span = flight->timer.span_count;
+    mark_needed(run);
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (wanted[i]
-            && !vkb_slots_resolve(run->device, &frame->slots, &run->graph->images[i],
-                                  &run->slots[i], error))
+        if (run->wanted[i] && !resolve(run, i, error))
             return false;
-    if (source->input && !stage_input(run, source->input, error))
+    if (!record_passes(run, error))
         return false;
-    if (!reserve(run, outputs, output_count, error)
-        || !record_and_run(run, outputs, output_count, offsets, error)
-        || !read_timings(run, timings, error))
-        return false;
-    for (uint32_t i = 0; i < output_count; ++i)
-        vkb_readback_fetch(&frame->readback, offsets[i], &run->slots[outputs[i].image]->image,
-                           &outputs[i]);
-    end_writing(run);
+    for (uint32_t i = 0; i < point->output_count; ++i)
+        vkb_readback_record(run->device, flight->commands.buffer, &flight->readback,
+                            &run->slots[point->outputs[i].image]->image, &point->outputs[i]);
     return true;
 }
 
-// After a failure nothing is known of what the device did: images and commands are made anew.
-static void recover(struct vkb_device *device, struct vkb_frame *frame)
+static bool record_and_submit(struct run *run, struct vkb_point *points, uint32_t point_count,
+                              struct vkb_error *error)
 {
-    if (frame->commands.pool)
-        device->vk.vkDeviceWaitIdle(device->handle);
-    vkb_slots_destroy(device, &frame->slots);
-    vkb_commands_destroy(device, &frame->commands);
+    struct vkb_device *device = run->device;
+    struct vkb_flight *flight = run->flight;
+    VkCommandBuffer commands = flight->commands.buffer;
+
+    if (!vkb_commands_begin(device, &flight->commands, error))
+        return false;
+    vkb_timer_reset(device, commands, &flight->timer);
+    if (run->send_input)
+        record_input(run);
+    for (uint32_t i = 0; i < point_count; ++i)
+        if (!record_point(run, &points[i], error))
+            return false;
+    vkb_barrier_record_host_read(device, commands);
+    return vkb_buffer_flush(device, &flight->uniforms, error)
+        && vkb_flight_submit(device, flight, error);
 }
 
-bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
-                   const struct vkb_frame_source *source, const struct vkb_graph *graph,
-                   const struct vkb_output *outputs, uint32_t output_count,
-                   struct vkb_timing *timings, uint32_t *timing_count, struct vkb_error *error)
+static bool submit(struct run *run, const struct vkb_frame_source *source, struct vkb_point *points,
+                   uint32_t point_count, struct vkb_error *error)
 {
-    struct run run = {.device = device, .frame = frame, .graph = graph};
-    bool *wanted = NULL;
-    VkDeviceSize *offsets = NULL;
+    run->graph = &points[0].graph;
+    return (!source->scene || load_scene(run, source->scene, error))
+        && (!source->input || stage_input(run, source->input, error))
+        && reserve(run, points, point_count, error)
+        && record_and_submit(run, points, point_count, error);
+}
+
+// After a failure nothing is known of what the device did: images and commands are made anew.
+static void recover(const struct vkb_device *device, struct vkb_frame *frame,
+                    struct vkb_flight *flight)
+{
+    device->vk.vkDeviceWaitIdle(device->handle);
+    vkb_slots_destroy(device, &frame->slots);
+    vkb_commands_destroy(device, &flight->commands);
+}
+
+bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
+                      const struct vkb_frame_source *source, struct vkb_point *points,
+                      uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error)
+{
+    struct run run = {.device = device, .frame = frame};
+    const uint32_t image_count = points[0].graph.image_count;
+    uint32_t pass_count = 0;
     bool done;
 
-    *timing_count = 0;
-    if (output_count == 0)
-        return true;
-    done = (run.slots = vkb_alloc(error, graph->image_count, sizeof *run.slots))
-        && (run.needed = vkb_alloc(error, graph->pass_count, sizeof *run.needed))
-        && (run.ran = vkb_alloc(error, graph->pass_count, sizeof *run.ran))
-        && (wanted = vkb_alloc(error, graph->image_count, sizeof *wanted))
-        && (offsets = vkb_alloc(error, output_count, sizeof *offsets))
-        && run_frame(&run, source, outputs, output_count, wanted, offsets, timings, error);
-    if (done)
-        *timing_count = run.ran_count;
-    else
-        recover(device, frame);
+    for (uint32_t i = 0; i < point_count; ++i)
+        if (points[i].graph.pass_count > pass_count)
+            pass_count = points[i].graph.pass_count;
+    if (!vkb_flights_take(device, &frame->flights, &run.flight, error))
+        return false;
+    done = (run.slots = vkb_alloc(error, image_count, sizeof *run.slots))
+        && (run.wanted = vkb_alloc(error, image_count, sizeof *run.wanted))
+        && (run.needed = vkb_alloc(error, pass_count, sizeof *run.needed))
+        && submit(&run, source, points, point_count, error);
     vkb_free(run.slots);
+    vkb_free(run.wanted);
     vkb_free(run.needed);
-    vkb_free(run.ran);
     vkb_free(run.recipe);
-    vkb_free(wanted);
-    vkb_free(offsets);
+    if (done) {
+        run.flight->points = points;
+        run.flight->point_count = point_count;
+        *flight = run.flight;
+    } else {
+        recover(device, frame, run.flight);
+        vkb_flights_give_back(device, &frame->flights, run.flight);
+    }
     return done;
+}
+
+// What the device has left for the points of a flight that is over.
+static void fetch(const struct vkb_device *device, const struct vkb_flight *flight)
+{
+    for (uint32_t i = 0; i < flight->point_count; ++i) {
+        const struct vkb_point *point = &flight->points[i];
+        for (uint32_t timing = 0; timing < point->timing_count; ++timing)
+            point->timings[timing].seconds =
+                vkb_timer_seconds(device, &flight->timer, point->first_span + timing);
+        for (uint32_t output = 0; output < point->output_count; ++output)
+            vkb_readback_fetch(&flight->readback, &point->outputs[output]);
+    }
+}
+
+bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
+                       struct vkb_flight *flight, struct vkb_error *error)
+{
+    bool done = vkb_flight_wait(device, flight, error)
+             && vkb_readback_end(device, &flight->readback, error)
+             && vkb_timer_fetch(device, &flight->timer, error);
+
+    if (done)
+        fetch(device, flight);
+    else
+        recover(device, frame, flight);
+    vkb_flights_give_back(device, &frame->flights, flight);
+    return done;
+}
+
+void vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight)
+{
+    struct vkb_error error;
+
+    if (!vkb_flight_wait(device, flight, &error))
+        recover(device, frame, flight);
+    vkb_flights_give_back(device, &frame->flights, flight);
 }

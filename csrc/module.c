@@ -202,7 +202,8 @@ static int execute(PyObject *module)
     }
     state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
     state->renderer_type = PyType_FromModuleAndSpec(module, &vkb_renderer_spec, NULL);
-    if (!state->renderer_type
+    state->batch_type = PyType_FromModuleAndSpec(module, &vkb_batch_spec, NULL);
+    if (!state->renderer_type || !state->batch_type
         || PyModule_AddObjectRef(module, "Renderer", state->renderer_type) < 0)
         return -1;
     return add_steal(module, "VALUES", value_table())
@@ -218,6 +219,7 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     struct vkb_module_state *state = vkb_module_state(module);
 
     Py_VISIT(state->renderer_type);
+    Py_VISIT(state->batch_type);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
     return 0;
@@ -228,6 +230,7 @@ static int clear(PyObject *module)
     struct vkb_module_state *state = vkb_module_state(module);
 
     Py_CLEAR(state->renderer_type);
+    Py_CLEAR(state->batch_type);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);
     return 0;

@@ -27,7 +27,7 @@ bool vkb_readback_begin(const struct vkb_device *device, struct vkb_readback *re
 
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          struct vkb_readback *readback, struct vkb_image *image,
-                         VkDeviceSize *offset)
+                         struct vkb_output *output)
 {
     VkBufferImageCopy copy = {
         .bufferOffset = readback->used,
@@ -35,7 +35,9 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
         .imageExtent = {image->width, image->height, 1},
     };
 
-    *offset = readback->used;
+    output->offset = readback->used;
+    output->format = image->format;
+    output->pixels = (size_t)image->width * image->height;
     readback->used += vkb_readback_size(image->format, image->width, image->height);
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
     device->vk.vkCmdCopyImageToBuffer(commands, image->handle,
@@ -43,20 +45,24 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
                                       readback->staging.handle, 1, &copy);
 }
 
-void vkb_readback_fetch(const struct vkb_readback *readback, VkDeviceSize offset,
-                        const struct vkb_image *image, const struct vkb_output *output)
+bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
+                      struct vkb_error *error)
 {
-    const struct vkb_format_info *format = &vkb_formats[image->format];
-    const unsigned char *from = (const unsigned char *)readback->staging.mapped + offset;
+    return readback->used == 0 || vkb_buffer_invalidate(device, &readback->staging, error);
+}
+
+void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
+{
+    const struct vkb_format_info *format = &vkb_formats[output->format];
+    const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
     unsigned char *to = output->memory;
-    const size_t pixels = (size_t)image->width * image->height;
-    const size_t from_size = vkb_pixel_size(image->format);
+    const size_t from_size = vkb_pixel_size(output->format);
     const size_t to_size = (size_t)output->channels * format->channel_size;
 
     if (from_size == to_size) {
-        memcpy(to, from, pixels * from_size);
+        memcpy(to, from, output->pixels * from_size);
         return;
     }
-    for (size_t i = 0; i < pixels; ++i)
+    for (size_t i = 0; i < output->pixels; ++i)
         memcpy(to + i * to_size, from + i * from_size, to_size);
 }

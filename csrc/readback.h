@@ -10,6 +10,10 @@ struct vkb_output {
     uint32_t image;  // in the graph
     uint32_t channels;
     void *memory;
+    // What vkb_readback_record leaves for vkb_readback_fetch.
+    VkDeviceSize offset;
+    enum vkb_format format;
+    size_t pixels;
 };
 
 struct vkb_readback {
@@ -24,13 +28,17 @@ bool vkb_readback_begin(const struct vkb_device *device, struct vkb_readback *re
                         VkDeviceSize size, struct vkb_error *error);
 VkDeviceSize vkb_readback_size(enum vkb_format format, uint32_t width, uint32_t height);
 
-// Records the copy of an image; *offset is where vkb_readback_fetch finds it.
+// Records the copy of the output's image.
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          struct vkb_readback *readback, struct vkb_image *image,
-                         VkDeviceSize *offset);
+                         struct vkb_output *output);
 
-// After the device is done and vkb_buffer_invalidate: the pixels to the caller's memory.
-void vkb_readback_fetch(const struct vkb_readback *readback, VkDeviceSize offset,
-                        const struct vkb_image *image, const struct vkb_output *output);
+// To be called once the device is done, before the first fetch.
+bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
+                      struct vkb_error *error);
+
+// The pixels to the caller's memory, whatever
+// has become of the image since.
+void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output);
 
 #endif

@@ -164,7 +164,8 @@ bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
              && vkb_buffer_flush(device, &staging.buffer, error);
     if (done) {
         vkb_barrier_record_upload(device, commands->buffer);
-        done = vkb_commands_run(device, commands, error);
+        done = vkb_commands_submit(device, commands, error)
+            && vkb_commands_wait(device, commands, error);
     }
     vkb_buffer_destroy(device, &staging.buffer);
     if (done)

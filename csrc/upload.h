@@ -3,7 +3,7 @@
 #ifndef VKB_UPLOAD_H
 #define VKB_UPLOAD_H
 
-#include "memory.h"
+#include "flight.h"
 
 #include <stddef.h>
 
@@ -15,18 +15,27 @@ struct vkb_input {
     uint32_t width, height, channels;
 };
 
+struct vkb_specials {
+    uint64_t nan, inf;
+};
+
 struct vkb_upload {
     struct vkb_buffer staging;
     enum vkb_format format;  // of what it holds; NONE: nothing
     uint32_t width, height, channels;
-    uint64_t nan_count, inf_count;  // in what it holds
+    struct vkb_specials *rows;     // in each row of what it holds
+    struct vkb_specials specials;  // in all
+    unsigned char *packed;         // one row, to be compared
+    size_t row_capacity, packed_capacity;
 };
 
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload);
 
 // Packs the image to RGBA, alpha 1 where it has none; *changed: it is another one than the last.
-bool vkb_upload_stage(const struct vkb_device *device, struct vkb_upload *upload,
-                      const struct vkb_input *input, bool *changed, struct vkb_error *error);
+// The flights may still read the last one: they are waited for before it is written over.
+bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
+                      struct vkb_flights *flights, const struct vkb_input *input, bool *changed,
+                      struct vkb_error *error);
 
 // Records the copy of what is staged to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,

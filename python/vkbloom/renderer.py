@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from vkbloom import _core, pipeline_cache
+from vkbloom import _core, batches, pipeline_cache
 from vkbloom.adapter import AdapterInfo
 from vkbloom.frames import Frames
 from vkbloom.settings import Separable, Settings, check_size
@@ -140,6 +140,11 @@ class Renderer:
         self._core = _core.Renderer(adapter, bool(validation), pipeline_cache.read)
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
+        self._made_by = {
+            "adapter": self.info.name,
+            "driver": self.info.driver_info or self.info.driver,
+            "version": _version(),
+        }
         self._saved_pipelines = 0
 
     @property
@@ -236,33 +241,8 @@ class Renderer:
         ``timings`` of the result names the passes that ran.
         """
         settings = _check_settings(settings)
-        if shading not in SHADINGS:
-            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-        try:
-            finite = math.isfinite(time)
-        except (TypeError, OverflowError):
-            raise TypeError(f"time: a number is needed, not {time!r}") from None
-        if not finite:
-            raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
-        from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
-
-        if not isinstance(scene, Scene):
-            raise TypeError(f"scene: a Scene is needed, not {scene!r}")
-        camera = scene.camera
-        arrays, timings, specials = self._core.render(
-            settings,
-            _scene_arrays(scene),
-            (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
-            check_size("size", size),
-            shading,
-            # Whole turns change nothing; without them large times keep their precision.
-            math.fmod(time, 1.0),
-            scene.glow_intensity,
-            _check_attachments(attachments),
-            _allocator(out),
-        )
-        _check_filled(out, arrays)
-        return self._frames(arrays, timings, specials, settings)
+        arguments = _render_arguments(scene, size, shading, time, attachments)
+        return self._run_one(self._core.render(*arguments), settings, out)
 
     def apply(
         self,
@@ -310,11 +290,8 @@ class Renderer:
         when what they read or their settings changed.
         """
         settings = _check_settings(settings)
-        arrays, timings, specials = self._core.apply(
-            settings, _check_image(image), _check_attachments(attachments), _allocator(out)
-        )
-        _check_filled(out, arrays)
-        return self._frames(arrays, timings, specials, settings)
+        batch = self._core.apply(_check_image(image), _check_attachments(attachments))
+        return self._run_one(batch, settings, out)
 
     def apply_many(
         self,
@@ -338,9 +315,16 @@ class Renderer:
         Frames
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
+
+        Notes
+        -----
+        The device works on the next settings while a frame is used: after the first frame,
+        settings are taken from their iterable before the frames that come before theirs.
+        What a wrong one of them raises is raised in its turn, after the frames before it.
         """
-        for settings in settings_seq:
-            yield self.apply(image, settings, attachments=attachments)
+        image = _check_image(image)
+        names = _check_attachments(attachments)
+        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -365,27 +349,37 @@ class Renderer:
         Frames
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
-        """
-        for settings in settings_seq:
-            yield self.render(
-                scene, settings, size, shading=shading, time=time, attachments=attachments
-            )
 
-    def _frames(
+        Notes
+        -----
+        As for `apply_many`.
+        """
+        arguments = _render_arguments(scene, size, shading, time, attachments)
+        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
+
+    def _run_one(
         self,
-        arrays: dict[str, NDArray[Any]],
-        timings: dict[str, float],
-        specials: tuple[int, int],
+        batch: _core.Batch,
         settings: Settings,
+        out: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
+        batch.add(settings, _allocator(out))
+        batch.submit()
+        (result,) = batch.collect()
+        _check_filled(out, result[0])
+        return self._frames(settings, result)
+
+    def _run_many(
+        self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
+    ) -> Iterator[Frames]:
+        checked = map(_check_settings, settings_seq)
+        for settings, result in batches.run(checked, open_batch, _allocator(None)):
+            yield self._frames(settings, result)
+
+    def _frames(self, settings: Settings, result: batches.Result) -> Frames:
         self._save_pipelines()
-        info = {
-            "adapter": self.info.name,
-            "driver": self.info.driver_info or self.info.driver,
-            "version": _version(),
-            "nan": specials[0],
-            "inf": specials[1],
-        }
+        arrays, timings, (nan, inf) = result
+        info = {**self._made_by, "nan": nan, "inf": inf}
         return Frames(arrays, timings=timings, settings=settings, info=info)
 
     def _save_pipelines(self) -> None:
@@ -394,6 +388,39 @@ class Renderer:
         if count != self._saved_pipelines:
             self._saved_pipelines = count
             pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
+
+
+def _render_arguments(
+    scene: Scene,
+    size: tuple[int, int],
+    shading: Shading,
+    time: float,
+    attachments: str | Sequence[str],
+) -> tuple[Any, ...]:
+    """Return what the core renders, checked."""
+    if shading not in SHADINGS:
+        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+    try:
+        finite = math.isfinite(time)
+    except (TypeError, OverflowError):
+        raise TypeError(f"time: a number is needed, not {time!r}") from None
+    if not finite:
+        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+    from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: a Scene is needed, not {scene!r}")
+    camera = scene.camera
+    return (
+        _scene_arrays(scene),
+        (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
+        check_size("size", size),
+        shading,
+        # Whole turns change nothing; without them large times keep their precision.
+        math.fmod(time, 1.0),
+        scene.glow_intensity,
+        _check_attachments(attachments),
+    )
 
 
 def _scene_arrays(scene: Scene) -> Any:
