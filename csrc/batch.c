@@ -25,7 +25,8 @@ struct batch {
     struct vkb_point *points;
     struct held_arrays *held;
     size_t count, point_capacity, held_capacity;
-    size_t size;                // bytes of all arrays
+    size_t size;  // bytes of all arrays
+    bool submitted;
     struct vkb_flight *flight;  // NULL: not in the air
     struct vkb_specials specials;
 };
@@ -260,6 +261,13 @@ static bool build_graph(const struct batch *self, const struct vkb_settings *set
         && vkb_graph_check(graph, self->renderer->device.limits.maxFramebufferWidth, error);
 }
 
+static bool require_filling(const struct batch *self)
+{
+    if (self->submitted)
+        PyErr_SetString(PyExc_RuntimeError, "the batch was submitted before");
+    return !self->submitted;
+}
+
 static PyObject *add(PyObject *object, PyObject *arguments)
 {
     struct batch *self = (struct batch *)object;
@@ -269,7 +277,8 @@ static PyObject *add(PyObject *object, PyObject *arguments)
     struct vkb_point point = {0};
     struct held_arrays held = {0};
 
-    if (!PyArg_ParseTuple(arguments, "OO:add", &settings_object, &allocate)
+    if (!require_filling(self)
+        || !PyArg_ParseTuple(arguments, "OO:add", &settings_object, &allocate)
         || !vkb_read_settings(settings_object, &settings))
         return NULL;
     if (!vkb_require_open(self->renderer, &error)
@@ -308,10 +317,13 @@ static PyObject *submit(PyObject *object, PyObject *unused)
     bool done;
 
     (void)unused;
-    if (self->count == 0 || self->flight) {
-        PyErr_SetString(PyExc_RuntimeError, "a batch of points is submitted once");
+    if (!require_filling(self))
+        return NULL;
+    if (self->count == 0) {
+        PyErr_SetString(PyExc_RuntimeError, "a batch without points cannot be submitted");
         return NULL;
     }
+    self->submitted = true;
     Py_BEGIN_ALLOW_THREADS
     PyThread_acquire_lock(renderer->lock, WAIT_LOCK);
     done = vkb_require_open(renderer, &error)

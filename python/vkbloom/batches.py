@@ -64,7 +64,7 @@ class _Points:
                 if not settings:
                     return None
                 batch.submit()
-            except Exception as error:  # noqa: BLE001  it is raised in its turn
+            except Exception as error:
                 if not self._blames_one(error, settings):
                     self._fail(error)
                     return None
@@ -88,7 +88,7 @@ class _Points:
                 break
             try:
                 fits = batch.add(point, self._allocate)
-            except Exception as error:  # noqa: BLE001  it is raised in its turn
+            except Exception as error:
                 self._fail(error)
                 break
             if not fits:
@@ -106,7 +106,7 @@ class _Points:
             return next(self._sequence)
         except StopIteration:
             self._ended = True
-        except Exception as error:  # noqa: BLE001  it is raised in its turn
+        except Exception as error:
             self._fail(error)
         return None
 
