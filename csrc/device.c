@@ -1,20 +1,86 @@
 #include "device.h"
 
+#include <string.h>
+
+static bool has_extension(VkPhysicalDevice physical, const char *name, bool *found,
+                          struct vkb_error *error)
+{
+    VkExtensionProperties *extensions;
+    uint32_t count = 0;
+
+    *found = false;
+    if (!VK(error, vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
+        || !(extensions = vkb_alloc(error, count, sizeof *extensions)))
+        return false;
+    bool done = VK(error, vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
+    for (uint32_t i = 0; done && i < count; ++i)
+        *found |= strcmp(extensions[i].extensionName, name) == 0;
+    vkb_free(extensions);
+    return done;
+}
+
+// Whether the device can copy to buffers in memory of the host's own.
+static bool imports_buffers(VkPhysicalDevice physical)
+{
+    VkExternalBufferProperties properties = {
+        .sType = VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES,
+    };
+
+    vkGetPhysicalDeviceExternalBufferProperties(
+        physical,
+        &(VkPhysicalDeviceExternalBufferInfo){
+            .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO,
+            .usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+            .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+        },
+        &properties);
+    const VkExternalMemoryFeatureFlags features =
+        properties.externalMemoryProperties.externalMemoryFeatures;
+    return (features & VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT)
+        && !(features & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
+}
+
+static VkDeviceSize import_alignment(VkPhysicalDevice physical)
+{
+    VkPhysicalDeviceExternalMemoryHostPropertiesEXT host = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT,
+    };
+
+    vkGetPhysicalDeviceProperties2(physical,
+                                   &(VkPhysicalDeviceProperties2){
+                                       .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
+                                       .pNext = &host,
+                                   });
+    return host.minImportedHostPointerAlignment;
+}
+
 static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
-    return VK(error, vkCreateDevice(device->adapter.physical,
-                                    &(VkDeviceCreateInfo){
-                                        .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                                        .queueCreateInfoCount = 1,
-                                        .pQueueCreateInfos =
-                                            &(VkDeviceQueueCreateInfo){
-                                                .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                                                .queueFamilyIndex = device->adapter.queue_family,
-                                                .queueCount = 1,
-                                                .pQueuePriorities = &(float){1.0f},
-                                            },
-                                    },
-                                    NULL, &device->handle));
+    bool has_import;
+
+    if (!has_extension(device->adapter.physical, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME,
+                       &has_import, error))
+        return false;
+    has_import = has_import && imports_buffers(device->adapter.physical);
+    if (has_import)
+        device->import_alignment = import_alignment(device->adapter.physical);
+    return VK(error,
+              vkCreateDevice(device->adapter.physical,
+                             &(VkDeviceCreateInfo){
+                                 .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                 .queueCreateInfoCount = 1,
+                                 .pQueueCreateInfos =
+                                     &(VkDeviceQueueCreateInfo){
+                                         .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                         .queueFamilyIndex = device->adapter.queue_family,
+                                         .queueCount = 1,
+                                         .pQueuePriorities = &(float){1.0f},
+                                     },
+                                 .enabledExtensionCount = has_import ? 1 : 0,
+                                 .ppEnabledExtensionNames =
+                                     (const char *[]){VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME},
+                             },
+                             NULL, &device->handle));
 }
 
 static uint64_t timestamp_mask(const struct vkb_device *device)

@@ -15,6 +15,8 @@ struct vkb_device {
     VkPhysicalDeviceMemoryProperties memory;
     VkPhysicalDeviceLimits limits;
     uint64_t timestamp_mask;  // 0: the queue has no timestamps
+    // Host memory that becomes a buffer starts and ends at multiples of it; 0: none can.
+    VkDeviceSize import_alignment;
     bool lost;
 };
 

@@ -69,6 +69,7 @@ void vkb_flights_give_back(const struct vkb_device *device, struct vkb_flights *
     flight->airborne = false;
     flight->points = NULL;
     flight->point_count = 0;
+    vkb_readback_release(device, &flight->readback);
     for (size_t i = 0; i < flights->count; ++i)
         free_count += !flights->flights[i]->taken;
     if (free_count <= KEPT_FLIGHTS)

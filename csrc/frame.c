@@ -382,28 +382,29 @@ static bool reserve_descriptors(struct run *run, uint32_t passes, struct vkb_err
 }
 
 // Room for all that the points can need.
-static bool reserve(struct run *run, const struct vkb_point *points, uint32_t point_count,
+static bool reserve(struct run *run, struct vkb_point *points, uint32_t point_count,
                     struct vkb_error *error)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
     const VkDeviceSize params = (sizeof(union vkb_params) + align - 1) / align * align;
     struct vkb_flight *flight = run->flight;
-    VkDeviceSize readback = 0;
     uint32_t passes = 0;
 
     for (uint32_t i = 0; i < point_count; ++i) {
-        const struct vkb_point *point = &points[i];
+        struct vkb_point *point = &points[i];
         passes += point->graph.pass_count;
         for (uint32_t output = 0; output < point->output_count; ++output) {
             const struct vkb_image_row *row = &point->graph.images[point->outputs[output].image];
-            readback += vkb_readback_size(row->format, row->width, row->height);
+            if (!vkb_readback_plan(run->device, &flight->readback, row->format, row->width,
+                                   row->height, &point->outputs[output], error))
+                return false;
         }
     }
     return reserve_descriptors(run, passes, error)
         && vkb_timer_reserve(run->device, passes, &flight->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
                               params * passes, &flight->uniforms, error)
-        && vkb_readback_begin(run->device, &flight->readback, readback, error);
+        && vkb_readback_reserve(run->device, &flight->readback, error);
 }
 
 // The slot of the graph's image. One that other commands may still use is replaced only when those

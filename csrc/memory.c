@@ -97,6 +97,86 @@ bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind ki
     return vkb_buffer_create(device, kind, usage, size, buffer, error);
 }
 
+// The first coherent type of the host memory's; UINT32_MAX where there is none.
+static uint32_t find_import_type(const struct vkb_device *device, void *memory, uint32_t allowed)
+{
+    VkMemoryHostPointerPropertiesEXT properties = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT,
+    };
+
+    if (device->vk.vkGetMemoryHostPointerPropertiesEXT(
+            device->handle, VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, memory,
+            &properties)
+        != VK_SUCCESS)
+        return UINT32_MAX;
+    for (uint32_t i = 0; i < device->memory.memoryTypeCount; ++i)
+        if ((allowed & properties.memoryTypeBits) >> i & 1
+            && device->memory.memoryTypes[i].propertyFlags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT)
+            return i;
+    return UINT32_MAX;
+}
+
+static bool import_memory(const struct vkb_device *device, void *memory, struct vkb_buffer *buffer,
+                          struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    VkMemoryRequirements requirements;
+
+    vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
+    const uint32_t type = find_import_type(device, memory, requirements.memoryTypeBits);
+    if (type == UINT32_MAX || requirements.size > buffer->size)
+        return false;
+    return VK(error,
+              vk->vkAllocateMemory(
+                  device->handle,
+                  &(VkMemoryAllocateInfo){
+                      .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                      .pNext =
+                          &(VkImportMemoryHostPointerInfoEXT){
+                              .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
+                              .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+                              .pHostPointer = memory,
+                          },
+                      .allocationSize = buffer->size,
+                      .memoryTypeIndex = type,
+                  },
+                  NULL, &buffer->memory))
+        && VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0));
+}
+
+bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage, void *memory,
+                       size_t size, struct vkb_buffer *buffer, VkDeviceSize *offset)
+{
+    const VkDeviceSize align = device->import_alignment;
+    struct vkb_error ignored;
+
+    *buffer = (struct vkb_buffer){0};
+    if (align == 0)
+        return false;
+    *offset = (uintptr_t)memory % align;
+    buffer->size = (*offset + size + align - 1) / align * align;
+    if (!VK(&ignored,
+            device->vk.vkCreateBuffer(
+                device->handle,
+                &(VkBufferCreateInfo){
+                    .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                    .pNext =
+                        &(VkExternalMemoryBufferCreateInfo){
+                            .sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
+                            .handleTypes = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+                        },
+                    .size = buffer->size,
+                    .usage = usage,
+                },
+                NULL, &buffer->handle))
+        || !import_memory(device, (char *)memory - *offset, buffer, &ignored)) {
+        vkb_buffer_destroy(device, buffer);
+        return false;
+    }
+    buffer->coherent = true;
+    return true;
+}
+
 static VkMappedMemoryRange whole_range(const struct vkb_buffer *buffer)
 {
     return (VkMappedMemoryRange){

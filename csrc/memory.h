@@ -46,6 +46,12 @@ bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind ki
                         VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
                         struct vkb_error *error);
 
+// A buffer over host memory that the caller keeps: what the device writes is there after the fence,
+// without a copy. It starts at the multiple of device->import_alignment before `memory`; *offset is
+// where `memory` lies in it. False without an error where the device cannot have that memory.
+bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage, void *memory,
+                       size_t size, struct vkb_buffer *buffer, VkDeviceSize *offset);
+
 // Around host access to mapped memory that is not coherent.
 bool vkb_buffer_flush(const struct vkb_device *device, const struct vkb_buffer *buffer,
                       struct vkb_error *error);

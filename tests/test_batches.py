@@ -246,7 +246,7 @@ def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
 def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> None:
     image = picture(40, 30, 3, 14)
     right = renderer.apply(image)
-    for _ in range(10):
+    for _ in range(3):
         frames = renderer.apply_many(image, SEQUENCE)
         for _ in range(taken):
             next(frames)
