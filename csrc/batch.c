@@ -279,7 +279,7 @@ static PyObject *add(PyObject *object, PyObject *arguments)
 
     if (!require_filling(self)
         || !PyArg_ParseTuple(arguments, "OO:add", &settings_object, &allocate)
-        || !vkb_read_settings(settings_object, &settings))
+        || !vkb_read_settings(state_of(object), settings_object, &settings))
         return NULL;
     if (!vkb_require_open(self->renderer, &error)
         || !vkb_grow(&error, (void **)&self->points, &self->point_capacity, self->count + 1,

@@ -12,6 +12,8 @@
 struct vkb_module_state {
     PyObject *renderer_type, *batch_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
+    PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
+    PyObject *lacking;  // dict of type to bytes: which of those its objects lack
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);
@@ -39,8 +41,13 @@ bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *err
 PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_batch_of_image(PyObject *renderer, PyObject *arguments);
 
-// A settings object's attributes; one that it lacks keeps its default. False with an exception set.
-bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
+// Makes what vkb_read_settings keeps in the state; false with an exception set.
+bool vkb_make_attributes(struct vkb_module_state *state);
+
+// A settings object's attributes; one that it lacks keeps its default. Objects of one type have the
+// same attributes. False with an exception set.
+bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
+                       struct vkb_settings *settings);
 
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);

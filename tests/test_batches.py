@@ -157,7 +157,7 @@ def test_settings_are_taken_a_bounded_way_ahead(renderer: Renderer) -> None:
     for given in range(2, 300):
         next(frames)
         assert given <= taken <= given + limit
-    frames.close()
+    frames.close()  # type: ignore[attr-defined]
 
 
 # Other calls between two frames

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 Shading = Literal["forward", "deferred"]
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 
+# In this machine's byte order: for all but those, more is asked.
+_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
+
 
 def _version() -> str:
     from vkbloom import __version__  # noqa: PLC0415  the package imports this module
@@ -44,13 +47,15 @@ def _check_image(image: object) -> NDArray[Any]:
     """Return the image, in this machine's byte order, if the core can take it."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"image: an array is needed, not {type(image).__name__}")
-    if image.dtype.name not in ("uint8", "float16", "float32"):
-        raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+    if image.dtype not in _DTYPES:
+        if image.dtype.name not in ("uint8", "float16", "float32"):
+            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+        image = image.astype(image.dtype.newbyteorder("="), copy=False)
     if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
         raise ValueError(
             f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
         )
-    return image.astype(image.dtype.newbyteorder("="), copy=False)
+    return image
 
 
 def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
