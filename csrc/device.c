@@ -132,6 +132,24 @@ bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
     return (properties.optimalTilingFeatures & features) == features;
 }
 
+bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
+                             VkImageUsageFlags usage, VkFormatFeatureFlags features, uint32_t width,
+                             uint32_t height)
+{
+    VkFormatProperties properties;
+    VkImageFormatProperties limits;
+
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU)
+        return false;
+    vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
+    return (properties.linearTilingFeatures & features) == features
+        && vkGetPhysicalDeviceImageFormatProperties(device->adapter.physical, format,
+                                                    VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage,
+                                                    0, &limits)
+               == VK_SUCCESS
+        && width <= limits.maxExtent.width && height <= limits.maxExtent.height;
+}
+
 static bool remember_loss(struct vkb_device *device, bool done, const struct vkb_error *error)
 {
     if (!done && error->kind == VKB_ERROR_DEVICE_LOST)

@@ -29,6 +29,12 @@ void vkb_device_destroy(struct vkb_device *device);
 bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
                          VkFormatFeatureFlags features);
 
+// Whether images of that kind are best in memory that the host can write to: on a CPU, where all
+// memory is the host's and no tiling is faster than rows.
+bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
+                             VkImageUsageFlags usage, VkFormatFeatureFlags features, uint32_t width,
+                             uint32_t height);
+
 // Submits the recorded commands; `fence`, unsignalled before, is signalled when the device has run
 // them and all that was submitted before. A lost device is remembered.
 bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,

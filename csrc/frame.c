@@ -159,7 +159,7 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
         images[i] = (VkDescriptorImageInfo){
             .sampler = pipelines->sampler,
             .imageView = image->view,
-            .imageLayout = vkb_access_layout(VKB_ACCESS_SAMPLED),
+            .imageLayout = vkb_image_layout(image, VKB_ACCESS_SAMPLED),
         };
         writes[write_count++] = (VkWriteDescriptorSet){
             .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
@@ -439,8 +439,11 @@ static bool stage_input(struct run *run, const struct vkb_input *input, struct v
                 return false;
             run->input = run->slots[i];
         }
-    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->flights, input, &changed,
-                          error))
+    // An image that its last writing did not reach holds nothing to compare with.
+    if (run->input->image.mapped && !run->input->valid)
+        vkb_upload_forget(&run->frame->upload);
+    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->flights, input,
+                          &run->input->image, &changed, error))
         return false;
     run->send_input = changed || !run->input->valid;
     return !run->send_input
@@ -449,8 +452,9 @@ static bool stage_input(struct run *run, const struct vkb_input *input, struct v
 
 static void record_input(struct run *run)
 {
-    vkb_upload_record(run->device, run->flight->commands.buffer, &run->frame->upload,
-                      &run->input->image);
+    if (!run->input->image.mapped)
+        vkb_upload_record(run->device, run->flight->commands.buffer, &run->frame->upload,
+                          &run->input->image);
     run->input->valid = true;
 }
 

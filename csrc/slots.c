@@ -66,6 +66,17 @@ static bool check_format(const struct vkb_device *device, enum vkb_format format
                     device->adapter.name, vkb_formats[format].name);
 }
 
+// The image from the host: written by it in place where the device reads that as fast.
+static bool is_mapped(const struct vkb_device *device, const struct vkb_image_row *row)
+{
+    const VkFormatFeatureFlags features =
+        VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT;
+
+    return row->input
+        && vkb_device_shares_image(device, vkb_formats[row->format].vk, image_usage(row->format),
+                                   features, row->width, row->height);
+}
+
 static struct vkb_slot *find_slot(const struct vkb_slots *slots, const char *name)
 {
     for (size_t i = 0; i < slots->count; ++i)
@@ -124,6 +135,7 @@ bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
                                 .layers = 1,
                                 .levels = 1,
                                 .usage = image_usage(row->format),
+                                .mapped = is_mapped(device, row),
                             },
                             &slot->image, error);
 }

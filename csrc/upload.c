@@ -88,8 +88,7 @@ static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t 
 
 static unsigned char *kept_row(const struct vkb_upload *upload, uint32_t y)
 {
-    return (unsigned char *)upload->staging.mapped
-         + y * ((size_t)upload->width * vkb_pixel_size(upload->format));
+    return upload->pixels + y * upload->row_pitch;
 }
 
 static bool row_differs(const struct vkb_upload *upload, const struct vkb_input *input, uint32_t y)
@@ -145,6 +144,11 @@ static struct vkb_specials count_row(const struct vkb_upload *upload, uint32_t y
     return sum;
 }
 
+void vkb_upload_forget(struct vkb_upload *upload)
+{
+    upload->format = VKB_FORMAT_NONE;
+}
+
 static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *input)
 {
     return upload->format == input->format && upload->width == input->width
@@ -153,18 +157,23 @@ static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *
 
 // Memory for an image of another kind than the last.
 static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
-                    const struct vkb_input *input, struct vkb_error *error)
+                    const struct vkb_input *input, const struct vkb_image *image,
+                    struct vkb_error *error)
 {
     const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
 
-    // Cached memory: it is compared with the next image.
-    upload->format = VKB_FORMAT_NONE;
+    vkb_upload_forget(upload);
     if (!vkb_grow(error, (void **)&upload->rows, &upload->row_capacity, input->height,
                   sizeof *upload->rows)
-        || !vkb_grow(error, (void **)&upload->packed, &upload->packed_capacity, row_size, 1)
-        || !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+        || !vkb_grow(error, (void **)&upload->packed, &upload->packed_capacity, row_size, 1))
+        return false;
+    // Cached memory: it is compared with the next image.
+    if (!image->mapped
+        && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                row_size * input->height, &upload->staging, error))
         return false;
+    upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
+    upload->row_pitch = image->mapped ? image->row_pitch : row_size;
     upload->format = input->format;
     upload->width = input->width;
     upload->height = input->height;
@@ -173,8 +182,8 @@ static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
 }
 
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
-                      struct vkb_flights *flights, const struct vkb_input *input, bool *changed,
-                      struct vkb_error *error)
+                      struct vkb_flights *flights, const struct vkb_input *input,
+                      const struct vkb_image *image, bool *changed, struct vkb_error *error)
 {
     const bool fresh = !holds_such(upload, input);
     uint32_t first = 0;
@@ -185,7 +194,7 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     if (!*changed)
         return true;
     if (!vkb_flights_land(device, flights, error)
-        || (fresh && !prepare(device, upload, input, error)))
+        || (fresh && !prepare(device, upload, input, image, error)))
         return false;
     for (uint32_t y = first; y < input->height; ++y) {
         pack_row(kept_row(upload, y), input, y);
@@ -196,7 +205,7 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
         upload->specials.nan += upload->rows[y].nan;
         upload->specials.inf += upload->rows[y].inf;
     }
-    return vkb_buffer_flush(device, &upload->staging, error);
+    return image->mapped || vkb_buffer_flush(device, &upload->staging, error);
 }
 
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,
