@@ -375,12 +375,6 @@ static bool read_mesh(struct vkb_held_scene *scene, PyObject *vertices, PyObject
         }
         mesh->emission = view->buf;
     }
-    for (uint32_t i = 0; i < mesh->index_count; ++i)
-        if (mesh->indices[i] >= mesh->vertex_count) {
-            PyErr_Format(PyExc_ValueError, "scene: index %u is beyond the mesh's %u vertices",
-                         mesh->indices[i], mesh->vertex_count);
-            return false;
-        }
     return true;
 }
 

@@ -146,6 +146,16 @@ static bool load_sky(const struct vkb_device *device, VkCommandBuffer commands,
     return true;
 }
 
+static bool check_indices(const struct vkb_mesh_data *data, struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < data->index_count; ++i)
+        if (data->indices[i] >= data->vertex_count)
+            return vkb_fail(error, VKB_ERROR_VALUE,
+                            "scene: index %u is beyond the mesh's %u vertices", data->indices[i],
+                            data->vertex_count);
+    return true;
+}
+
 bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
                     const struct vkb_scene_data *data, struct vkb_scene *scene,
                     struct vkb_error *error)
@@ -154,6 +164,8 @@ bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
 
     if (scene->serial == data->serial)
         return true;
+    if (!check_indices(&data->body, error) || !check_indices(&data->glow, error))
+        return false;
     vkb_scene_destroy(device, scene);
     bool done = vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                   staging_bytes(data), &staging.buffer, error)

@@ -23,6 +23,7 @@ from vkbloom import (
     _core,
     batches,
 )
+from vkbloom.renderer import _scene_arrays
 
 SIZE = (64, 36)
 
@@ -444,6 +445,22 @@ def test_a_batch_is_submitted_and_collected_once(renderer: Renderer) -> None:
             again()
     with pytest.raises(TypeError):
         type(batch)()
+
+
+def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
+    # Scenes cannot have them; the device must never.
+    serial, vertices, indices, *others = _scene_arrays(scene)
+    wrong = indices.copy()
+    wrong[-1] = len(vertices)
+    camera = ((0.0, 0.0, -10.0), (0.0, 0.0, 0.0), 45.0, 0.1, 256.0)
+    arguments = (camera, SIZE, "forward", 0.0, 1.0, None)
+    right = renderer.render(scene, None, SIZE)
+    batch = renderer._core.render((2**63, vertices, wrong, *others), *arguments)
+    batch.add(Separable(), lambda _, shape, dtype: np.empty(shape, dtype))
+    with pytest.raises(ValueError, match=f"index {len(vertices)} is beyond the mesh's"):
+        batch.submit()
+    assert_same(renderer.render(scene, None, SIZE), right)
+    assert serial != 2**63
 
 
 def test_a_batch_of_a_closed_renderer() -> None:
