@@ -189,6 +189,8 @@ PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments)
     source.has_sky = self->scene.data.sky.level_count > 0;
     source.has_glow = self->scene.data.glow.index_count > 0;
     source.has_emission = self->scene.data.body.emission != NULL;
+    source.body_textured = self->scene.data.body.surface_count > 0;
+    source.glow_textured = self->scene.data.glow.surface_count > 0;
     self->scene_source = source;
     return (PyObject *)self;
 }

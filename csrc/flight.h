@@ -12,7 +12,7 @@ struct vkb_flight {
     struct vkb_buffer uniforms;
     VkDeviceSize uniform_used;
     VkDescriptorPool descriptors;
-    uint32_t descriptor_capacity;  // in passes
+    uint32_t descriptor_capacity;  // in sets
     struct vkb_timer timer;
     struct vkb_readback readback;
     struct vkb_point *points;  // what it runs; the submitter's

@@ -449,13 +449,13 @@ def test_a_batch_is_submitted_and_collected_once(renderer: Renderer) -> None:
 
 def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
     # Scenes cannot have them; the device must never.
-    serial, vertices, indices, *others = _scene_arrays(scene)
+    serial, (vertices, indices, *mesh), *others = _scene_arrays(scene)
     wrong = indices.copy()
     wrong[-1] = len(vertices)
     camera = ((0.0, 0.0, -10.0), (0.0, 0.0, 0.0), 45.0, 0.1, 256.0)
     arguments = (camera, SIZE, "forward", 0.0, 1.0, None)
     right = renderer.render(scene, None, SIZE)
-    batch = renderer._core.render((2**63, vertices, wrong, *others), *arguments)
+    batch = renderer._core.render((2**63, (vertices, wrong, *mesh), *others), *arguments)
     batch.add(Separable(), lambda _, shape, dtype: np.empty(shape, dtype))
     with pytest.raises(ValueError, match=f"index {len(vertices)} is beyond the mesh's"):
         batch.submit()
