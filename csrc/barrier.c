@@ -93,8 +93,6 @@ void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer command
     barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
     barrier.srcAccessMask = before->writes;
     barrier.dstAccessMask = after->reads | after->writes;
-    barrier.oldLayout = before->layout;
-    barrier.newLayout = after->layout;
     barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     device->vk.vkCmdPipelineBarrier(commands, before->stages, after->stages, 0, 0, NULL, 0, NULL, 1,

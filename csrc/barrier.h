@@ -21,7 +21,7 @@ enum vkb_access {
 
 VkImageLayout vkb_access_layout(enum vkb_access access);
 
-// Records the barrier that orders two accesses to an image, changing its layout. Nothing is
+// Records the barrier that orders two accesses to an image, with the layouts given. Nothing is
 // recorded between two equal accesses that only read.
 void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,
                         const VkImageMemoryBarrier *image, enum vkb_access from,

@@ -39,6 +39,19 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
     return true;
 }
 
+bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
+{
+    if (a->image_count != b->image_count)
+        return false;
+    for (uint32_t i = 0; i < a->image_count; ++i) {
+        const struct vkb_image_row *x = &a->images[i], *y = &b->images[i];
+        if (x->format != y->format || x->width != y->width || x->height != y->height
+            || strcmp(x->name, y->name) != 0)
+            return false;
+    }
+    return true;
+}
+
 static bool share_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
 {
     return !a->alternative && !b->alternative && a->geometry != VKB_GEOMETRY_DISPATCH

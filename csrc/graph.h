@@ -90,6 +90,9 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
 // Every rule that the rows must keep, so that nothing but a right graph reaches Vulkan.
 bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_size, struct vkb_error *error);
 
+// Whether both have the same images, in the same order; their passes may differ.
+bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b);
+
 // The index after the last pass that shares a render pass with pass `first`.
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 

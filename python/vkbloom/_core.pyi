@@ -58,7 +58,6 @@ class Renderer:
     def pipeline_cache(self) -> bytes: ...
     def render(
         self,
-        settings: object,
         scene: _Scene,
         camera: _Camera,
         size: tuple[int, int],
@@ -66,14 +65,13 @@ class Renderer:
         time: float,
         glow_intensity: float,
         names: tuple[str, ...] | None,
-        allocate: _Allocate,
         /,
-    ) -> _Result: ...
-    def apply(
-        self,
-        settings: object,
-        image: _Array,
-        names: tuple[str, ...] | None,
-        allocate: _Allocate,
-        /,
-    ) -> _Result: ...
+    ) -> Batch: ...
+    def apply(self, image: _Array, names: tuple[str, ...] | None, /) -> Batch: ...
+
+class Batch:
+    @property
+    def size(self) -> int: ...
+    def add(self, settings: object, allocate: _Allocate, /) -> bool: ...
+    def submit(self) -> None: ...
+    def collect(self) -> list[_Result]: ...

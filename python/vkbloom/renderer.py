@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from vkbloom import _core, pipeline_cache
+from vkbloom import _core, batches, pipeline_cache
 from vkbloom.adapter import AdapterInfo
 from vkbloom.frames import Frames
 from vkbloom.settings import Separable, Settings, check_size
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 Shading = Literal["forward", "deferred"]
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
+
+# In this machine's byte order: for all but those, more is asked.
+_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 
 
 def _version() -> str:
@@ -45,13 +48,15 @@ def _check_image(image: object) -> NDArray[Any]:
     """Return the image, in this machine's byte order, if the core can take it."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"image: an array is needed, not {type(image).__name__}")
-    if image.dtype.name not in ("uint8", "float16", "float32"):
-        raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+    if image.dtype not in _DTYPES:
+        if image.dtype.name not in ("uint8", "float16", "float32"):
+            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+        image = image.astype(image.dtype.newbyteorder("="), copy=False)
     if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
         raise ValueError(
             f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
         )
-    return image.astype(image.dtype.newbyteorder("="), copy=False)
+    return image
 
 
 def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
@@ -142,6 +147,11 @@ class Renderer:
         self._core = _core.Renderer(adapter, bool(validation), forms, pipeline_cache.read)
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
+        self._made_by = {
+            "adapter": self.info.name,
+            "driver": self.info.driver_info or self.info.driver,
+            "version": _version(),
+        }
         self._saved_pipelines = 0
 
     @property
@@ -238,33 +248,8 @@ class Renderer:
         ``timings`` of the result names the passes that ran.
         """
         settings = _check_settings(settings)
-        if shading not in SHADINGS:
-            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-        try:
-            finite = math.isfinite(time)
-        except (TypeError, OverflowError):
-            raise TypeError(f"time: a number is needed, not {time!r}") from None
-        if not finite:
-            raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
-        from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
-
-        if not isinstance(scene, Scene):
-            raise TypeError(f"scene: a Scene is needed, not {scene!r}")
-        camera = scene.camera
-        arrays, timings, specials = self._core.render(
-            settings,
-            _scene_arrays(scene),
-            (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
-            check_size("size", size),
-            shading,
-            # Whole turns change nothing; without them large times keep their precision.
-            math.fmod(time, 1.0),
-            scene.glow_intensity,
-            _check_attachments(attachments),
-            _allocator(out),
-        )
-        _check_filled(out, arrays)
-        return self._frames(arrays, timings, specials, settings)
+        arguments = _render_arguments(scene, size, shading, time, attachments)
+        return self._run_one(self._core.render(*arguments), settings, out)
 
     def apply(
         self,
@@ -312,11 +297,8 @@ class Renderer:
         when what they read or their settings changed.
         """
         settings = _check_settings(settings)
-        arrays, timings, specials = self._core.apply(
-            settings, _check_image(image), _check_attachments(attachments), _allocator(out)
-        )
-        _check_filled(out, arrays)
-        return self._frames(arrays, timings, specials, settings)
+        batch = self._core.apply(_check_image(image), _check_attachments(attachments))
+        return self._run_one(batch, settings, out)
 
     def apply_many(
         self,
@@ -340,9 +322,16 @@ class Renderer:
         Frames
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
+
+        Notes
+        -----
+        The device works on the next settings while a frame is used: after the first frame,
+        settings are taken from their iterable before the frames that come before theirs.
+        What a wrong one of them raises is raised in its turn, after the frames before it.
         """
-        for settings in settings_seq:
-            yield self.apply(image, settings, attachments=attachments)
+        image = _check_image(image)
+        names = _check_attachments(attachments)
+        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -367,27 +356,37 @@ class Renderer:
         Frames
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
-        """
-        for settings in settings_seq:
-            yield self.render(
-                scene, settings, size, shading=shading, time=time, attachments=attachments
-            )
 
-    def _frames(
+        Notes
+        -----
+        As for `apply_many`.
+        """
+        arguments = _render_arguments(scene, size, shading, time, attachments)
+        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
+
+    def _run_one(
         self,
-        arrays: dict[str, NDArray[Any]],
-        timings: dict[str, float],
-        specials: tuple[int, int],
+        batch: _core.Batch,
         settings: Settings,
+        out: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
+        batch.add(settings, _allocator(out))
+        batch.submit()
+        (result,) = batch.collect()
+        _check_filled(out, result[0])
+        return self._frames(settings, result)
+
+    def _run_many(
+        self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
+    ) -> Iterator[Frames]:
+        checked = map(_check_settings, settings_seq)
+        for settings, result in batches.run(checked, open_batch, _allocator(None)):
+            yield self._frames(settings, result)
+
+    def _frames(self, settings: Settings, result: batches.Result) -> Frames:
         self._save_pipelines()
-        info = {
-            "adapter": self.info.name,
-            "driver": self.info.driver_info or self.info.driver,
-            "version": _version(),
-            "nan": specials[0],
-            "inf": specials[1],
-        }
+        arrays, timings, (nan, inf) = result
+        info = {**self._made_by, "nan": nan, "inf": inf}
         return Frames(arrays, timings=timings, settings=settings, info=info)
 
     def _save_pipelines(self) -> None:
@@ -396,6 +395,39 @@ class Renderer:
         if count != self._saved_pipelines:
             self._saved_pipelines = count
             pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
+
+
+def _render_arguments(
+    scene: Scene,
+    size: tuple[int, int],
+    shading: Shading,
+    time: float,
+    attachments: str | Sequence[str],
+) -> tuple[Any, ...]:
+    """Return what the core renders, checked."""
+    if shading not in SHADINGS:
+        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+    try:
+        finite = math.isfinite(time)
+    except (TypeError, OverflowError):
+        raise TypeError(f"time: a number is needed, not {time!r}") from None
+    if not finite:
+        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+    from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: a Scene is needed, not {scene!r}")
+    camera = scene.camera
+    return (
+        _scene_arrays(scene),
+        (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
+        check_size("size", size),
+        shading,
+        # Whole turns change nothing; without them large times keep their precision.
+        math.fmod(time, 1.0),
+        scene.glow_intensity,
+        _check_attachments(attachments),
+    )
 
 
 def _scene_arrays(scene: Scene) -> Any:
