@@ -283,9 +283,7 @@ def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.clip(finite, 0.0, 1.0)
 
 
-def _stretched(
-    values: NDArray[np.float32], ranged: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def _stretched(values: NDArray[np.float32], ranged: NDArray[np.float32]) -> NDArray[np.float32]:
     """Map the finite range that each channel has in `ranged` to 0..1; one value gives 0."""
     finite = np.isfinite(ranged)
     low: NDArray[np.float32] = ranged.min(axis=(0, 1), where=finite, initial=np.inf)

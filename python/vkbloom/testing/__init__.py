@@ -7,10 +7,40 @@ The laws need no reference picture; they work on any callable that takes an imag
 from __future__ import annotations
 
 from vkbloom.testing.judging import Tolerances
+from vkbloom.testing.laws import (
+    assert_additive,
+    assert_bounded_fireflies,
+    assert_gain,
+    assert_no_ringing,
+    assert_superposition,
+    assert_symmetric,
+)
+from vkbloom.testing.point_spread import (
+    Response,
+    assert_centroid_kept,
+    assert_separable,
+    assert_spread,
+    point_spread,
+    response,
+)
+from vkbloom.testing.probe import Probe
 from vkbloom.testing.regression import FrameDifferenceWarning, FrameRegression
 
 __all__ = [
     "FrameDifferenceWarning",
     "FrameRegression",
+    "Probe",
+    "Response",
     "Tolerances",
+    "assert_additive",
+    "assert_bounded_fireflies",
+    "assert_centroid_kept",
+    "assert_gain",
+    "assert_no_ringing",
+    "assert_separable",
+    "assert_spread",
+    "assert_superposition",
+    "assert_symmetric",
+    "point_spread",
+    "response",
 ]

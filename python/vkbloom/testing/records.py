@@ -1,4 +1,4 @@
-"""What a check leaves for the summary and the report: plain values that travel between processes."""
+"""What a check leaves for the summary and the report: plain values that processes exchange."""
 
 from __future__ import annotations
 

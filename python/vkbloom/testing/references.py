@@ -156,8 +156,9 @@ class ReferenceFolder:
         for framebuffer, image in images.items():
             _check_image(framebuffer, image)
         listed = self._listed(name)
-        kept = [entry for entry in listed if add and Origin(**entry["origin"]).machine
-                != origin.machine]
+        kept = [
+            entry for entry in listed if add and Origin(**entry["origin"]).machine != origin.machine
+        ]
         used = {entry["number"] for entry in kept}
         number = next(n for n in range(1, len(used) + 2) if n not in used)
         self.path.mkdir(parents=True, exist_ok=True)

@@ -52,6 +52,16 @@ class Mode:
     parts: Path | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What a test gave to a check."""
+
+    name: str
+    images: Mapping[str, NDArray[Any]]
+    origin: Origin
+    tolerances: Tolerances
+
+
 class FrameRegression:
     """Compares frames with references; what the fixture `frame_regression` gives a test.
 
@@ -140,19 +150,19 @@ class FrameRegression:
             warn=warn,
             allow_nan=allow_nan,
         )
-        images = _images("frames", frames)
-        origin = _origin(frames, info)
-        chosen = self._chosen_name(name)
-        self._check_adapter(origin)
-        references = self._folder.load(chosen)
+        given = _Given(
+            self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
+        )
+        self._check_adapter(given.origin)
+        references = self._folder.load(given.name)
         if not references:
-            self._without_reference(chosen, images, origin, tolerances)
+            self._without_reference(given)
             return
-        reference, verdicts = _closest(references, images, tolerances)
+        reference, verdicts = _closest(references, given)
         if first_failure(verdicts) and (self._mode.update or self._mode.add):
-            self._write(chosen, images, origin, tolerances)
+            self._write(given)
             return
-        self._conclude(chosen, images, origin, reference, verdicts, len(references))
+        self._conclude(given, reference, verdicts, len(references))
 
     def compare(
         self,
@@ -200,12 +210,11 @@ class FrameRegression:
         )
         if name is not None:
             check_name(name)
-        images, origin = _images("actual", actual), _origin(actual, None)
-        reference = Reference(
-            images=_images("expected", expected), origin=_origin(expected, None)
+        given = _Given(
+            name or self._name, _images("actual", actual), _origin(actual, None), tolerances
         )
-        verdicts = judge(reference.images, images, tolerances)
-        self._conclude(name or self._name, images, origin, reference, verdicts, None)
+        reference = Reference(images=_images("expected", expected), origin=_origin(expected, None))
+        self._conclude(given, reference, judge(reference.images, given.images, tolerances), None)
 
     def _chosen_name(self, name: str | None) -> str:
         if name is not None:
@@ -225,81 +234,69 @@ class FrameRegression:
                 f"--bloom-expect-adapter={wanted}: these frames come from {origin.summary}"
             )
 
-    def _without_reference(
-        self,
-        name: str,
-        images: Mapping[str, NDArray[Any]],
-        origin: Origin,
-        tolerances: Tolerances,
-    ) -> None:
+    def _without_reference(self, given: _Given) -> None:
         __tracebackhide__ = True
         if self._mode.update or self._mode.add:
-            self._write(name, images, origin, tolerances)
+            self._write(given)
             return
-        record = self._record(name, "missing", origin, None)
+        record = self._record(given, "missing", None)
         if not self._mode.allow_missing:
             record["message"] = message = (
-                f"{name}: there is no reference {self._folder.file(name)}. Make it with "
-                "--bloom-update, look at it, and keep it with the tests"
+                f"{given.name}: there is no reference {self._folder.file(given.name)}. Make it "
+                "with --bloom-update, look at it, and keep it with the tests"
             )
             raise AssertionError(message)
 
-    def _write(
-        self,
-        name: str,
-        images: Mapping[str, NDArray[Any]],
-        origin: Origin,
-        tolerances: Tolerances,
-    ) -> None:
-        for framebuffer, image in images.items():
-            if not tolerances.allow_nan and not np.isfinite(image).all():
+    def _write(self, given: _Given) -> None:
+        for framebuffer, image in given.images.items():
+            if not given.tolerances.allow_nan and not np.isfinite(image).all():
                 raise ValueError(
-                    f"{name}: {framebuffer} has NaN or infinity; allow_nan=True lets that be a "
-                    "reference"
+                    f"{given.name}: {framebuffer} has NaN or infinity; allow_nan=True lets that be "
+                    "a reference"
                 )
-        self._folder.write(name, images, origin, add=self._mode.add)
-        self._record(name, "written", origin, None)
+        self._folder.write(given.name, given.images, given.origin, add=self._mode.add)
+        self._record(given, "written", None)
 
     def _conclude(
         self,
-        name: str,
-        images: Mapping[str, NDArray[Any]],
-        origin: Origin,
+        given: _Given,
         reference: Reference,
         verdicts: tuple[Verdict, ...],
         count: int | None,
     ) -> None:
-        """Record what was found; raise AssertionError if something failed."""
+        """Record what was found; raise AssertionError if something failed.
+
+        `count` references were tried; None: the test gave what it expects.
+        """
         __tracebackhide__ = True
         failure = first_failure(verdicts)
-        record = self._record(name, "failed" if failure else "passed", origin, reference)
+        record = self._record(given, "failed" if failure else "passed", reference)
         record["has_files"] = count is not None
         record["first_failure"] = failure.name if failure else None
-        record["framebuffers"] = [report_parts.figures(verdict, images) for verdict in verdicts]
-        for verdict in verdicts:
-            if verdict.warning and not failure:
-                warnings.warn(
-                    f"{name}: {verdict.warning}", FrameDifferenceWarning, stacklevel=3
-                )
+        record["framebuffers"] = [
+            report_parts.figures(verdict, given.images) for verdict in verdicts
+        ]
         if failure is None:
+            for verdict in verdicts:
+                if verdict.warning:
+                    text = f"{given.name}: {verdict.warning}"
+                    warnings.warn(text, FrameDifferenceWarning, stacklevel=3)
             return
-        record["message"] = _message(name, failure, verdicts, reference, origin, count)
+        record["message"] = _message(given, verdicts, reference, count)
         if self._mode.parts is not None:
             record["part"] = report_parts.write(
-                self._mode.parts, verdicts, reference.images, images
+                self._mode.parts, verdicts, reference.images, given.images
             )
         raise AssertionError(record["message"])
 
-    def _record(
-        self, name: str, outcome: str, origin: Origin, reference: Reference | None
-    ) -> Record:
+    def _record(self, given: _Given, outcome: str, reference: Reference | None) -> Record:
         record: Record = {
             "test": self._test,
-            "name": name,
+            "name": given.name,
             "folder": str(self._folder.path),
             "has_files": True,
             "outcome": outcome,
-            "origin": origin.summary,
+            "origin": given.origin.summary,
             "reference_origin": reference.origin.summary if reference else None,
             "first_failure": None,
             "message": None,
@@ -361,10 +358,10 @@ def _origin(frames: object, info: Mapping[str, str] | None) -> Origin:
 
 
 def _closest(
-    references: Sequence[Reference], images: Mapping[str, NDArray[Any]], tolerances: Tolerances
+    references: Sequence[Reference], given: _Given
 ) -> tuple[Reference, tuple[Verdict, ...]]:
     """Return a reference that fits, else the one whose first failure is the furthest down."""
-    judged = [(each, judge(each.images, images, tolerances)) for each in references]
+    judged = [(each, judge(each.images, given.images, given.tolerances)) for each in references]
 
     def depth(pair: tuple[Reference, tuple[Verdict, ...]]) -> float:
         failure = first_failure(pair[1])
@@ -374,18 +371,16 @@ def _closest(
 
 
 def _message(
-    name: str,
-    failure: Verdict,
-    verdicts: tuple[Verdict, ...],
-    reference: Reference,
-    origin: Origin,
-    count: int | None,
+    given: _Given, verdicts: tuple[Verdict, ...], reference: Reference, count: int | None
 ) -> str:
-    place = verdicts.index(failure)
-    before = ", ".join(verdict.name for verdict in verdicts[:place])
+    before: list[str] = []
+    for verdict in verdicts:
+        if not verdict.passed:
+            break
+        before.append(verdict.name)
     lines = [
-        f"{name}: the first framebuffer that differs is {failure.name}"
-        + (f" ({before}: right)" if before else "")
+        f"{given.name}: the first framebuffer that differs is {verdicts[len(before)].name}"
+        + (f" ({', '.join(before)}: right)" if before else "")
     ]
     for verdict in verdicts:
         if verdict.identical:
@@ -395,5 +390,6 @@ def _message(
         for reason in verdict.reasons:
             lines.append(f"  {verdict.name}: FAILED ({verdict.failed_at}): {reason}")
     of_several = f" (the closest of {count})" if count and count > 1 else ""
-    lines.append(f"  reference{of_several}: {reference.origin.summary}; now: {origin.summary}")
+    now = given.origin.summary
+    lines.append(f"  reference{of_several}: {reference.origin.summary}; now: {now}")
     return "\n".join(lines)

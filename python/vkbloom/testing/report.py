@@ -213,7 +213,11 @@ def _pictures(group: str, figures: Figures, shown: Shown) -> Iterable[str]:
     name = _text(figures["name"])
     kinds: list[tuple[str, str | None, str]] = [
         ("expected", shown["expected"], "expected"),
-        ("actual", shown["actual"], "actual"),
+        (
+            "actual",
+            shown["actual"],
+            "actual and expected" if figures["outcome"] == "equal" else "actual",
+        ),
         ("difference", shown["difference"], f"difference × {shown['magnified']:.4g}"),
         ("flip", shown["flip"], f"FLIP, mean {_number(shown['flip_mean'])}, black 0, light 1"),
     ]
@@ -242,16 +246,13 @@ def _histogram(histogram: Histogram) -> str:
     width, height = 10, 100
     tallest = math.log1p(max(counts))
     bars = "".join(
-        f'<rect x="{index * width}" y="{height - bar:.1f}" width="{width - 1}" '
-        f'height="{bar:.1f}"/>'
+        f'<rect x="{index * width}" y="{height - bar:.1f}" width="{width - 1}" height="{bar:.1f}"/>'
         for index, bar in enumerate(height * math.log1p(count) / tallest for count in counts)
         if bar
     )
     middle = len(counts) // 2
     lower, around, higher = sum(counts[:middle]), counts[middle], sum(counts[middle + 1 :])
-    summary = (
-        f"{lower} values are lower than expected, {around} equal or nearly, {higher} higher"
-    )
+    summary = f"{lower} values are lower than expected, {around} equal or nearly, {higher} higher"
     return (
         '<figure class="histogram"><svg role="img" viewBox="0 0 '
         f'{width * len(counts)} {height}" preserveAspectRatio="none" '

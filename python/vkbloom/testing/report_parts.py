@@ -129,12 +129,10 @@ def write(
     return name
 
 
-def _shown(
-    verdict: Verdict, expected: NDArray[Any] | None, actual: NDArray[Any] | None
-) -> Shown:
+def _shown(verdict: Verdict, expected: NDArray[Any] | None, actual: NDArray[Any] | None) -> Shown:
     shown: Shown = {
         "name": verdict.name,
-        "expected": _picture(verdict.name, expected, expected),
+        "expected": None if verdict.identical else _picture(verdict.name, expected, expected),
         "actual": _picture(verdict.name, actual, expected),
         "difference": None,
         "magnified": 1.0,
@@ -220,9 +218,7 @@ def _channels(image: NDArray[Any], x: int, y: int) -> list[float]:
     return [float(value) for value in np.atleast_1d(_real(image)[y, x])]
 
 
-def _picture(
-    name: str, image: NDArray[Any] | None, range_of: NDArray[Any] | None
-) -> str | None:
+def _picture(name: str, image: NDArray[Any] | None, range_of: NDArray[Any] | None) -> str | None:
     if image is None:
         return None
     height, width = image.shape[:2]
