@@ -363,11 +363,13 @@ def fail(assertion: str, law: str, figure: str) -> NoReturn:
 
 
 def _whole_quarters(probe: Probe, image: Image) -> Image:
-    """Round integers so that a quarter of them is a whole level, and halves as exact as any."""
-    if probe.dtype.kind != "u":
-        return image
-    levels = np.iinfo(probe.dtype).max
-    return np.floor(image * levels / 4) * 4 / levels
+    """Round values so that a half and a quarter of two of them add up without rounding.
+
+    Integers to multiples of four levels; floats to 256 levels, of which half has 8 times as many.
+    """
+    levels = np.iinfo(probe.dtype).max / 4 if probe.dtype.kind == "u" else 256 / probe.value
+    whole: Image = np.floor(image * levels + 1e-9) / levels
+    return whole
 
 
 def _mirrored(image: Image, axis: str) -> Image:
