@@ -15,6 +15,7 @@ import pytest
 import skimage.metrics  # noqa: F401
 
 import vkbloom.testing.report  # noqa: F401
+from vkbloom.testing import read_frame
 from vkbloom.testing.references import cpu_vendor
 from vkbloom.testing.regression import name_of_test
 
@@ -464,6 +465,33 @@ def test_other(frame_regression):
             f"        frame_regression.check(frames(), {argument})",
         )
         run(project).assert_outcomes(passed=1)
+
+
+class TestFrameFiles:
+    @pytest.mark.parametrize(
+        ("name", "dtype", "channels"),
+        [("a.exr", "float16", 3), ("a.exr", "float32", 4), ("a.png", "uint8", 4)],
+    )
+    def test_values_are_as_stored(
+        self, tmp_path: Path, name: str, dtype: str, channels: int
+    ) -> None:
+        image = np.arange(5 * 7 * channels).reshape(5, 7, channels).astype(dtype)
+        buffer = oiio.ImageBuf(image)
+        buffer.specmod().attribute("oiio:UnassociatedAlpha", 1)
+        assert buffer.write(str(tmp_path / name))
+        read = read_frame(tmp_path / name)
+        assert read.dtype == image.dtype
+        np.testing.assert_array_equal(read, image)
+
+    def test_files_that_are_no_frames(self, tmp_path: Path) -> None:
+        with pytest.raises(FileNotFoundError, match="nothing"):
+            read_frame(tmp_path / "nothing.exr")
+        file = tmp_path / "two.exr"
+        buffer = oiio.ImageBuf(np.zeros((2, 2, 2), np.float32))
+        buffer.specmod().channelnames = ("X", "Z")
+        assert buffer.write(str(file))
+        with pytest.raises(ValueError, match=r"two\.exr: the channels are"):
+            read_frame(file)
 
 
 class TestOptions:

@@ -6,6 +6,7 @@ The laws need no reference picture; they work on any callable that takes an imag
 
 from __future__ import annotations
 
+from vkbloom.testing.frame_files import read_frame
 from vkbloom.testing.judging import Tolerances
 from vkbloom.testing.laws import (
     assert_additive,
@@ -42,5 +43,6 @@ __all__ = [
     "assert_superposition",
     "assert_symmetric",
     "point_spread",
+    "read_frame",
     "response",
 ]
