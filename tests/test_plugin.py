@@ -57,6 +57,15 @@ def run(project: pytest.Pytester, *arguments: str) -> pytest.RunResult:
     return project.runpytest_inprocess(*quick, *arguments)
 
 
+def run_workers(
+    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *arguments: str
+) -> pytest.RunResult:
+    """Run with two workers of xdist, without other plugins, which take most of their time."""
+    with monkeypatch.context() as patch:
+        patch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+        return run(project, "-p", "vkbloom", "-p", "xdist", "-n", "2", *arguments)
+
+
 def references(project: pytest.Pytester, module: str = "test_one") -> list[str]:
     return sorted(file.name for file in (project.path / "bloom_references" / module).iterdir())
 
@@ -292,8 +301,10 @@ class TestUnused:
     def test_is_listed(self, project: pytest.Pytester) -> None:
         run(project).stdout.fnmatch_lines([self.LINE])
 
-    def test_is_listed_of_workers(self, project: pytest.Pytester) -> None:
-        result = run(project, "-n", "2")
+    def test_is_listed_of_workers(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        result = run_workers(project, monkeypatch)
         result.assert_outcomes(passed=2)
         result.stdout.fnmatch_lines([self.LINE])
 
@@ -573,6 +584,15 @@ def test_again(bloom_renderer):
         result.assert_outcomes(failed=1)
         result.stdout.fnmatch_lines(["*--bloom-expect-adapter=GeForce: these frames come from*"])
 
+    def test_images_need_no_vulkan(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write(project, ONE)
+        monkeypatch.setenv("VK_DRIVER_FILES", "/dev/null")
+        monkeypatch.setenv("VK_ICD_FILENAMES", "/dev/null")
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        run(project).assert_outcomes(passed=1)
+
     def test_no_adapter_is_an_error(self, project: pytest.Pytester) -> None:
         write(project, self.RENDER)
         result = run(project, "--bloom-adapter=no such device")
@@ -587,17 +607,15 @@ class TestReportOfWorkers:
         "    frame_regression.check(frames() if n % 2 else frames(0.0), f'name{n}')\n"
     )
 
-    def test_is_one(
-        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-    ) -> None:
+    def test_is_one(self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
         write(project, self.MANY)
         run(project, "--bloom-update").assert_outcomes(passed=6)
         monkeypatch.setenv("SHIFT", "0.1")
+        alone = run(project, "--bloom-report=alone")
+        shared = run_workers(project, monkeypatch, "--bloom-report=shared")
         outputs = []
-        for folder, workers in (("alone", "0"), ("shared", "3")):
-            run(project, f"--bloom-report={folder}", "-n", workers).assert_outcomes(
-                passed=3, failed=3
-            )
+        for result, folder in ((alone, "alone"), (shared, "shared")):
+            result.assert_outcomes(passed=3, failed=3)
             files = sorted(file.name for file in (project.path / folder).iterdir())
             assert files == ["index.html", "report.json"]
             outputs.append([(project.path / folder / name).read_bytes() for name in files])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["bloom_renderer", "frame_regression"]
 
 _RECORDS = pytest.StashKey[list["Record"]]()
-_SESSION = pytest.StashKey["_Session"]()
+_RUN = pytest.StashKey["_Run"]()
 # Attributes in which the report of a test carries its checks, and what is known of its module,
 # from an xdist worker to the controller.
 _CHECKS = "vkbloom_checks"
@@ -78,15 +78,15 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError("--bloom-update replaces references, --bloom-add keeps them")
     if config.getoption("bloom_expect_adapter") == "":
         raise pytest.UsageError("--bloom-expect-adapter: a name is needed")
-    session = _Session(config)
-    config.stash[_SESSION] = session
-    config.pluginmanager.register(session, "vkbloom-session")
+    run = _Run(config)
+    config.stash[_RUN] = run
+    config.pluginmanager.register(run, "vkbloom-run")
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Tell an xdist worker where the parts of the report belong."""
-    parts = node.config.stash[_SESSION].parts
+    parts = node.config.stash[_RUN].parts
     node.workerinput["vkbloom_parts"] = None if parts is None else str(parts)
 
 
@@ -100,7 +100,7 @@ def pytest_runtest_makereport(
     if records:
         setattr(report, _CHECKS, list(records))
         records.clear()
-    setattr(report, _MODULE, item.config.stash[_SESSION].describe(item))
+    setattr(report, _MODULE, item.config.stash[_RUN].describe(item))
     return report
 
 
@@ -140,7 +140,7 @@ def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
             add=config.getoption("bloom_add"),
             allow_missing=config.getoption("bloom_allow_missing"),
             expect_adapter=config.getoption("bloom_expect_adapter"),
-            parts=config.stash[_SESSION].parts,
+            parts=config.stash[_RUN].parts,
         ),
         records=item.stash.setdefault(_RECORDS, []),
     )
@@ -151,7 +151,7 @@ def folder_of(module: Path) -> Path:
     return module.parent / _FOLDER / module.stem
 
 
-class _Session:
+class _Run:
     """What is known of all checks of a run; registered as a plugin of its own."""
 
     def __init__(self, config: pytest.Config) -> None:
