@@ -1,5 +1,6 @@
 # make demo: sets up what is missing, renders the built-in scene into out/.
 # make test: the same for the tests, and runs them. Both are quick the second time.
+# make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
@@ -14,8 +15,9 @@ demo: build/stamp/core
 test: build/stamp/core build/stamp/test
 	$(PYTHON) -m pytest
 
-bench: build/stamp/core
-	$(PYTHON) benchmarks/separable.py
+# BENCH: more options of vkbloom bench.
+bench: build/stamp/core build/stamp/peers
+	$(PYTHON) -m vkbloom.bench --out out/bench.md $(BENCH)
 
 lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .
@@ -50,6 +52,10 @@ build/stamp/packages: pyproject.toml | $(PYTHON)
 
 build/stamp/core: $(CORE) build/stamp/packages
 	$(PYTHON) -m pip install --quiet --no-build-isolation --no-deps --editable .
+	@mkdir -p $(@D) && touch $@
+
+build/stamp/peers: benchmarks/peers.txt | $(PYTHON)
+	$(PYTHON) -m pip install --quiet -r benchmarks/peers.txt
 	@mkdir -p $(@D) && touch $@
 
 build/stamp/test: pyproject.toml | $(PYTHON)

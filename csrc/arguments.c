@@ -1,4 +1,5 @@
-// Python's arguments as the core's structs. All functions return false with an exception set.
+// Python's settings, cameras and images as the core's structs. All functions return false with an
+// exception set.
 #include "module.h"
 
 #include <math.h>
@@ -221,9 +222,8 @@ bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)
                             &camera->fov, &camera->near, &camera->far);
 }
 
-// The buffer protocol's code of the element type; 0 for anything but one number in this machine's
-// byte order. NumPy marks unaligned arrays with a prefix.
-static char element_code(const Py_buffer *view)
+// NumPy marks unaligned arrays with a prefix.
+char vkb_element_code(const Py_buffer *view)
 {
     const char *format = view->format ? view->format : "B";
 
@@ -232,122 +232,17 @@ static char element_code(const Py_buffer *view)
     return strlen(format) == 1 ? *format : 0;
 }
 
-static bool has_element(const Py_buffer *view, const char *codes)
+bool vkb_has_element(const Py_buffer *view, const char *codes)
 {
-    char code = element_code(view);
+    char code = vkb_element_code(view);
     return code && strchr(codes, code);
 }
 
-// A contiguous array of at least one element, held in the scene; NULL with an exception set.
-static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, const char *what,
-                             const char *codes)
-{
-    Py_buffer *view = &scene->views[scene->view_count];
-
-    if (PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0)
-        return NULL;
-    ++scene->view_count;
-    if (view->len > 0 && has_element(view, codes))
-        return view;
-    PyErr_Format(PyExc_TypeError, "scene: %s is an array of the wrong type", what);
-    return NULL;
-}
-
-static bool read_mesh(struct vkb_held_scene *scene, PyObject *vertices, PyObject *indices,
-                      PyObject *emission, struct vkb_mesh_data *mesh)
-{
-    if (vertices == Py_None)
-        return true;
-    const Py_buffer *vertex_view = hold(scene, vertices, "vertices", "f");
-    const Py_buffer *index_view = vertex_view ? hold(scene, indices, "indices", "I") : NULL;
-    if (!index_view)
-        return false;
-
-    *mesh = (struct vkb_mesh_data){
-        .vertices = vertex_view->buf,
-        .indices = index_view->buf,
-        .vertex_count =
-            (uint32_t)((size_t)vertex_view->len / (VKB_GIVEN_FLOATS * sizeof *mesh->vertices)),
-        .index_count = (uint32_t)((size_t)index_view->len / sizeof *mesh->indices),
-    };
-    if (emission != Py_None) {
-        const Py_buffer *view = hold(scene, emission, "emission", "f");
-        if (!view)
-            return false;
-        if ((size_t)view->len != 3 * sizeof *mesh->emission * mesh->vertex_count) {
-            PyErr_Format(PyExc_ValueError, "scene: emission must have the mesh's %u rows of 3",
-                         mesh->vertex_count);
-            return false;
-        }
-        mesh->emission = view->buf;
-    }
-    for (uint32_t i = 0; i < mesh->index_count; ++i)
-        if (mesh->indices[i] >= mesh->vertex_count) {
-            PyErr_Format(PyExc_ValueError, "scene: index %u is beyond the mesh's %u vertices",
-                         mesh->indices[i], mesh->vertex_count);
-            return false;
-        }
-    return true;
-}
-
-static enum vkb_format pixel_format(char code)
+enum vkb_format vkb_pixel_format(char code)
 {
     return code == 'B' ? VKB_FORMAT_RGBA8_UNORM
          : code == 'e' ? VKB_FORMAT_RGBA16_FLOAT
                        : VKB_FORMAT_RGBA32_FLOAT;
-}
-
-static bool read_sky(struct vkb_held_scene *scene, PyObject *levels)
-{
-    struct vkb_sky_data *sky = &scene->data.sky;
-    Py_ssize_t count = PyTuple_Size(levels);
-
-    if (count < 0 || count > VKB_MAX_MIP_LEVELS) {
-        if (!PyErr_Occurred())
-            PyErr_Format(PyExc_ValueError, "skybox: %zd mip levels are out of range, 0 to %d",
-                         count, VKB_MAX_MIP_LEVELS);
-        return false;
-    }
-    for (Py_ssize_t i = 0; i < count; ++i) {
-        const Py_buffer *view = hold(scene, PyTuple_GetItem(levels, i), "a skybox level", "Bef");
-        if (!view)
-            return false;
-        if (i == 0) {
-            sky->format = pixel_format(element_code(view));
-            sky->size = view->ndim == 4 ? (uint32_t)view->shape[1] : 0;
-        }
-        uint32_t size = sky->size >> i ? sky->size >> i : 1;
-        size_t expected = 6 * (size_t)size * size * vkb_pixel_size(sky->format);
-        if (sky->size == 0 || (size_t)view->len != expected
-            || pixel_format(element_code(view)) != sky->format) {
-            PyErr_Format(PyExc_ValueError, "skybox: level %zd is not six faces of %u x %u", i, size,
-                         size);
-            return false;
-        }
-        sky->levels[i] = view->buf;
-        sky->level_count = (uint32_t)i + 1;
-    }
-    return true;
-}
-
-bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene)
-{
-    unsigned long long serial;
-    PyObject *body_vertices, *body_indices, *body_emission, *glow_vertices, *glow_indices, *sky;
-
-    if (!PyArg_ParseTuple(tuple, "KOOOOOO!", &serial, &body_vertices, &body_indices, &body_emission,
-                          &glow_vertices, &glow_indices, &PyTuple_Type, &sky))
-        return false;
-    scene->data.serial = serial;
-    return read_mesh(scene, body_vertices, body_indices, body_emission, &scene->data.body)
-        && read_mesh(scene, glow_vertices, glow_indices, Py_None, &scene->data.glow)
-        && read_sky(scene, sky);
-}
-
-void vkb_release_scene(struct vkb_held_scene *scene)
-{
-    while (scene->view_count > 0)
-        PyBuffer_Release(&scene->views[--scene->view_count]);
 }
 
 bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
@@ -357,7 +252,7 @@ bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
     if (PyObject_GetBuffer(array, view, PyBUF_STRIDES | PyBUF_FORMAT) < 0)
         return false;
     image->held = true;
-    if (!has_element(view, "Bef")) {
+    if (!vkb_has_element(view, "Bef")) {
         PyErr_SetString(PyExc_TypeError, "image: an array of uint8, float16 or float32 is needed");
         return false;
     }
@@ -372,7 +267,7 @@ bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
         .row_stride = view->strides[0],
         .pixel_stride = view->strides[1],
         .channel_stride = view->strides[2],
-        .format = pixel_format(element_code(view)),
+        .format = vkb_pixel_format(vkb_element_code(view)),
         .width = (uint32_t)view->shape[1],
         .height = (uint32_t)view->shape[0],
         .channels = (uint32_t)view->shape[2],

@@ -31,15 +31,13 @@ static bool add_images(struct vkb_size size, struct vkb_graph *graph, struct gbu
                           error);
 }
 
-// Adds the row with all of the G-buffer as its targets.
-static bool add_draw(const struct gbuffer *gbuffer, struct vkb_pass_row *row,
-                     struct vkb_graph *graph, struct vkb_error *error)
+// Makes all of the G-buffer the row's targets.
+static void set_targets(const struct gbuffer *gbuffer, struct vkb_pass_row *row)
 {
     for (int i = 0; i < GBUFFER_COLOURS; ++i)
         row->targets[i] = gbuffer->colours[i];
     row->target_count = GBUFFER_COLOURS;
     row->depth = gbuffer->depth;
-    return vkb_graph_add_pass(graph, row, error);
 }
 
 // `glow` (VKB_NO_IMAGE: none) is the glow mesh alone, as in the forward system. It is drawn before
@@ -59,13 +57,15 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
     if (source->has_sky) {
         row = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX, VKB_SHADER_gbuffer_sky_frag, 0, 0,
                             &stored);
-        if (!add_draw(gbuffer, &row, graph, error))
+        set_targets(gbuffer, &row);
+        if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }
     row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, VKB_SHADER_gbuffer_body_frag, 0, 0, &stored);
     row.constants[0] = emitters;
     row.constant_count = 1;
-    if (!add_draw(gbuffer, &row, graph, error))
+    set_targets(gbuffer, &row);
+    if (!vkb_add_mesh(&row, source->body_textured, VKB_SHADER_gbuffer_textured_frag, graph, error))
         return false;
     if (glow == VKB_NO_IMAGE)
         return true;
@@ -75,7 +75,8 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
     row.reads[0] = glow;
     row.read_count = 1;
     row.blend = VKB_BLEND_ADD;
-    return add_draw(gbuffer, &row, graph, error);
+    set_targets(gbuffer, &row);
+    return vkb_graph_add_pass(graph, &row, error);
 }
 
 static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
@@ -123,8 +124,8 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
     if (settings->values.bloom && source->has_glow) {
         struct vkb_mesh_params lamp = params;
         lamp.glow_intensity = (float)fmin(source->glow_intensity, FLT_MAX);
-        if (!vkb_add_glow(settings, &lamp, HDR, source->size, false, THRESHOLD_NONE, graph, &glow,
-                          error))
+        if (!vkb_add_glow(settings, source, &lamp, HDR, source->size, false, THRESHOLD_NONE, graph,
+                          &glow, error))
             return false;
     }
     return add_gbuffer(source, &params, glow, &gbuffer, graph, error)

@@ -30,7 +30,7 @@ static bool add_scene(const struct vkb_scene_source *source, const struct vkb_me
     }
     struct vkb_pass_row body =
         vkb_scene_row("scene", VKB_GEOMETRY_BODY, VKB_SHADER_phong_frag, *scene, depth, params);
-    return vkb_graph_add_pass(graph, &body, error);
+    return vkb_add_mesh(&body, source->body_textured, VKB_SHADER_phong_textured_frag, graph, error);
 }
 
 bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
@@ -48,7 +48,7 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
         struct vkb_mesh_params lamp = params;
         // 8 bits have no room for radiance: the intensity is the deferred system's.
         lamp.glow_intensity = 1.0f;
-        if (!vkb_add_glow(settings, &lamp, glow.format, glow.buffers, true,
+        if (!vkb_add_glow(settings, source, &lamp, glow.format, glow.buffers, true,
                           vkb_threshold_mode(settings), graph, &glow.glow, error)
             || !vkb_add_bloom(settings, &glow, graph, &bloom, error))
             return false;

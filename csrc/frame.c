@@ -120,8 +120,35 @@ static VkDeviceSize write_params(struct run *run, const struct vkb_pass_row *pas
     return offset;
 }
 
-static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
-                              VkDescriptorSet *set, struct vkb_error *error)
+// What the pass reads at binding index + 1; `surface` is whose textures those are, if any.
+static VkDescriptorImageInfo read_image(const struct run *run, const struct vkb_pass_row *pass,
+                                        const struct vkb_surface *surface, uint32_t index)
+{
+    const struct vkb_scene *scene = &run->frame->scene;
+    const struct vkb_image *image;
+    VkSampler sampler = run->frame->pipelines.sampler;
+
+    if (surface) {
+        const struct vkb_texture *texture =
+            &scene->textures[index == 0 ? surface->base : surface->emission];
+        image = &texture->image;
+        sampler = texture->sampler;
+    } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
+        image = &scene->sky;
+    } else {
+        image = &run->slots[pass->reads[index]]->image;
+    }
+    return (VkDescriptorImageInfo){
+        .sampler = sampler,
+        .imageView = image->view,
+        .imageLayout = vkb_access_layout(VKB_ACCESS_SAMPLED),
+    };
+}
+
+// A descriptor set with the pass's parameters, which lie at that offset, and what it reads.
+static bool bind_descriptors(struct run *run, const struct vkb_pass_row *pass,
+                             VkDeviceSize params_offset, const struct vkb_surface *surface,
+                             struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     const struct vkb_pipelines *pipelines = &run->frame->pipelines;
@@ -129,6 +156,7 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
     VkDescriptorImageInfo images[VKB_MAX_READS];
     VkWriteDescriptorSet writes[VKB_MAX_READS + 1];
     uint32_t write_count = 0;
+    VkDescriptorSet set;
 
     if (!VK(error, vk->vkAllocateDescriptorSets(
                        run->device->handle,
@@ -138,34 +166,27 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
                            .descriptorSetCount = 1,
                            .pSetLayouts = &pipelines->set_layouts[image_count],
                        },
-                       set)))
+                       &set)))
         return false;
     VkDescriptorBufferInfo params = {
         .buffer = run->frame->uniforms.handle,
-        .offset = write_params(run, pass),
+        .offset = params_offset,
         .range = vkb_block_sizes[pass->block],
     };
     if (pass->block != VKB_BLOCK_NONE)
         writes[write_count++] = (VkWriteDescriptorSet){
             .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = *set,
+            .dstSet = set,
             .dstBinding = 0,
             .descriptorCount = 1,
             .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
             .pBufferInfo = &params,
         };
     for (uint32_t i = 0; i < image_count; ++i) {
-        const struct vkb_image *image = pass->geometry == VKB_GEOMETRY_SKYBOX
-                                          ? &run->frame->scene.sky
-                                          : &run->slots[pass->reads[i]]->image;
-        images[i] = (VkDescriptorImageInfo){
-            .sampler = pipelines->sampler,
-            .imageView = image->view,
-            .imageLayout = vkb_access_layout(VKB_ACCESS_SAMPLED),
-        };
+        images[i] = read_image(run, pass, surface, i);
         writes[write_count++] = (VkWriteDescriptorSet){
             .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = *set,
+            .dstSet = set,
             .dstBinding = i + 1,
             .descriptorCount = 1,
             .descriptorType = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
@@ -173,61 +194,73 @@ static bool write_descriptors(struct run *run, const struct vkb_pass_row *pass,
         };
     }
     vk->vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
+    vk->vkCmdBindDescriptorSets(run->frame->commands.buffer, VK_PIPELINE_BIND_POINT_GRAPHICS,
+                                pipelines->layouts[image_count], 0, 1, &set, 0, NULL);
     return true;
 }
 
-static void draw_mesh(const struct run *run, const struct vkb_mesh *mesh)
+static void bind_mesh(const struct run *run, const struct vkb_mesh *mesh, bool textured)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     VkCommandBuffer commands = run->frame->commands.buffer;
 
-    if (mesh->index_count == 0)
-        return;
     vk->vkCmdBindVertexBuffers(commands, 0, 1, &mesh->vertices.handle, &(VkDeviceSize){0});
+    if (textured)
+        vk->vkCmdBindVertexBuffers(commands, 1, 1, &mesh->texcoords.handle, &(VkDeviceSize){0});
     vk->vkCmdBindIndexBuffer(commands, mesh->indices.handle, 0, VK_INDEX_TYPE_UINT32);
-    vk->vkCmdDrawIndexed(commands, mesh->index_count, 1, 0, 0, 0);
 }
 
-static void draw(const struct run *run, enum vkb_geometry geometry)
+// A draw for each surface, with its textures.
+static bool draw_surfaces(struct run *run, const struct vkb_pass_row *pass,
+                          const struct vkb_mesh *mesh, VkDeviceSize params, struct vkb_error *error)
+{
+    uint32_t first = mesh->plain_count;
+
+    bind_mesh(run, mesh, true);
+    for (uint32_t i = 0; i < mesh->surface_count; ++i) {
+        const struct vkb_surface *surface = &mesh->surfaces[i];
+        if (!bind_descriptors(run, pass, params, surface, error))
+            return false;
+        run->device->vk.vkCmdDrawIndexed(run->frame->commands.buffer, surface->index_count, 1,
+                                         first, 0, 0);
+        first += surface->index_count;
+    }
+    return true;
+}
+
+static bool draw(struct run *run, const struct vkb_pass_row *pass, VkDeviceSize params,
+                 struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     VkCommandBuffer commands = run->frame->commands.buffer;
+    const struct vkb_scene *scene = &run->frame->scene;
+    const struct vkb_mesh *mesh = pass->geometry == VKB_GEOMETRY_GLOW ? &scene->glow : &scene->body;
 
-    switch (geometry) {
-    case VKB_GEOMETRY_FULLSCREEN:
-        vk->vkCmdDraw(commands, 3, 1, 0, 0);
-        break;
-    case VKB_GEOMETRY_SKYBOX:
-        vk->vkCmdDraw(commands, 36, 1, 0, 0);
-        break;
-    case VKB_GEOMETRY_BODY:
-        draw_mesh(run, &run->frame->scene.body);
-        break;
-    case VKB_GEOMETRY_GLOW:
-        draw_mesh(run, &run->frame->scene.glow);
-        break;
+    if (pass->textured)
+        return draw_surfaces(run, pass, mesh, params, error);
+    if (!bind_descriptors(run, pass, params, NULL, error))
+        return false;
+    if (!vkb_is_mesh(pass->geometry)) {
+        vk->vkCmdDraw(commands, pass->geometry == VKB_GEOMETRY_SKYBOX ? 36 : 3, 1, 0, 0);
+    } else if (mesh->plain_count > 0) {
+        bind_mesh(run, mesh, false);
+        vk->vkCmdDrawIndexed(commands, mesh->plain_count, 1, 0, 0, 0);
     }
+    return true;
 }
 
 static bool record_pass(struct run *run, uint32_t index, VkRenderPass render_pass,
                         struct vkb_error *error)
 {
-    const struct VolkDeviceTable *vk = &run->device->vk;
     const struct vkb_pass_row *pass = &run->graph->passes[index];
-    VkCommandBuffer commands = run->frame->commands.buffer;
-    struct vkb_pipelines *pipelines = &run->frame->pipelines;
     VkPipeline pipeline;
-    VkDescriptorSet set;
 
-    if (!vkb_pipelines_get(run->device, pipelines, pass, render_pass, &pipeline, error)
-        || !write_descriptors(run, pass, &set, error))
+    if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
+                           error))
         return false;
-    vk->vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline);
-    vk->vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS,
-                                pipelines->layouts[vkb_pass_descriptor_images(pass)], 0, 1, &set, 0,
-                                NULL);
-    draw(run, pass->geometry);
-    return true;
+    run->device->vk.vkCmdBindPipeline(run->frame->commands.buffer, VK_PIPELINE_BIND_POINT_GRAPHICS,
+                                      pipeline);
+    return draw(run, pass, write_params(run, pass), error);
 }
 
 // What the passes read, and the targets in the state that the render pass's dependencies go on
@@ -345,9 +378,10 @@ static bool reserve_descriptors(struct run *run, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     struct vkb_frame *frame = run->frame;
-    const uint32_t passes = run->graph->pass_count;
+    const uint32_t sets =
+        run->graph->pass_count + frame->scene.body.surface_count + frame->scene.glow.surface_count;
 
-    if (passes <= frame->descriptor_capacity)
+    if (sets <= frame->descriptor_capacity)
         return VK(error, vk->vkResetDescriptorPool(run->device->handle, frame->descriptors, 0));
     vk->vkDestroyDescriptorPool(run->device->handle, frame->descriptors, NULL);
     frame->descriptors = VK_NULL_HANDLE;
@@ -357,17 +391,17 @@ static bool reserve_descriptors(struct run *run, struct vkb_error *error)
                 run->device->handle,
                 &(VkDescriptorPoolCreateInfo){
                     .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
-                    .maxSets = passes,
+                    .maxSets = sets,
                     .poolSizeCount = 2,
                     .pPoolSizes =
                         (VkDescriptorPoolSize[]){
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, passes},
-                            {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, passes * VKB_MAX_READS},
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets},
+                            {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, sets * VKB_MAX_READS},
                         },
                 },
                 NULL, &frame->descriptors)))
         return false;
-    frame->descriptor_capacity = passes;
+    frame->descriptor_capacity = sets;
     return true;
 }
 

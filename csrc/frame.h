@@ -23,7 +23,7 @@ struct vkb_frame {
     struct vkb_timer timer;
     struct vkb_slots slots;
     VkDescriptorPool descriptors;
-    uint32_t descriptor_capacity;  // in passes
+    uint32_t descriptor_capacity;  // in sets
 };
 
 // What a graph starts from; what it does not use is NULL.

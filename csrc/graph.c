@@ -186,6 +186,10 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
         || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
                         pass->name);
+    if (pass->textured && (pass->read_count > 0 || !vkb_is_mesh(pass->geometry)))
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "graph: pass %s has textures, but no mesh or images beside them",
+                        pass->name);
     for (uint32_t i = 0; i < pass->read_count; ++i)
         if (pass->reads[i] >= graph->image_count || !is_filled(graph, pass->reads[i], index))
             return vkb_fail(error, VKB_ERROR_GENERAL,

@@ -36,15 +36,21 @@ enum vkb_geometry {
     VKB_GEOMETRY_GLOW,
 };
 
+static inline bool vkb_is_mesh(enum vkb_geometry geometry)
+{
+    return geometry == VKB_GEOMETRY_BODY || geometry == VKB_GEOMETRY_GLOW;
+}
+
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
 enum vkb_blend { VKB_BLEND_NONE, VKB_BLEND_ADD };
 
 // Bindings: 0 the parameter block, then the images read in their order; a skybox reads the scene's
-// cubemap at binding 1. Passes that follow each other with the same targets share a render pass;
-// the first one's load op counts.
+// cubemap at binding 1, textured triangles the base colour's texture and the emission's. Passes
+// that follow each other with the same targets share a render pass; the first one's load op counts.
 struct vkb_pass_row {
     char name[VKB_NAME_SIZE];
     enum vkb_geometry geometry;
+    bool textured;  // draws the mesh's triangles that have textures, not those that have none
     enum vkb_shader vertex, fragment;
     int32_t constants[VKB_MAX_CONSTANTS];  // specialization constants 0, 1, ...
     uint32_t constant_count;

@@ -139,10 +139,13 @@ bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint
         return false;
     struct vkb_pass_row row = vkb_fullscreen_row("final", VKB_SHADER_composite_frag, final);
     const bool off = bloom == VKB_NO_IMAGE;
+    // Floats have no levels to round to.
+    const bool dither = settings->values.dither && format == VKB_FORMAT_RGBA8_UNORM;
     row.constants[0] = off ? COMPOSITE_OFF : settings->choices[VKB_CHOICE_composite];
     row.constants[1] = settings->choices[VKB_CHOICE_tonemap];
     row.constants[2] = settings->choices[VKB_CHOICE_encoding];
-    row.constant_count = 3;
+    row.constants[3] = dither;
+    row.constant_count = 4;
     row.reads[0] = scene;
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = off ? scene : bloom;
@@ -150,5 +153,6 @@ bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint
     row.block = VKB_BLOCK_composite;
     row.params.composite = settings->values.composite;
     row.params.composite.limit = vkb_formats[image.format].limit;
+    row.params.composite.noise_seed = dither ? settings->values.dither_seed : 0;
     return vkb_graph_add_pass(graph, &row, error);
 }

@@ -1,5 +1,5 @@
-// What the files that speak Python share: module.c, renderer.c, arguments.c, describe.c. The only
-// header of the core that includes Python.h.
+// What the files that speak Python share: module.c, renderer.c, arguments.c, scene_arguments.c,
+// describe.c. The only header of the core that includes Python.h.
 #ifndef VKB_MODULE_H
 #define VKB_MODULE_H
 
@@ -30,16 +30,24 @@ bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
 
+// The buffer protocol's code of the element type; 0 for anything but one number in this machine's
+// byte order.
+char vkb_element_code(const Py_buffer *view);
+bool vkb_has_element(const Py_buffer *view, const char *codes);
+
+// The format of pixels whose channels have that element type: B, e or f.
+enum vkb_format vkb_pixel_format(char code);
+
 // A scene's arrays, held until vkb_release_scene, which may be called on a zeroed or half-read one.
-enum { VKB_SCENE_ARRAYS = 5 + VKB_MAX_MIP_LEVELS };
 struct vkb_held_scene {
     struct vkb_scene_data data;
-    Py_buffer views[VKB_SCENE_ARRAYS];
-    int view_count;
+    Py_buffer *views;
+    size_t view_count;
 };
 
-// (serial, body vertices, body indices, body emission or None, glow vertices or None, glow indices
-// or None, sky levels)
+// (serial, body, glow or None, sky levels, textures); a mesh is (vertices, indices, emission or
+// None, texcoords or None, surfaces), a surface (index count, base texture, emission texture), a
+// texture (levels, address mode across, down, magnification, minification, mipmap filter).
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
 void vkb_release_scene(struct vkb_held_scene *scene);
 

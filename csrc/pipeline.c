@@ -22,6 +22,7 @@ struct vkb_render_pass_entry {
 struct pipeline_key {
     enum vkb_shader vertex, fragment;
     enum vkb_geometry geometry;
+    bool textured;
     enum vkb_blend blend;
     uint32_t target_count;
     uint32_t constant_count;
@@ -266,7 +267,6 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
 
 // The fixed state that each kind of geometry asks for.
 static const struct geometry_state {
-    bool vertices;
     VkCullModeFlags cull;
     bool depth_test, depth_write;
 } geometry_states[] = {
@@ -274,14 +274,12 @@ static const struct geometry_state {
     [VKB_GEOMETRY_SKYBOX] = {.cull = VK_CULL_MODE_FRONT_BIT, .depth_test = true},
     [VKB_GEOMETRY_BODY] =
         {
-            .vertices = true,
             .cull = VK_CULL_MODE_BACK_BIT,
             .depth_test = true,
             .depth_write = true,
         },
     [VKB_GEOMETRY_GLOW] =
         {
-            .vertices = true,
             .cull = VK_CULL_MODE_BACK_BIT,
             .depth_test = true,
             .depth_write = true,
@@ -310,8 +308,12 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
                             VkPipeline *pipeline, struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
+    const bool is_mesh = vkb_is_mesh(pass->geometry);
     VkSpecializationMapEntry map[VKB_MAX_CONSTANTS];
     VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
+    const uint32_t bindings = pass->textured ? VKB_VERTEX_BINDINGS : is_mesh;
+    const uint32_t attributes =
+        pass->textured ? VKB_TEXTURED_ATTRIBUTES : is_mesh * VKB_VERTEX_ATTRIBUTES;
     VkShaderModule vertex, fragment;
 
     if (!get_module(device, pipelines, pass->vertex, &vertex, error)
@@ -353,13 +355,9 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
                       .pVertexInputState =
                           &(VkPipelineVertexInputStateCreateInfo){
                               .sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
-                              .vertexBindingDescriptionCount = state->vertices,
-                              .pVertexBindingDescriptions =
-                                  &(VkVertexInputBindingDescription){
-                                      .stride = sizeof(struct vkb_vertex),
-                                  },
-                              .vertexAttributeDescriptionCount =
-                                  state->vertices ? VKB_VERTEX_ATTRIBUTES : 0,
+                              .vertexBindingDescriptionCount = bindings,
+                              .pVertexBindingDescriptions = vkb_vertex_bindings,
+                              .vertexAttributeDescriptionCount = attributes,
                               .pVertexAttributeDescriptions = vkb_vertex_attributes,
                           },
                       .pInputAssemblyState =
@@ -422,6 +420,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     key.vertex = pass->vertex;
     key.fragment = pass->fragment;
     key.geometry = pass->geometry;
+    key.textured = pass->textured;
     key.blend = pass->blend;
     key.target_count = pass->target_count;
     key.constant_count = pass->constant_count;
@@ -445,5 +444,5 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
 
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
 {
-    return pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
+    return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
 }

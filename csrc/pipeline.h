@@ -39,7 +39,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
                        const struct vkb_pass_row *pass, VkRenderPass render_pass,
                        VkPipeline *pipeline, struct vkb_error *error);
 
-// How many images the pass reads by descriptor, the skybox's cubemap counted in.
+// How many images the pass reads by descriptor, the scene's cubemap or textures counted in.
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
 
 #endif

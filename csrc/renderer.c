@@ -319,6 +319,8 @@ static PyObject *render(PyObject *object, PyObject *arguments)
         source.has_sky = scene.data.sky.level_count > 0;
         source.has_glow = scene.data.glow.index_count > 0;
         source.has_emission = scene.data.body.emission != NULL;
+        source.body_textured = scene.data.body.surface_count > 0;
+        source.glow_textured = scene.data.glow.surface_count > 0;
         if (require_open(self, &error)
             && vkb_build_scene(shading, &settings, &source, &graph, &error)
             && vkb_graph_check(&graph, self->device.limits.maxFramebufferWidth, &error))

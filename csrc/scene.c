@@ -3,17 +3,17 @@
 #include <math.h>
 #include <string.h>
 
-const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_VERTEX_ATTRIBUTES] = {
+const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES] = {
     {0, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, position)},
     {1, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, normal)},
     {2, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, colour)},
     {3, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, emission)},
+    {4, 1, VK_FORMAT_R32G32B32A32_SFLOAT, 0},
 };
 
-// Where the pieces of a scene lie in the one staging buffer that brings them to the device.
-struct staging {
-    struct vkb_buffer buffer;
-    VkDeviceSize used;
+const VkVertexInputBindingDescription vkb_vertex_bindings[VKB_VERTEX_BINDINGS] = {
+    {0, sizeof(struct vkb_vertex), VK_VERTEX_INPUT_RATE_VERTEX},
+    {1, VKB_TEXCOORDS * sizeof(float), VK_VERTEX_INPUT_RATE_VERTEX},
 };
 
 static size_t vertex_bytes(const struct vkb_mesh_data *data)
@@ -21,128 +21,102 @@ static size_t vertex_bytes(const struct vkb_mesh_data *data)
     return data->vertex_count * sizeof(struct vkb_vertex);
 }
 
+static size_t texcoord_bytes(const struct vkb_mesh_data *data)
+{
+    return data->surface_count ? data->vertex_count * VKB_TEXCOORDS * sizeof *data->texcoords : 0;
+}
+
 static size_t index_bytes(const struct vkb_mesh_data *data)
 {
     return data->index_count * sizeof *data->indices;
 }
 
-static uint32_t level_size(const struct vkb_sky_data *data, uint32_t level)
+static VkDeviceSize mesh_size(const struct vkb_mesh_data *data)
 {
-    uint32_t size = data->size >> level;
-    return size ? size : 1;
+    return vkb_staging_size(vertex_bytes(data)) + vkb_staging_size(texcoord_bytes(data))
+         + vkb_staging_size(index_bytes(data));
 }
 
-static size_t level_bytes(const struct vkb_sky_data *data, uint32_t level)
+static VkDeviceSize scene_size(const struct vkb_scene_data *data)
 {
-    size_t size = level_size(data, level);
-    return 6 * size * size * vkb_pixel_size(data->format);
-}
+    VkDeviceSize size =
+        mesh_size(&data->body) + mesh_size(&data->glow) + vkb_staging_picture_size(&data->sky);
 
-// Offsets of image copies must be multiples of the pixel size, 16 at the most.
-static VkDeviceSize align16(VkDeviceSize size)
-{
-    return (size + 15) & ~(VkDeviceSize)15;
-}
-
-static VkDeviceSize staging_bytes(const struct vkb_scene_data *data)
-{
-    VkDeviceSize size = align16(vertex_bytes(&data->body)) + align16(index_bytes(&data->body))
-                      + align16(vertex_bytes(&data->glow)) + align16(index_bytes(&data->glow));
-
-    for (uint32_t level = 0; level < data->sky.level_count; ++level)
-        size += align16(level_bytes(&data->sky, level));
+    for (uint32_t i = 0; i < data->texture_count; ++i)
+        size += vkb_staging_picture_size(&data->textures[i].picture);
     return size;
 }
 
-static VkDeviceSize stage(struct staging *staging, const void *data, size_t size)
-{
-    VkDeviceSize offset = staging->used;
-
-    memcpy((char *)staging->buffer.mapped + offset, data, size);
-    staging->used += align16(size);
-    return offset;
-}
-
-static VkDeviceSize stage_vertices(struct staging *staging, const struct vkb_mesh_data *data)
+static VkDeviceSize stage_vertices(struct vkb_staging *staging, const struct vkb_mesh_data *data)
 {
     static const float none[3];
-    const VkDeviceSize offset = staging->used;
-    struct vkb_vertex *vertices = (void *)((char *)staging->buffer.mapped + offset);
+    VkDeviceSize offset;
+    struct vkb_vertex *vertices = vkb_stage(staging, vertex_bytes(data), &offset);
 
     for (size_t i = 0; i < data->vertex_count; ++i) {
         memcpy(&vertices[i], data->vertices + VKB_GIVEN_FLOATS * i,
                offsetof(struct vkb_vertex, emission));
         memcpy(vertices[i].emission, data->emission ? data->emission + 3 * i : none, sizeof none);
     }
-    staging->used += align16(vertex_bytes(data));
     return offset;
 }
 
-// A buffer on the device with what lies in the staging buffer from `offset` on.
-static bool load_buffer(const struct vkb_device *device, VkCommandBuffer commands,
-                        const struct staging *staging, VkDeviceSize offset, size_t size,
-                        VkBufferUsageFlags usage, struct vkb_buffer *buffer,
-                        struct vkb_error *error)
+static VkDeviceSize stage_bytes(struct vkb_staging *staging, const void *data, size_t size)
 {
-    if (!vkb_buffer_create(device, VKB_MEMORY_DEVICE, usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-                           size, buffer, error))
+    VkDeviceSize offset;
+
+    memcpy(vkb_stage(staging, size, &offset), data, size);
+    return offset;
+}
+
+static bool load_surfaces(const struct vkb_device *device, VkCommandBuffer commands,
+                          struct vkb_staging *staging, const struct vkb_mesh_data *data,
+                          struct vkb_mesh *mesh, struct vkb_error *error)
+{
+    if (data->surface_count == 0)
+        return true;
+    mesh->surfaces = vkb_alloc(error, data->surface_count, sizeof *mesh->surfaces);
+    if (!mesh->surfaces)
         return false;
-    device->vk.vkCmdCopyBuffer(commands, staging->buffer.handle, buffer->handle, 1,
-                               &(VkBufferCopy){
-                                   .srcOffset = offset,
-                                   .size = size,
-                               });
-    return true;
+    memcpy(mesh->surfaces, data->surfaces, data->surface_count * sizeof *mesh->surfaces);
+    mesh->surface_count = data->surface_count;
+    for (uint32_t i = 0; i < mesh->surface_count; ++i)
+        mesh->plain_count -= mesh->surfaces[i].index_count;
+    const VkDeviceSize texcoords = stage_bytes(staging, data->texcoords, texcoord_bytes(data));
+    return vkb_staging_load_buffer(device, commands, staging, texcoords, texcoord_bytes(data),
+                                   VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->texcoords, error);
 }
 
 static bool load_mesh(const struct vkb_device *device, VkCommandBuffer commands,
-                      struct staging *staging, const struct vkb_mesh_data *data,
+                      struct vkb_staging *staging, const struct vkb_mesh_data *data,
                       struct vkb_mesh *mesh, struct vkb_error *error)
 {
-    mesh->index_count = data->index_count;
+    mesh->plain_count = data->index_count;
     if (data->index_count == 0)
         return true;
     const VkDeviceSize vertices = stage_vertices(staging, data);
-    const VkDeviceSize indices = stage(staging, data->indices, index_bytes(data));
-    return load_buffer(device, commands, staging, vertices, vertex_bytes(data),
-                       VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->vertices, error)
-        && load_buffer(device, commands, staging, indices, index_bytes(data),
-                       VK_BUFFER_USAGE_INDEX_BUFFER_BIT, &mesh->indices, error);
+    const VkDeviceSize indices = stage_bytes(staging, data->indices, index_bytes(data));
+    return vkb_staging_load_buffer(device, commands, staging, vertices, vertex_bytes(data),
+                                   VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->vertices, error)
+        && vkb_staging_load_buffer(device, commands, staging, indices, index_bytes(data),
+                                   VK_BUFFER_USAGE_INDEX_BUFFER_BIT, &mesh->indices, error)
+        && load_surfaces(device, commands, staging, data, mesh, error);
 }
 
-static bool load_sky(const struct vkb_device *device, VkCommandBuffer commands,
-                     struct staging *staging, const struct vkb_sky_data *data,
-                     struct vkb_image *sky, struct vkb_error *error)
+static bool load_textures(const struct vkb_device *device, VkCommandBuffer commands,
+                          struct vkb_staging *staging, const struct vkb_scene_data *data,
+                          struct vkb_scene *scene, struct vkb_error *error)
 {
-    if (data->level_count == 0)
+    if (data->texture_count == 0)
         return true;
-    if (data->size > device->limits.maxImageDimensionCube)
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "skybox: faces of %u pixels are beyond this adapter's limit of %u",
-                        data->size, device->limits.maxImageDimensionCube);
-    if (!vkb_image_create(device,
-                          &(struct vkb_image_spec){
-                              .format = data->format,
-                              .width = data->size,
-                              .height = data->size,
-                              .layers = 6,
-                              .levels = data->level_count,
-                              .usage = VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
-                          },
-                          sky, error))
+    scene->textures = vkb_alloc(error, data->texture_count, sizeof *scene->textures);
+    if (!scene->textures)
         return false;
-    vkb_image_transition(device, commands, sky, VKB_ACCESS_COPY_TARGET);
-    for (uint32_t level = 0; level < data->level_count; ++level) {
-        uint32_t size = level_size(data, level);
-        VkBufferImageCopy copy = {
-            .bufferOffset = stage(staging, data->levels[level], level_bytes(data, level)),
-            .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, level, 0, 6},
-            .imageExtent = {size, size, 1},
-        };
-        device->vk.vkCmdCopyBufferToImage(commands, staging->buffer.handle, sky->handle,
-                                          vkb_access_layout(VKB_ACCESS_COPY_TARGET), 1, &copy);
-    }
-    vkb_image_transition(device, commands, sky, VKB_ACCESS_SAMPLED);
+    scene->texture_count = data->texture_count;
+    for (uint32_t i = 0; i < data->texture_count; ++i)
+        if (!vkb_texture_load(device, commands, staging, &data->textures[i], &scene->textures[i],
+                              error))
+            return false;
     return true;
 }
 
@@ -150,17 +124,19 @@ bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
                     const struct vkb_scene_data *data, struct vkb_scene *scene,
                     struct vkb_error *error)
 {
-    struct staging staging = {0};
+    struct vkb_staging staging = {0};
 
     if (scene->serial == data->serial)
         return true;
     vkb_scene_destroy(device, scene);
     bool done = vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                                  staging_bytes(data), &staging.buffer, error)
+                                  scene_size(data), &staging.buffer, error)
              && vkb_commands_begin(device, commands, error)
              && load_mesh(device, commands->buffer, &staging, &data->body, &scene->body, error)
              && load_mesh(device, commands->buffer, &staging, &data->glow, &scene->glow, error)
-             && load_sky(device, commands->buffer, &staging, &data->sky, &scene->sky, error)
+             && vkb_staging_load_picture(device, commands->buffer, &staging, "skybox", &data->sky,
+                                         &scene->sky, error)
+             && load_textures(device, commands->buffer, &staging, data, scene, error)
              && vkb_buffer_flush(device, &staging.buffer, error);
     if (done) {
         vkb_barrier_record_upload(device, commands->buffer);
@@ -177,7 +153,9 @@ bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
 static void destroy_mesh(const struct vkb_device *device, struct vkb_mesh *mesh)
 {
     vkb_buffer_destroy(device, &mesh->vertices);
+    vkb_buffer_destroy(device, &mesh->texcoords);
     vkb_buffer_destroy(device, &mesh->indices);
+    vkb_free(mesh->surfaces);
 }
 
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
@@ -185,6 +163,9 @@ void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
     destroy_mesh(device, &scene->body);
     destroy_mesh(device, &scene->glow);
     vkb_image_destroy(device, &scene->sky);
+    for (uint32_t i = 0; i < scene->texture_count; ++i)
+        vkb_texture_destroy(device, &scene->textures[i]);
+    vkb_free(scene->textures);
     *scene = (struct vkb_scene){0};
 }
 

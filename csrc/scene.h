@@ -1,49 +1,66 @@
-// A scene on the device: two meshes and a sky; and the matrices of a frame.
+// A scene on the device: two meshes, their textures and a sky; and the matrices of a frame.
 #ifndef VKB_SCENE_H
 #define VKB_SCENE_H
 
 #include "commands.h"
-#include "memory.h"
 #include "params.h"
+#include "texture.h"
 
 // As the meshes lie on the device, tightly packed.
 struct vkb_vertex {
     float position[3], normal[3], colour[3], emission[3];
 };
 
-enum { VKB_VERTEX_ATTRIBUTES = 4, VKB_GIVEN_FLOATS = 9, VKB_MAX_MIP_LEVELS = 16 };
-extern const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_VERTEX_ATTRIBUTES];
+// Binding 0 holds struct vkb_vertex; binding 1, which only textured triangles have, places in two
+// textures.
+enum {
+    VKB_VERTEX_ATTRIBUTES = 4,
+    VKB_TEXTURED_ATTRIBUTES = 5,
+    VKB_VERTEX_BINDINGS = 2,
+    VKB_GIVEN_FLOATS = 9,
+    VKB_TEXCOORDS = 4,
+};
+extern const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES];
+extern const VkVertexInputBindingDescription vkb_vertex_bindings[VKB_VERTEX_BINDINGS];
 
-// Host memory that the caller keeps alive; no vertices: no such mesh.
-struct vkb_mesh_data {
-    const float *vertices;  // position, normal and colour of each
-    const float *emission;  // three floats of each, NULL: nothing emits
-    const uint32_t *indices;
-    uint32_t vertex_count, index_count;
+// Triangles that have textures, by their indices among the scene's.
+struct vkb_surface {
+    uint32_t index_count;
+    uint32_t base, emission;
 };
 
-// Mip levels of six square faces each, tightly packed; no levels: no sky.
-struct vkb_sky_data {
-    enum vkb_format format;
-    uint32_t size, level_count;
-    const void *levels[VKB_MAX_MIP_LEVELS];
+// Host memory that the caller keeps alive; no vertices: no such mesh. The last indices are those of
+// the surfaces, one after the other.
+struct vkb_mesh_data {
+    const float *vertices;   // position, normal and colour of each
+    const float *emission;   // three floats of each, NULL: nothing emits
+    const float *texcoords;  // four of each: base colour's, emission's; NULL: no surfaces
+    const uint32_t *indices;
+    struct vkb_surface *surfaces;
+    uint32_t vertex_count, index_count, surface_count;
 };
 
 struct vkb_scene_data {
     uint64_t serial;  // differs between any two scenes; never 0
     struct vkb_mesh_data body, glow;
-    struct vkb_sky_data sky;
+    struct vkb_picture_data sky;
+    struct vkb_texture_data *textures;
+    uint32_t texture_count;
 };
 
 struct vkb_mesh {
-    struct vkb_buffer vertices, indices;
-    uint32_t index_count;
+    struct vkb_buffer vertices, texcoords, indices;
+    uint32_t plain_count;  // indices before those of the surfaces
+    struct vkb_surface *surfaces;
+    uint32_t surface_count;
 };
 
 struct vkb_scene {
     uint64_t serial;  // of the data that is on the device; 0: none
     struct vkb_mesh body, glow;
     struct vkb_image sky;
+    struct vkb_texture *textures;
+    uint32_t texture_count;
 };
 
 struct vkb_camera {

@@ -1,6 +1,7 @@
 // What the shadings share: their names, and the rows that draw a scene's meshes.
 #include "methods.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const struct shading {
@@ -48,10 +49,27 @@ struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
     return row;
 }
 
-bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_mesh_params *params,
-                  enum vkb_format format, struct vkb_size size, bool framebuffer,
-                  enum vkb_mode threshold, struct vkb_graph *graph, uint32_t *glow,
-                  struct vkb_error *error)
+bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_shader textured,
+                  struct vkb_graph *graph, struct vkb_error *error)
+{
+    struct vkb_pass_row second;
+
+    if (!vkb_graph_add_pass(graph, row, error))
+        return false;
+    if (!has_textures)
+        return true;
+    memcpy(&second, row, sizeof second);
+    snprintf(second.name, sizeof second.name, "%.16s_textured", row->name);
+    second.textured = true;
+    second.vertex = VKB_SHADER_mesh_textured_vert;
+    second.fragment = textured;
+    return vkb_graph_add_pass(graph, &second, error);
+}
+
+bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_source *source,
+                  const struct vkb_mesh_params *params, enum vkb_format format,
+                  struct vkb_size size, bool framebuffer, enum vkb_mode threshold,
+                  struct vkb_graph *graph, uint32_t *glow, struct vkb_error *error)
 {
     uint32_t depth;
 
@@ -68,5 +86,5 @@ bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_mesh_par
         row.params.mesh.threshold = settings->values.mesh.threshold;
         row.params.mesh.knee = settings->values.mesh.knee;
     }
-    return vkb_graph_add_pass(graph, &row, error);
+    return vkb_add_mesh(&row, source->glow_textured, VKB_SHADER_glow_textured_frag, graph, error);
 }

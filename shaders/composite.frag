@@ -1,7 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The finished picture: scene and bloom, exposure, tone map, encoding.
+// The finished picture: scene and bloom, exposure, tone map, encoding, dither.
 #include "block.glsl"
+#include "dither.glsl"
 #include "finite.glsl"
 #include "tonemap.glsl"
 
@@ -11,6 +12,7 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
 layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
 layout(constant_id = 2) const int ENCODING = ENCODING_NONE;
+layout(constant_id = 3) const int DITHER = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
@@ -35,6 +37,8 @@ void main()
     if (COMPOSITE != COMPOSITE_OFF)
         result = composite(result, texelFetch(bloom, pixel, 0).rgb);
     result = apply_encoding(apply_tonemap(result * exp2(params.exposure), TONEMAP), ENCODING);
+    if (DITHER != 0)
+        result = dithered(result, pixel, params.noise_seed);
     // NaN and infinity of the source stay at their own pixels, whatever the curve makes of them.
     colour = vec4(mix(source.rgb, storable(result), is_finite(source.rgb)), source.a);
 }

@@ -1,22 +1,4 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The mesh that is lit later, in view space, with the radiance that its material emits.
-#include "block.glsl"
-#include "gbuffer.glsl"
-
-UNIFORM_BLOCK(MESH_BLOCK);
-#include "storage.glsl"
-
-layout(location = 0) in vec3 view_position;
-layout(location = 1) in vec3 view_normal;
-layout(location = 2) in vec3 vertex_colour;
-layout(location = 3) in vec3 vertex_emission;
-
-void main()
-{
-    float size = length(view_normal);
-    albedo = vec4(storable(vertex_colour), 1.0);
-    normal = vec4(storable(size > 0.0 ? view_normal / size : vec3(0.0)), 1.0);
-    position = vec4(storable(view_position), 1.0);
-    brightness = vec4(storable(in_its_part(vertex_emission)), 1.0);
-}
+// Triangles without textures.
+#include "gbuffer_mesh.glsl"

@@ -77,7 +77,8 @@
 #define COMPOSITE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, intensity, 1.0, 0.0, 65504.0) \
     SETTING(B, exposure, 0.0, -32.0, 32.0) \
-    INPUT(B, float, limit)
+    INPUT(B, float, limit) \
+    INPUT(B, int, noise_seed)
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
@@ -94,6 +95,8 @@
 // Whole numbers: COUNT(name, default, min, max); a flag is one of 0 and 1.
 #define COUNT_ROWS(COUNT) \
     COUNT(bloom, 1, 0, 1) \
+    COUNT(dither, 0, 0, 1) \
+    COUNT(dither_seed, 0, 0, 65535) \
     COUNT(loops, 1, 1, 16) \
     COUNT(first_tap, 1, 0, 1) \
     COUNT(direct, 0, 0, 1) \

@@ -1,4 +1,4 @@
-"""Scenes whose glow is a given image, so that a test chooses every pixel that is blurred."""
+"""Scenes that show given images, so that a test chooses every pixel."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vkbloom import Camera, Scene
 from vkbloom.scene import Mesh
+from vkbloom.textures import WHITE, Surface, Texture
 
 # The model matrix of time 0 moves a mesh by (0, -1, 0.25); this camera takes that back and stands
 # DISTANCE away from the plane z = 0, looking straight at it.
@@ -49,6 +50,43 @@ def screen(image: NDArray[Any], frame: tuple[int, int]) -> Scene:
     vertices[:, :, 6:] = image[rows, columns][:, np.newaxis]
     indices = np.arange(len(rows), dtype=np.uint32)[:, np.newaxis] * 4 + SQUARE
     return Scene(body=NOTHING, glow=Mesh(vertices.reshape(-1, 9), indices.ravel()), camera=CAMERA)
+
+
+def panel(
+    frame: tuple[int, int],
+    base: Texture = WHITE,
+    emission: Texture = WHITE,
+    *,
+    places: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0),
+    across: tuple[float, float] = (0.0, 1.0),
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    radiance: tuple[float, float, float] | None = None,
+) -> Mesh:
+    """Return a mesh that shows textures over a whole frame of that size, at time 0.
+
+    Parameters
+    ----------
+    places
+        u and v at the top left corner, u and v at the bottom right one.
+    across
+        The part of the frame's width that it covers, 0..1 being all of it.
+    """
+    top = DISTANCE * math.tan(math.radians(CAMERA.fov / 2))
+    right = top * frame[0] / frame[1]
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    vertices = np.zeros((4, 9), np.float32)
+    vertices[:, 0] = (2 * np.array(across)[corners[:, 0]] - 1) * right
+    vertices[:, 1] = (2 * corners[:, 1] - 1) * top
+    vertices[:, 5] = 1.0
+    vertices[:, 6:] = colour
+    u, v = np.array(places)[[0, 2]][corners[:, 0]], np.array(places)[[1, 3]][corners[:, 1]]
+    return Mesh(
+        vertices,
+        SQUARE,
+        None if radiance is None else np.tile(np.array(radiance, np.float32), (4, 1)),
+        np.stack((u, v, u, v), axis=1).astype(np.float32),
+        (Surface(len(SQUARE), base, emission),),
+    )
 
 
 def noise(size: tuple[int, int], highest: float = 1.0) -> NDArray[np.float64]:

@@ -347,9 +347,7 @@ def test_everything_left_out_is_named_in_one_warning(tmp_path: Path) -> None:
     document.primitive(mode=3)
     document.primitive(material=0, targets=[{"POSITION": 0}])
     document.json["meshes"][0]["primitives"].append({"attributes": {"NORMAL": 0}})
-    document.json["materials"] = [
-        {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "alphaMode": "BLEND"}
-    ]
+    document.json["materials"] = [{"normalTexture": {"index": 0}, "alphaMode": "BLEND"}]
     document.json["nodes"][0]["skin"] = 0
     document.json["animations"] = [{"channels": [], "samplers": []}]
     document.json["extensionsUsed"] = ["KHR_lights_punctual"]
@@ -362,7 +360,7 @@ def test_everything_left_out_is_named_in_one_warning(tmp_path: Path) -> None:
         "mesh.gltf",
         "points",
         "line strips",
-        "textures",
+        "normal textures",
         "'BLEND'",
         "skins",
         "morph targets",

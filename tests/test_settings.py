@@ -23,6 +23,8 @@ DEFAULTS = {
     "tonemap": "none",
     "exposure": 0.0,
     "encoding": "none",
+    "dither": False,
+    "dither_seed": 0,
     "bloom_size": None,
     "bloom_scale": 1.0,
     "format": None,
@@ -118,6 +120,7 @@ EDGES: list[tuple[str, Any, Any]] = [
     ("blur_scale", 0.0, 16.0),
     ("blur_strength", 0.0, 16.0),
     ("loops", 1, 16),
+    ("dither_seed", 0, 65535),
     ("first_tap", 0, 1),
 ]
 
@@ -134,14 +137,14 @@ def test_the_edges_of_a_range_are_in_it(name: str, low: Any, high: Any) -> None:
         assert repr(value) in str(caught.value)
 
 
-@pytest.mark.parametrize("name", [name for name, _, _ in EDGES] + ["bloom", "direct"])
+@pytest.mark.parametrize("name", [name for name, _, _ in EDGES] + ["bloom", "direct", "dither"])
 @pytest.mark.parametrize("value", ["1", 1j, [1.0], (), object()])
 def test_a_number_is_needed(name: str, value: object) -> None:
     with pytest.raises(TypeError, match=rf"^{name}: "):
         make(**{name: value})
 
 
-@pytest.mark.parametrize("name", ["loops", "first_tap", "bloom", "direct"])
+@pytest.mark.parametrize("name", ["loops", "first_tap", "bloom", "direct", "dither", "dither_seed"])
 def test_a_whole_number_is_needed(name: str) -> None:
     low = 1 if name == "loops" else 0
     with pytest.raises(ValueError, match=rf"^{name}: {low + 0.5}"):

@@ -12,15 +12,15 @@ MAX_LAYERS: int
 _Adapter = tuple[str, str, str, str, str, bytes]
 _Array = NDArray[Any]
 _Camera = tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]
-_Scene = tuple[
-    int,
+_Texture = tuple[tuple[_Array, ...], str, str, str, str, str]
+_Mesh = tuple[
     NDArray[np.float32],
     NDArray[np.uint32],
     NDArray[np.float32] | None,
     NDArray[np.float32] | None,
-    NDArray[np.uint32] | None,
-    tuple[_Array, ...],
+    tuple[tuple[int, int, int], ...],
 ]
+_Scene = tuple[int, _Mesh, _Mesh | None, tuple[_Array, ...], tuple[_Texture, ...]]
 _Result = tuple[dict[str, _Array], dict[str, float], tuple[int, int]]
 _Allocate = Callable[[str, tuple[int, ...], str], _Array]
 

@@ -25,7 +25,9 @@ from .gltf_file import (
     GltfFile,
     Parsed,
 )
+from .gltf_textures import TextureReader, TextureUse
 from .scene import Mesh
+from .textures import WHITE, Surface, Texture
 
 _LINE_MODES: Final = {0: "points", 1: "lines", 2: "line loops", 3: "line strips"}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -40,6 +42,12 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     mesh's `emission` is the emissive factor times its strength
     (KHR_materials_emissive_strength).
 
+    Textures of the base colour and of the emission are read from PNG and JPEG images, decoded by
+    the sRGB curve (3.9.2, 3.9.3) and sampled as their sampler says; one that says nothing of its
+    minification gets mip levels. Any TEXCOORD_n serves, moved by KHR_texture_transform. The texture
+    of an emission whose factor is 0 is not read, for it changes nothing. A base colour's alpha is
+    ignored.
+
     Nodes of the file's default scene are used, or all root nodes where it names none. Triangles,
     strips and fans, indexed or not, are read; where there are no normals, flat ones are computed
     (3.7.2.1). Under a transform of negative determinant the winding is reversed (3.7.4). A normal
@@ -49,8 +57,8 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     Parameters
     ----------
     path
-        The file. A GLB is known by its first bytes, not by its name. Buffers may be in it, in data
-        URIs, or in files in the same folder or under it.
+        The file. A GLB is known by its first bytes, not by its name. Buffers and images may be in
+        it, in data URIs, or in files in the same folder or under it.
 
     Returns
     -------
@@ -59,18 +67,18 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     Warns
     -----
     UserWarning
-        Once a file, with everything in it that is left out: points and lines, textures, alpha
+        Once a file, with everything in it that is left out: points and lines, other textures, alpha
         modes, skins, morph targets, animations, extensions.
 
     Raises
     ------
     OSError
-        The file or one of its buffers is not there or cannot be read.
+        The file or one of its buffers or images is not there or cannot be read.
     ValueError
-        The file is damaged, needs an extension that is not supported, refers to something outside
-        of its folder, is too large, or has no triangles; the message names it.
+        The file or an image is damaged, needs an extension that is not supported, refers to
+        something outside of its folder, is too large, or has no triangles; the message names it.
     ModuleNotFoundError
-        pygltflib is not installed.
+        pygltflib, or OpenImageIO for textures, is not installed.
     """
     file = GltfFile(Path(path))
     mesh = _Loader(file).mesh()
@@ -80,13 +88,34 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
 
 
 @dataclass(frozen=True)
+class _Material:
+    """What a material gives its surfaces."""
+
+    factor: Floats  # rgb
+    emission: Floats  # rgb
+    # None where there is no texture.
+    base_texture: TextureUse | None = None
+    emission_texture: TextureUse | None = None
+
+    @property
+    def textures(self) -> tuple[Texture, Texture] | None:
+        """The two textures of a `Surface`, or None where it needs none."""
+        uses = (self.base_texture, self.emission_texture)
+        if uses == (None, None):
+            return None
+        base, emission = (WHITE if use is None else use.texture for use in uses)
+        return base, emission
+
+
+@dataclass(frozen=True)
 class _Geometry:
     """One primitive in its own space."""
 
     positions: Floats  # (n, 3)
     normals: Floats | None  # (n, 3)
     colours: Floats  # (n, 3)
-    emission: Floats  # (3,)
+    texcoords: Floats  # (n, 4): base colour's, emission's
+    material: _Material
     triangles: NDArray[np.int64]  # (t, 3)
 
     @property
@@ -100,6 +129,7 @@ class _Loader:
 
     def __init__(self, file: GltfFile) -> None:
         self._file = file
+        self._textures = TextureReader(file)
 
     # Nodes
 
@@ -192,7 +222,9 @@ class _Loader:
     def mesh(self) -> Mesh:
         """Bake all triangles of the scene into one mesh."""
         vertices: list[NDArray[np.float32]] = []
-        indices: list[NDArray[np.uint32]] = []
+        texcoords: list[NDArray[np.float32]] = []
+        # By their textures; those without come first.
+        indices: dict[tuple[Texture, Texture] | None, list[NDArray[np.uint32]]] = {None: []}
         emission: list[NDArray[np.float32]] = []
         read: dict[tuple[int, int], _Geometry | None] = {}
         total = corners = 0
@@ -212,29 +244,49 @@ class _Loader:
                 total += geometry.vertex_count
                 if max(total, corners / 3) > MAX_VERTICES:
                     self._file.fail(f"too large: over {MAX_VERTICES} vertices or triangles")
-                rows, triangles = self._bake(geometry, world, f"{user}: {what}")
-                indices.append((triangles + (total - len(rows))).astype(np.uint32).ravel())
+                rows, places, triangles = self._bake(geometry, world, f"{user}: {what}")
+                material = geometry.material
+                indices.setdefault(material.textures, []).append(
+                    (triangles + (total - len(rows))).astype(np.uint32).ravel()
+                )
                 vertices.append(rows)
+                texcoords.append(places)
                 emission.append(
-                    np.broadcast_to(geometry.emission.astype(np.float32), (len(rows), 3))
+                    np.broadcast_to(material.emission.astype(np.float32), (len(rows), 3))
                 )
         if not vertices:
             self._file.fail("has no triangles")
         emits = any(rows[0].any() for rows in emission)
-        return Mesh(_joined(vertices), _joined(indices), _joined(emission) if emits else None)
+        surfaces = tuple(
+            Surface(sum(map(len, parts)), *textures)
+            for textures, parts in indices.items()
+            if textures is not None
+        )
+        return Mesh(
+            _joined(vertices),
+            _joined([part for parts in indices.values() for part in parts]),
+            _joined(emission) if emits else None,
+            _joined(texcoords) if surfaces else None,
+            surfaces,
+        )
 
     def _bake(
         self, geometry: _Geometry, world: Floats, what: str
-    ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-        """Place a primitive in the renderer's world: its vertex rows and its triangles."""
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
+        """Place a primitive in the renderer's world.
+
+        Return its rows of `Mesh.vertices`, those of `Mesh.texcoords`, and its triangles.
+        """
         linear = world[:3, :3]
-        triangles, colours = geometry.triangles, geometry.colours
+        triangles = geometry.triangles
+        colours, texcoords = geometry.colours, geometry.texcoords
         with np.errstate(over="ignore", invalid="ignore"):
             positions = geometry.positions @ linear.T + world[:3, 3]
             if np.linalg.det(linear) < 0.0:
                 triangles = triangles[:, ::-1]
             if geometry.normals is None:
-                positions, colours = positions[triangles.ravel()], colours[triangles.ravel()]
+                flat = triangles.ravel()
+                positions, colours, texcoords = positions[flat], colours[flat], texcoords[flat]
                 first, second, third = positions[0::3], positions[1::3], positions[2::3]
                 normals = np.repeat(np.cross(second - first, third - first), 3, axis=0)
                 triangles = np.arange(len(positions)).reshape(-1, 3)
@@ -247,9 +299,9 @@ class _Loader:
         rows = np.concatenate((positions, normals, colours), axis=1)
         rows[:, (1, 4)] *= -1.0
         # Also False for NaN.
-        if not (np.abs(rows) <= FLOAT_MAX).all():
+        if not all((np.abs(values) <= FLOAT_MAX).all() for values in (rows, texcoords)):
             self._file.fail(f"{what}: a transformed vertex is not finite")
-        return rows.astype(np.float32), triangles
+        return rows.astype(np.float32), texcoords.astype(np.float32), triangles
 
     def _geometry(self, primitive: Parsed, what: str) -> _Geometry | None:
         """Read a primitive; None if it has no triangles."""
@@ -273,10 +325,11 @@ class _Loader:
         normals = None
         if attribute["NORMAL"] is not None:
             normals = self._file.vectors(attribute["NORMAL"], f"{what}.NORMAL", count)
-        factor, emission = self._material(primitive.material, what)
-        colours = np.broadcast_to(factor, (count, 3))
+        material = self._material(primitive.material, what)
+        colours = np.broadcast_to(material.factor, (count, 3))
         if attribute["COLOR_0"] is not None:
-            colours = factor * self._file.vectors(attribute["COLOR_0"], f"{what}.COLOR_0", count)
+            read = self._file.vectors(attribute["COLOR_0"], f"{what}.COLOR_0", count)
+            colours = material.factor * read
         if primitive.indices is None:
             corners = np.arange(count, dtype=np.int64)
         else:
@@ -290,8 +343,31 @@ class _Loader:
                     f"damaged: {what} has index {corners.max()}, but only {count} vertices"
                 )
         return _Geometry(
-            positions, normals, colours, emission, self._triangles(corners, mode, what)
+            positions,
+            normals,
+            colours,
+            self._texcoords(primitive, material, count, what),
+            material,
+            self._triangles(corners, mode, what),
         )
+
+    def _texcoords(self, primitive: Parsed, material: _Material, count: int, what: str) -> Floats:
+        """Return where in its two textures each vertex lies ``(n, 4)``; 0 without a texture."""
+        if material.textures is None:
+            return np.broadcast_to(np.float64(0.0), (count, 4))
+        texcoords = np.zeros((count, 4))
+        for column, use in ((0, material.base_texture), (2, material.emission_texture)):
+            if use is None:
+                continue
+            index = getattr(primitive.attributes, use.coordinates, None)
+            if index is None:
+                self._file.fail(
+                    f"damaged: {what} has no {use.coordinates}, "
+                    f"where the textures of materials[{primitive.material}] are looked up"
+                )
+            read = self._file.vectors(index, f"{what}.{use.coordinates}", count)
+            texcoords[:, column : column + 2] = use.placed(read)
+        return texcoords
 
     def _triangles(self, corners: NDArray[np.int64], mode: int, what: str) -> NDArray[np.int64]:
         """Split a list, a strip or a fan into triangles ``(t, 3)`` by the rules of 3.7.2.1."""
@@ -309,26 +385,42 @@ class _Loader:
         odd = step % 2
         return np.stack((corners[step], corners[step + 1 + odd], corners[step + 2 - odd]), axis=1)
 
-    def _material(self, index: object, what: str) -> tuple[Floats, Floats]:
-        """Return the base colour factor and the emitted radiance, rgb each."""
+    def _material(self, index: object, what: str) -> _Material:
+        """Return the base colour's factor, the emitted radiance, and their textures."""
         if index is None:
-            return np.ones(3), np.zeros(3)
+            return _Material(np.ones(3), np.zeros(3))
         material = self._file.item("materials", index, what)
         what = f"materials[{index}]"
         factor = np.ones(3)
+        base_texture = None
         metal = material.pbrMetallicRoughness
         if metal is not None:
             if metal.baseColorFactor is not None:
                 factor = self._file.floats(
                     metal.baseColorFactor, f"{what}.baseColorFactor", 4, low=0.0
                 )[:3]
-            if metal.baseColorTexture is not None or metal.metallicRoughnessTexture is not None:
-                self._file.leave_out("textures")
-        textures = (material.normalTexture, material.occlusionTexture, material.emissiveTexture)
-        if any(texture is not None for texture in textures):
-            self._file.leave_out("textures")
+            if metal.baseColorTexture is not None:
+                base_texture = self._textures.use(
+                    metal.baseColorTexture, f"{what}.baseColorTexture"
+                )
+            if metal.metallicRoughnessTexture is not None:
+                self._file.leave_out("metallic-roughness textures")
+        if material.normalTexture is not None:
+            self._file.leave_out("normal textures")
+        if material.occlusionTexture is not None:
+            self._file.leave_out("occlusion textures")
         if material.alphaMode not in (None, "OPAQUE"):
             self._file.leave_out(f"alpha mode {reprlib.repr(material.alphaMode)}")
+        emission = self._emission(material, what)
+        emission_texture = None
+        if material.emissiveTexture is not None and emission.any():
+            emission_texture = self._textures.use(
+                material.emissiveTexture, f"{what}.emissiveTexture"
+            )
+        return _Material(factor, emission, base_texture, emission_texture)
+
+    def _emission(self, material: Parsed, what: str) -> Floats:
+        """Return the emissive factor times its strength."""
         emission = np.zeros(3)
         if material.emissiveFactor is not None:
             emission = self._file.floats(
@@ -345,7 +437,7 @@ class _Loader:
             )
             if emission.max() > FLOAT_MAX:
                 self._file.fail(f"{what} emits more than float32 can hold")
-        return factor, emission
+        return emission
 
 
 def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:

@@ -31,13 +31,16 @@ Parsed: TypeAlias = Any
 FLOAT: Final = 5126
 INTEGERS: Final = (5121, 5123, 5125)
 EMISSIVE_STRENGTH: Final = "KHR_materials_emissive_strength"
+TEXTURE_TRANSFORM: Final = "KHR_texture_transform"
 FLOAT_MAX: Final = float(np.finfo(np.float32).max)
 # A node may use a mesh again and a sparse accessor needs no bytes for its zeros, so that a small
 # file can ask for any amount of memory. This many baked vertices take 0.6 GB.
 MAX_VERTICES: Final = 2**24
 _COMPONENTS: Final = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS: Final = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
-_EXTENSIONS: Final = frozenset({EMISSIVE_STRENGTH})
+_WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_EXTENSIONS: Final = frozenset({EMISSIVE_STRENGTH, TEXTURE_TRANSFORM})
+# Compressed: what it holds is checked when it is decoded.
+_MAX_IMAGE_BYTES: Final = 2**30
 
 
 class GltfFile:
@@ -67,10 +70,13 @@ class GltfFile:
             "accessors": pygltflib.Accessor,
             "bufferViews": pygltflib.BufferView,
             "buffers": pygltflib.Buffer,
+            "images": pygltflib.Image,
             "materials": pygltflib.Material,
             "meshes": pygltflib.Mesh,
             "nodes": pygltflib.Node,
+            "samplers": pygltflib.Sampler,
             "scenes": pygltflib.Scene,
+            "textures": pygltflib.Texture,
         }
         self._check_asset()
 
@@ -168,20 +174,26 @@ class GltfFile:
     # Accessors and buffers
 
     def vectors(self, index: object, what: str, count: int | None = None) -> Floats:
-        """Read the first three components of a float (or, for a colour, normalized) accessor."""
-        colour = what.endswith("COLOR_0")
+        """Read the first three components of a vertex attribute.
+
+        Those are the two of texture coordinates. Colours and texture coordinates may be normalized
+        whole numbers, all else is of floats.
+        """
+        attribute = what.rpartition(".")[2]
+        shapes = {"COLOR_0": ("VEC3", "VEC4"), "TEXCOORD": ("VEC2",)}
+        kind = attribute if attribute in shapes else attribute.partition("_")[0]
         values = self.accessor(
             index,
             what,
-            ("VEC3", "VEC4") if colour else ("VEC3",),
-            (FLOAT, 5121, 5123) if colour else (FLOAT,),
+            shapes.get(kind, ("VEC3",)),
+            (FLOAT, 5121, 5123) if kind in shapes else (FLOAT,),
         )
         if count is not None and len(values) != count:
             self.fail(f"damaged: {what} has {len(values)} entries for {count} vertices")
         vectors: Floats = values[:, :3].astype(np.float64)
         if values.dtype.kind == "u":
             if not self.item("accessors", index, what).normalized:
-                self.fail(f"{what}: whole-number colours that are not normalized")
+                self.fail(f"{what}: whole numbers that are not normalized")
             vectors /= np.iinfo(values.dtype).max
         if not np.isfinite(vectors).all():
             self.fail(f"damaged: {what} holds NaN or infinity")
@@ -301,6 +313,24 @@ class GltfFile:
         self._buffers[index] = data[:length]
         return self._buffers[index]
 
+    def image_bytes(self, index: object, user: str) -> bytes:
+        """Return an image as it is stored, from a bufferView, a data URI or a file."""
+        image = self.item("images", index, user)
+        what = f"images[{index}]"
+        if (image.uri is None) == (image.bufferView is None):
+            self.fail(f"damaged: {what} needs either a URI or a bufferView")
+        if image.uri is None:
+            view = self.item("bufferViews", image.bufferView, what)
+            length = self.integer(
+                view.byteLength, f"bufferViews[{image.bufferView}].byteLength", 1, 2**63 - 1
+            )
+            return self._elements(
+                image.bufferView, 0, length, 1, np.dtype(np.uint8), what=what
+            ).tobytes()
+        if image.uri[:5].lower() == "data:":
+            return self._data_uri(image.uri, what)
+        return self._outer_file(image.uri, None, what)
+
     def _data_uri(self, uri: str, what: str) -> bytes:
         header, comma, payload = uri.partition(",")
         if not comma or not header.lower().endswith(";base64"):
@@ -310,8 +340,8 @@ class GltfFile:
         except (binascii.Error, ValueError) as error:
             raise ValueError(f"{self.path}: damaged: base64 of {what}: {error}") from error
 
-    def _outer_file(self, uri: str, length: int, what: str) -> bytes:
-        """Read a buffer's file, which must lie in the glTF file's folder or under it."""
+    def _outer_file(self, uri: str, length: int | None, what: str) -> bytes:
+        """Read `length` bytes (None: all) of a file in the glTF file's folder or under it."""
         name = unquote(uri)
         shown = reprlib.repr(uri)
         if re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", name):
@@ -334,9 +364,11 @@ class GltfFile:
                 self.fail(f"{what}: URI {shown} is no file")
             with target.open("rb") as file:
                 size = os.fstat(file.fileno()).st_size
-                if size < length:
+                if length is None and size > _MAX_IMAGE_BYTES:
+                    self.fail(f"{what}: {shown} has {size} bytes, which are too many")
+                if length is not None and size < length:
                     self.fail(f"damaged: {what}: {shown} has {size} bytes of {length}")
-                return file.read(length)
+                return file.read(size if length is None else length)
         except OSError as error:
             raise OSError(
                 error.errno, f"{error.strerror} ({what} of {self.path})", str(target)

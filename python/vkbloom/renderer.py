@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from vkbloom.scene import Scene
+    from vkbloom.scene import Mesh, Scene
+    from vkbloom.textures import Texture
 
 Shading = Literal["forward", "deferred"]
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
@@ -398,13 +399,34 @@ class Renderer:
 
 def _scene_arrays(scene: Scene) -> Any:
     """Return the scene as the core takes it."""
-    glow = scene.glow
-    return (
-        scene.serial,
-        scene.body.vertices,
-        scene.body.indices,
-        scene.body.emission,
-        None if glow is None else glow.vertices,
-        None if glow is None else glow.indices,
-        () if scene.skybox is None else scene.skybox.levels,
+    # Textures by what they are, not by what they hold: each goes to the device once.
+    numbers: dict[Texture, int] = {}
+    body = _mesh_arrays(scene.body, numbers)
+    glow = None if scene.glow is None else _mesh_arrays(scene.glow, numbers)
+    sky = () if scene.skybox is None else scene.skybox.levels
+    textures = tuple(
+        (
+            texture.levels,
+            *texture.address_mode,
+            texture.mag_filter,
+            texture.min_filter,
+            texture.mipmap_filter,
+        )
+        for texture in numbers
     )
+    return scene.serial, body, glow, sky, textures
+
+
+def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:
+    """Return a mesh as the core takes it; textures get the next numbers."""
+    surfaces = tuple(
+        (
+            surface.index_count,
+            *(
+                numbers.setdefault(texture, len(numbers))
+                for texture in (surface.base, surface.emission)
+            ),
+        )
+        for surface in mesh.surfaces
+    )
+    return mesh.vertices, mesh.indices, mesh.emission, mesh.texcoords, surfaces

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from . import skybox as sky
 from .skybox import Cubemap, SkyboxSource, read_only
+from .textures import WHITE, Surface
 
 _serials = itertools.count(1)
 _FACE_SUFFIXES: Final = ("px", "nx", "py", "ny", "pz", "nz")
@@ -28,7 +29,7 @@ _FACE_SUFFIXES: Final = ("px", "nx", "py", "ny", "pz", "nz")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
-    """Triangles with normals and colours.
+    """Triangles with normals and colours, some of them with textures.
 
     Parameters
     ----------
@@ -40,20 +41,31 @@ class Mesh:
     emission
         ``(N, 3)`` float32, finite, or None where nothing emits: radiance rgb of each vertex, which
         the deferred system adds to `brightness`.
+    texcoords
+        ``(N, 4)`` float32, finite, or None where there are no surfaces: where in the base texture
+        each vertex lies, then where in the emission's; (0, 0) is the top left corner of a texture,
+        (1, 1) the bottom right one.
+    surfaces
+        The textures of the last triangles: each `Surface` takes its `index_count` entries of
+        `indices`, one after the other, the last one to the end. Triangles before the first have
+        none.
 
     Arrays are copied unless they are read-only, C-contiguous owners of their memory.
 
     Raises
     ------
     TypeError
-        An array has another type or dtype.
+        An array has another type or dtype, or a surface another type.
     ValueError
-        An array has another shape, or holds values out of range.
+        An array has another shape, or holds values out of range; surfaces take more indices than
+        there are, or have no texture coordinates.
     """
 
     vertices: NDArray[np.float32]
     indices: NDArray[np.uint32]
     emission: NDArray[np.float32] | None = None
+    texcoords: NDArray[np.float32] | None = None
+    surfaces: tuple[Surface, ...] = ()
 
     def __post_init__(self) -> None:
         _check_array("vertices", self.vertices, np.float32, 9)
@@ -69,15 +81,30 @@ class Mesh:
             raise ValueError(f"indices has {highest}; there are {count} vertices")
         object.__setattr__(self, "vertices", read_only(self.vertices))
         object.__setattr__(self, "indices", read_only(self.indices))
-        if self.emission is not None:
-            _check_array("emission", self.emission, np.float32, 3)
-            if len(self.emission) != count:
-                raise ValueError(f"emission has {len(self.emission)} rows; {count} are needed")
-            object.__setattr__(self, "emission", read_only(self.emission))
+        for name, columns in (("emission", 3), ("texcoords", 4)):
+            array = getattr(self, name)
+            if array is not None:
+                _check_array(name, array, np.float32, columns)
+                if len(array) != count:
+                    raise ValueError(f"{name} has {len(array)} rows; {count} are needed")
+                object.__setattr__(self, name, read_only(array))
+        self._check_surfaces()
 
-    def __reduce__(self) -> tuple[type[Mesh], tuple[NDArray[Any] | None, ...]]:
+    def _check_surfaces(self) -> None:
+        object.__setattr__(self, "surfaces", tuple(self.surfaces))
+        for surface in self.surfaces:
+            if not isinstance(surface, Surface):
+                raise TypeError(f"surfaces must hold Surfaces, not {surface!r}")
+        taken = sum(surface.index_count for surface in self.surfaces)
+        if taken > len(self.indices):
+            raise ValueError(f"surfaces take {taken} indices; there are {len(self.indices)}")
+        if self.surfaces and self.texcoords is None:
+            raise ValueError("texcoords is None; surfaces need texture coordinates")
+
+    def __reduce__(self) -> tuple[type[Mesh], tuple[Any, ...]]:
         # Through the constructor, because NumPy pickles do not keep arrays read-only.
-        return Mesh, (self.vertices, self.indices, self.emission)
+        arrays = (self.vertices, self.indices, self.emission, self.texcoords)
+        return Mesh, (*arrays, self.surfaces)
 
     def __repr__(self) -> str:
         return f"Mesh({self.summary})"
@@ -85,7 +112,11 @@ class Mesh:
     @property
     def summary(self) -> str:
         """Its size in words."""
-        return f"{len(self.indices) // 3} triangles, {len(self.vertices)} vertices"
+        size = f"{len(self.indices) // 3} triangles, {len(self.vertices)} vertices"
+        if not self.surfaces:
+            return size
+        textures = {texture for part in self.surfaces for texture in (part.base, part.emission)}
+        return f"{size}, textures: {len(textures - {WHITE})}"
 
 
 @dataclass(frozen=True)

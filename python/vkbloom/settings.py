@@ -94,6 +94,15 @@ class Settings:
         In stops, -32 to 32: the composite is multiplied by 2**exposure before the curve.
     encoding : {"none", "gamma22", "srgb"}
         Applied to rgb after the curve.
+    dither : bool
+        Noise before ``final`` is rounded to 8 bits, so that dark gradients show grain instead of
+        bands. The noise is uniform over one level, +-1/2, each channel its own: the mean over
+        pixels is the unrounded value (Roberts, "Picture Coding Using Pseudo-Random Noise", IRE
+        Transactions on Information Theory, 1962), while values that 8 bits hold, 0 and 1 among
+        them, stay as they are. A ``final`` of floats has none.
+    dither_seed : int
+        Chooses the noise, 0 to 65535. It is a hash of the pixel's place and the seed: the same
+        seed gives the same noise on every adapter.
     bloom_size : (int, int) or None
         Width and height of the bloom buffers in pixels.
     bloom_scale : float
@@ -121,6 +130,8 @@ class Settings:
     tonemap: ToneMap = _choice("tonemap")
     exposure: float = _number("exposure")
     encoding: Encoding = _choice("encoding")
+    dither: bool = _flag("dither")
+    dither_seed: int = _number("dither_seed")
     bloom_size: tuple[int, int] | None = None
     bloom_scale: float = _number("bloom_scale")
     format: BloomFormat | None = None

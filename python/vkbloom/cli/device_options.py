@@ -7,6 +7,14 @@ from typing import Any
 
 import click
 
+#: ``--adapter``, the argument of `vkbloom.Renderer`.
+adapter_option = click.option(
+    "--adapter",
+    default="auto",
+    show_default=True,
+    help="auto, software, hardware, or a part of an adapter's name.",
+)
+
 
 def device_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--adapter`` and ``--validation``, the arguments of `vkbloom.Renderer`."""
@@ -15,9 +23,4 @@ def device_options(command: Callable[..., Any]) -> Callable[..., Any]:
         is_flag=True,
         help="Run with the Khronos validation layer; its first message is a failure.",
     )(command)
-    return click.option(
-        "--adapter",
-        default="auto",
-        show_default=True,
-        help="auto, software, hardware, or a part of an adapter's name.",
-    )(command)
+    return adapter_option(command)

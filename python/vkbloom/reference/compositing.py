@@ -29,6 +29,10 @@ class CompositeSettings(Protocol):
     def tonemap(self) -> str: ...
     @property
     def encoding(self) -> str: ...
+    @property
+    def dither(self) -> bool: ...
+    @property
+    def dither_seed(self) -> int: ...
 
 
 def composite(
@@ -37,11 +41,12 @@ def composite(
     settings: CompositeSettings,
     dtype: DTypeLike | None = None,
 ) -> Array:
-    """Return the final image: composite, exposure, tone map and encoding, in this order.
+    """Return the final image: composite, exposure, tone map, encoding, dither, in this order.
 
     With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" s + (b - s) i
     and "screen" 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies
-    by 2^e. All of it works on rgb; alpha is the scene's.
+    by 2^e. Dither rounds uint8 to floor(255 c + n) / 255 with c clamped to 0..1 and n a noise
+    of 0..1, and leaves other types alone. All of it works on rgb; alpha is the scene's.
 
     A component of the scene that is NaN or infinite stays so. To the tone maps that mix the
     channels it counts as 0.
@@ -59,7 +64,7 @@ def composite(
     Returns
     -------
     ndarray of float64, shape of the scene
-        In real units, not rounded to `dtype`.
+        In real units, not rounded to `dtype` but by the dither.
 
     Raises
     ------
@@ -84,6 +89,8 @@ def composite(
         rgb = _blend(rgb, glow, settings.composite, settings.intensity)
     rgb = ENCODINGS[settings.encoding](TONE_MAPS[settings.tonemap](rgb * 2.0**settings.exposure))
     rgb = storage(format_of(np.empty(0, stored), None))(rgb)
+    if settings.dither and stored == np.uint8:
+        rgb = np.floor(255 * rgb + _noise(rgb.shape[:2], settings.dither_seed)) / 255
     rgb = np.where(np.isfinite(original), rgb, original)
     return np.concatenate([rgb, image[..., 3:]], axis=-1)
 
@@ -97,3 +104,20 @@ def _blend(scene: Array, bloom: Array, mode: str, intensity: float) -> Array:
     if mode == "screen":
         return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(intensity * bloom, 0, 1))
     raise ValueError(f'composite must be "add", "mix" or "screen", not {mode!r}')
+
+
+def _noise(size: tuple[int, int], seed: int) -> Array:
+    """Return the noise of an image of (height, width): (n + 1/2) / 4096, n of 0..4095, a channel.
+
+    n are the upper 12 bits of the three numbers of 32 bits that pcg3d makes of column, row and
+    seed (Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020).
+    """
+    rows, columns = np.indices(size, np.uint32)
+    state = [columns, rows, np.full(size, seed, np.uint32)]
+    state = [np.uint32(1664525) * number + np.uint32(1013904223) for number in state]
+    for mixing in range(2):
+        for place in range(3):
+            state[place] = state[place] + state[place - 2] * state[place - 1]
+        if mixing == 0:
+            state = [number ^ (number >> np.uint32(16)) for number in state]
+    return (np.stack(state, axis=-1) // np.uint32(2**20) + 0.5) / 4096

@@ -1,6 +1,6 @@
 """Hold other people's blurs and blooms, and our own, against the laws of `vkbloom.testing`.
 
-``python benchmarks/laws.py`` writes docs/laws.md. It needs ``pip install vkbloom[peers]`` and a
+``python tools/laws.py`` writes docs/laws.md. It needs the packages of benchmarks/peers.txt and a
 Vulkan driver, as pygfx's bloom runs through wgpu.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import os
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -48,7 +47,7 @@ class Subject:
 
 def opencv() -> Iterator[Subject]:
     """Yield OpenCV's Gaussian and median."""
-    import cv2  # noqa: PLC0415  each library may be missing
+    import cv2
 
     def gaussian(image: NDArray[Any]) -> NDArray[Any]:
         return cv2.GaussianBlur(image, (0, 0), SIGMA)
@@ -62,7 +61,7 @@ def opencv() -> Iterator[Subject]:
 
 def scipy() -> Iterator[Subject]:
     """Yield SciPy's Gaussian and box."""
-    from scipy import ndimage  # noqa: PLC0415
+    from scipy import ndimage
 
     name = f"SciPy {version('scipy')}"
     yield Subject(
@@ -98,7 +97,7 @@ def scipy() -> Iterator[Subject]:
 
 def skimage() -> Iterator[Subject]:
     """Yield scikit-image's Gaussian and, for what rings, its unsharp mask."""
-    from skimage import filters  # noqa: PLC0415
+    from skimage import filters
 
     name = f"scikit-image {version('scikit-image')}"
     yield Subject(
@@ -117,55 +116,36 @@ def skimage() -> Iterator[Subject]:
     )
 
 
-def pygfx() -> Iterator[Subject]:
-    """Yield pygfx's bloom: all of it in the place of the picture, and as it is by default."""
+def pygfx(adapter: str) -> Iterator[Subject]:
+    """Yield pygfx's bloom alone, and the picture with it as it is by default."""
+    from vkbloom.bench.peers.pygfx import Bloom as Peer
+
     name = f"pygfx {version('pygfx')} `PhysicalBasedBloomPass`"
     levels = 4
+
+    peer = Peer(HALF.size, levels, adapter)
+
+    def bloom(*, strength: float = 1.0, karis_average: bool = False) -> Bloom:
+        def apply(image: NDArray[Any]) -> NDArray[Any]:
+            peer.karis_average = karis_average
+            return peer.bloom(np.dstack([image, np.ones_like(image[..., 0])]), strength)
+
+        return apply
+
     for karis in (False, True):
         yield Subject(
             f"{name}, {levels} levels, `bloom_strength=1`" + ", `use_karis_average`" * karis,
-            _pygfx_bloom(bloom_strength=1.0, max_mip_levels=levels, use_karis_average=karis),
+            bloom(karis_average=karis),
             HALF,
             float(levels),
         )
     yield Subject(
-        f"{name}, the picture with it", _pygfx_bloom(max_mip_levels=levels), HALF, 1.0, picture=True
+        f"{name}, `bloom_strength=0.04`, the picture with it",
+        bloom(strength=0.04),
+        HALF,
+        1.0,
+        picture=True,
     )
-
-
-def _pygfx_bloom(**options: Any) -> Bloom:
-    os.environ.setdefault("WGPU_FORCE_OFFSCREEN", "1")
-    import wgpu  # noqa: PLC0415
-    from pygfx.renderers.wgpu.engine.bloom import PhysicalBasedBloomPass  # noqa: PLC0415
-    from pygfx.renderers.wgpu.engine.shared import get_shared  # noqa: PLC0415
-
-    device = get_shared().device
-    bloom = PhysicalBasedBloomPass(**options)
-    usage = (
-        wgpu.TextureUsage.TEXTURE_BINDING
-        | wgpu.TextureUsage.RENDER_ATTACHMENT
-        | wgpu.TextureUsage.COPY_DST
-        | wgpu.TextureUsage.COPY_SRC
-    )
-
-    def apply(image: NDArray[Any]) -> NDArray[Any]:
-        height, width, _ = image.shape
-        rgba = np.ones((height, width, 4), np.float16)
-        rgba[..., :3] = image
-        source, target = (
-            device.create_texture(size=(width, height, 1), format="rgba16float", usage=usage)
-            for _ in range(2)
-        )
-        layout = {"bytes_per_row": 8 * width, "rows_per_image": height}
-        device.queue.write_texture({"texture": source}, rgba, layout, (width, height, 1))
-        encoder = device.create_command_encoder()
-        bloom.render(encoder, source.create_view(), None, target.create_view())
-        device.queue.submit([encoder.finish()])
-        data = device.queue.read_texture({"texture": target}, layout, (width, height, 1))
-        # The memory is the device's, and ends with `data`.
-        return np.array(np.frombuffer(data, np.float16).reshape(height, width, 4)[..., :3])
-
-    return apply
 
 
 def ours(renderer: vkbloom.Renderer) -> Iterator[Subject]:
@@ -307,7 +287,7 @@ def page(subjects: list[Subject], device: str) -> str:
 
 TEXT = """# Which laws blurs and blooms keep
 
-Made by `benchmarks/laws.py`, which holds other people's blurs and blooms, and this package's own,
+Made by `tools/laws.py`, which holds other people's blurs and blooms, and this package's own,
 against the assertions of `vkbloom.testing` (see [testing.md](testing.md)). Adapter of what runs on
 one: {device}.
 
@@ -350,7 +330,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=TARGET)
     target = parser.parse_args().out
     with vkbloom.Renderer("software") as renderer:
-        subjects = [*opencv(), *scipy(), *skimage(), *pygfx(), *ours(renderer)]
+        subjects = [*opencv(), *scipy(), *skimage(), *pygfx(renderer.info.name), *ours(renderer)]
         target.write_text(page(subjects, renderer.info.summary), encoding="utf-8")
     print(target)
 
