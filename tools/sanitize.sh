@@ -9,8 +9,8 @@ cd "$(dirname "$0")/.."
 # of many pixels take minutes here without another path through the core.
 if [ $# = 0 ]; then
     set -- -k "not 333x and not 1920"
-    for name in assets bench cli cli_apply comparison doctor files frames gltf gltf_textures hdr_images \
-        images pictures reference scene skybox; do
+    for name in assets bench cli cli_apply comparison doctor files frames gltf gltf_textures guide \
+        hdr_images images laws mutations pictures plugin reference report scene skybox; do
         set -- "$@" "--ignore=tests/test_$name.py"
     done
 fi
