@@ -414,6 +414,17 @@ class TestExtras:
         )
         subprocess.run([sys.executable, "-c", code], check=True)
 
+    def test_grids_are_imported_late(self) -> None:
+        code = (
+            "import sys, vkbloom\n"
+            "assert not any(name.startswith('vkbloom.grid') for name in sys.modules)\n"
+            "assert all(hasattr(vkbloom, name) for name in vkbloom.__all__)\n"
+            "from vkbloom import reductions"
+        )
+        subprocess.run([sys.executable, "-c", code], check=True)
+        with pytest.raises(AttributeError, match="no attribute 'grids'"):
+            vkbloom.grids  # noqa: B018
+
 
 class TestProgress:
     def test_silent_without_a_terminal(
