@@ -7,6 +7,7 @@ import shutil
 import struct
 import subprocess
 from pathlib import Path
+from typing import NamedTuple
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
@@ -16,43 +17,77 @@ SPIRV = Path("build/spirv")
 STAGES = (".vert", ".frag", ".comp")
 
 
-def identifier(shader: Path) -> str:
-    """`blur.frag` is `blur_frag` in C."""
-    return shader.name.replace(".", "_")
+# GLSL's names of the formats that a shader can be compiled for, by the package's names.
+FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
 
 
-def compile_shader(shader: Path) -> tuple[int, ...]:
-    """Compile one shader to its SPIR-V words."""
+class Module(NamedTuple):
+    """One SPIR-V module: `blur.frag` is `blur_frag` in C, with a suffix for a variant."""
+
+    name: str
+    shader: Path
+    options: tuple[str, ...] = ()
+
+
+def modules(shader: Path) -> list[Module]:
+    """Return the modules that a shader is compiled to.
+
+    A pass over all pixels has a compute form too; a shader that loads texels without a sampler
+    is compiled for each format that it may load from.
+    """
+    name = shader.name.replace(".", "_")
+    text = shader.read_text()
+    if "SOURCE_FORMAT" in text:
+        return [
+            Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",))
+            for ours, glsl in FORMATS.items()
+        ]
+    if '#include "fullscreen.glsl"' in text:
+        dispatch = Module(f"{shader.stem}_dispatch", shader, ("-DDISPATCH", "-S", "comp"))
+        return [Module(name, shader), dispatch]
+    return [Module(name, shader)]
+
+
+def compile_module(module: Module) -> tuple[int, ...]:
+    """Compile one module to its SPIR-V words."""
     compiler = shutil.which("glslangValidator") or shutil.which("glslang")
     if compiler is None:
         raise SystemExit(
             "glslangValidator is missing; on Debian or Ubuntu: apt install glslang-tools"
         )
-    target = SPIRV / f"{shader.name}.spv"
-    command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", "-o", str(target)]
-    result = subprocess.run([*command, str(shader)], capture_output=True, text=True, check=False)
+    target = SPIRV / f"{module.name}.spv"
+    command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", *module.options]
+    command += ["-o", str(target), str(module.shader)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
-        raise SystemExit(f"{shader} does not compile:\n{result.stdout}{result.stderr}")
+        raise SystemExit(f"{module.shader} does not compile:\n{result.stdout}{result.stderr}")
     code = target.read_bytes()
     return struct.unpack(f"={len(code) // 4}I", code)
 
 
 def write_spirv() -> None:
-    """Write spirv.h and spirv.c: an enum of the shaders, and their code, one row for each file."""
+    """Write spirv.h and spirv.c: an enum of the modules, and their code, one row for each."""
     SPIRV.mkdir(parents=True, exist_ok=True)
     shaders = sorted(path for path in SHADERS.iterdir() if path.suffix in STAGES)
-    names = [identifier(shader) for shader in shaders]
-    enum = "".join(f"    VKB_SHADER_{name},\n" for name in names)
+    built = [module for shader in shaders for module in modules(shader)]
+    names = {module.name for module in built}
+    enum = "".join(f"    VKB_SHADER_{module.name},\n" for module in built)
     arrays = "".join(
-        f"static const uint32_t {name}[] = {{{','.join(map(str, compile_shader(shader)))}}};\n"
-        for name, shader in zip(names, shaders, strict=True)
+        f"static const uint32_t {module.name}[] = "
+        f"{{{','.join(map(str, compile_module(module)))}}};\n"
+        for module in built
     )
-    rows = "".join(f"    {{{name}, sizeof {name}}},\n" for name in names)
+    rows = ""
+    for module in built:
+        dispatch = f"{module.shader.stem}_dispatch"
+        twin = dispatch if dispatch in names else module.name
+        rows += f"    {{{module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n"
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
         "#include <stddef.h>\n#include <stdint.h>\n\n"
         f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
-        "struct vkb_spirv { const uint32_t *code; size_t size; };\n"
+        "// `dispatch`: the same pass as a compute shader, or itself where there is none.\n"
+        "struct vkb_spirv { const uint32_t *code; size_t size; enum vkb_shader dispatch; };\n"
         "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
     )
     (SPIRV / "spirv.c").write_text(

@@ -5,13 +5,95 @@
 #include <math.h>
 #include <string.h>
 
-// The attribute, or NULL: without an exception where the object lacks it.
-static PyObject *optional_attribute(PyObject *object, const char *name)
-{
-    PyObject *value = PyObject_GetAttrString(object, name);
+// The attributes of a settings object that are read here; the values' rows come last.
+enum attribute {
+    ATTRIBUTE_METHOD,
+    ATTRIBUTE_THRESHOLD,
+    ATTRIBUTE_FORMAT,
+    ATTRIBUTE_BLOOM_SIZE,
+    ATTRIBUTE_WEIGHTS,
+    ATTRIBUTE_LAYERS,
+    ATTRIBUTE_CHOICES,
+    ATTRIBUTE_VALUES = ATTRIBUTE_CHOICES + VKB_CHOICE_COUNT,
+};
 
-    if (!value && PyErr_ExceptionMatches(PyExc_AttributeError))
+static const char *attribute_name(size_t attribute)
+{
+    static const char *const names[ATTRIBUTE_CHOICES] = {
+        [ATTRIBUTE_METHOD] = "method",   [ATTRIBUTE_THRESHOLD] = "threshold",
+        [ATTRIBUTE_FORMAT] = "format",   [ATTRIBUTE_BLOOM_SIZE] = "bloom_size",
+        [ATTRIBUTE_WEIGHTS] = "weights", [ATTRIBUTE_LAYERS] = "layers",
+    };
+
+    return attribute < ATTRIBUTE_CHOICES ? names[attribute]
+         : attribute < ATTRIBUTE_VALUES  ? vkb_choice_rows[attribute - ATTRIBUTE_CHOICES].name
+                                         : vkb_value_rows[attribute - ATTRIBUTE_VALUES].name;
+}
+
+bool vkb_make_attributes(struct vkb_module_state *state)
+{
+    const size_t count = ATTRIBUTE_VALUES + vkb_value_row_count;
+
+    state->lacking = PyDict_New();
+    state->attributes = PyTuple_New((Py_ssize_t)count);
+    for (size_t i = 0; state->attributes && i < count; ++i) {
+        PyObject *name = PyUnicode_InternFromString(attribute_name(i));
+        if (!name || PyTuple_SetItem(state->attributes, (Py_ssize_t)i, name) < 0)
+            return false;
+    }
+    return state->attributes && state->lacking;
+}
+
+// A settings object that is being read. Most types of settings lack most attributes, and asking in
+// vain takes far longer than asking, so that is done once a type.
+struct reader {
+    const struct vkb_module_state *state;
+    PyObject *object;
+    PyObject *lacking;  // bytes: by attribute, whether the object's type is known to lack it
+    bool learning;
+};
+
+static bool begin_reading(const struct vkb_module_state *state, PyObject *object,
+                          struct reader *reader)
+{
+    PyObject *type = (PyObject *)Py_TYPE(object);
+    const Py_ssize_t count = PyTuple_Size(state->attributes);
+    PyObject *known = PyDict_GetItemWithError(state->lacking, type);
+
+    *reader = (struct reader){.state = state, .object = object, .learning = !known};
+    if (known) {
+        reader->lacking = Py_NewRef(known);
+        return true;
+    }
+    if (PyErr_Occurred() || !(reader->lacking = PyBytes_FromStringAndSize(NULL, count)))
+        return false;
+    memset(PyBytes_AsString(reader->lacking), 0, (size_t)count);
+    return true;
+}
+
+static bool end_reading(struct reader *reader, bool done)
+{
+    if (done && reader->learning)
+        done = PyDict_SetItem(reader->state->lacking, (PyObject *)Py_TYPE(reader->object),
+                              reader->lacking)
+            == 0;
+    Py_DECREF(reader->lacking);
+    return done;
+}
+
+// The attribute, or NULL: without an exception where the object lacks it.
+static PyObject *optional_attribute(const struct reader *reader, size_t attribute)
+{
+    char *lacking = PyBytes_AsString(reader->lacking) + attribute;
+
+    if (*lacking)
+        return NULL;
+    PyObject *name = PyTuple_GetItem(reader->state->attributes, (Py_ssize_t)attribute);
+    PyObject *value = PyObject_GetAttr(reader->object, name);
+    if (!value && PyErr_ExceptionMatches(PyExc_AttributeError)) {
         PyErr_Clear();
+        *lacking = 1;
+    }
     return value;
 }
 
@@ -44,9 +126,10 @@ static bool out_of_range(const char *name, PyObject *value, double low, double h
 }
 
 // None keeps the default.
-static bool read_value(PyObject *object, const struct vkb_value_row *row, struct vkb_values *values)
+static bool read_value(const struct reader *reader, size_t index, struct vkb_values *values)
 {
-    PyObject *value = optional_attribute(object, row->name);
+    const struct vkb_value_row *row = &vkb_value_rows[index];
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_VALUES + index);
     bool done = true;
 
     store_value(values, row, row->initial);
@@ -64,9 +147,10 @@ static bool read_value(PyObject *object, const struct vkb_value_row *row, struct
     return done;
 }
 
-static bool read_choice(PyObject *object, const struct vkb_choice_row *row, int *choice)
+static bool read_choice(const struct reader *reader, int index, int *choice)
 {
-    PyObject *value = optional_attribute(object, row->name);
+    const struct vkb_choice_row *row = &vkb_choice_rows[index];
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_CHOICES + (size_t)index);
 
     *choice = 0;
     if (!value)
@@ -82,9 +166,9 @@ static bool read_choice(PyObject *object, const struct vkb_choice_row *row, int 
     return false;
 }
 
-static bool read_format(PyObject *object, enum vkb_format *format)
+static bool read_format(const struct reader *reader, enum vkb_format *format)
 {
-    PyObject *value = optional_attribute(object, "format");
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_FORMAT);
 
     *format = VKB_FORMAT_NONE;
     if (!value)
@@ -102,9 +186,9 @@ static bool read_format(PyObject *object, enum vkb_format *format)
     return !PyErr_Occurred();
 }
 
-static bool read_size(PyObject *object, struct vkb_settings *settings)
+static bool read_size(const struct reader *reader, struct vkb_settings *settings)
 {
-    PyObject *value = optional_attribute(object, "bloom_size");
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_BLOOM_SIZE);
     bool done = true;
 
     if (!value)
@@ -122,12 +206,13 @@ static bool read_size(PyObject *object, struct vkb_settings *settings)
     return done;
 }
 
-static bool read_method(PyObject *object, enum vkb_method *method)
+static bool read_method(const struct reader *reader, enum vkb_method *method)
 {
 #define METHOD_NAME(constant, name, published) [VKB_METHOD_##constant] = #name,
     static const char *const names[VKB_METHOD_COUNT] = {VKB_METHODS(METHOD_NAME)};
 #undef METHOD_NAME
-    PyObject *value = PyObject_GetAttrString(object, "method");
+    PyObject *value = PyObject_GetAttr(
+        reader->object, PyTuple_GetItem(reader->state->attributes, ATTRIBUTE_METHOD));
 
     if (!value)
         return false;
@@ -142,9 +227,9 @@ static bool read_method(PyObject *object, enum vkb_method *method)
     return false;
 }
 
-static bool read_weights(PyObject *object, struct vkb_settings *settings)
+static bool read_weights(const struct reader *reader, struct vkb_settings *settings)
 {
-    PyObject *value = optional_attribute(object, "weights");
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_WEIGHTS);
 
     if (!value)
         return !PyErr_Occurred();
@@ -167,9 +252,9 @@ static bool read_weights(PyObject *object, struct vkb_settings *settings)
     return !PyErr_Occurred();
 }
 
-static bool read_layers(PyObject *object, struct vkb_settings *settings)
+static bool read_layers(const struct reader *reader, struct vkb_settings *settings)
 {
-    PyObject *value = optional_attribute(object, "layers");
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_LAYERS);
 
     if (!value)
         return !PyErr_Occurred();
@@ -196,22 +281,31 @@ static bool read_layers(PyObject *object, struct vkb_settings *settings)
     return !PyErr_Occurred();
 }
 
-bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)
+static bool read_all(const struct reader *reader, struct vkb_settings *settings)
 {
     memset(settings, 0, sizeof *settings);
     for (size_t i = 0; i < vkb_value_row_count; ++i)
-        if (!read_value(object, &vkb_value_rows[i], &settings->values))
+        if (!read_value(reader, i, &settings->values))
             return false;
     for (int i = 0; i < VKB_CHOICE_COUNT; ++i)
-        if (!read_choice(object, &vkb_choice_rows[i], &settings->choices[i]))
+        if (!read_choice(reader, i, &settings->choices[i]))
             return false;
 
-    PyObject *threshold = optional_attribute(object, "threshold");
+    PyObject *threshold = optional_attribute(reader, ATTRIBUTE_THRESHOLD);
     settings->thresholded = threshold && threshold != Py_None;
     Py_XDECREF(threshold);
-    return !PyErr_Occurred() && read_method(object, &settings->method)
-        && read_format(object, &settings->format) && read_size(object, settings)
-        && read_weights(object, settings) && read_layers(object, settings);
+    return !PyErr_Occurred() && read_method(reader, &settings->method)
+        && read_format(reader, &settings->format) && read_size(reader, settings)
+        && read_weights(reader, settings) && read_layers(reader, settings);
+}
+
+bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
+                       struct vkb_settings *settings)
+{
+    struct reader reader;
+
+    return begin_reading(state, object, &reader)
+        && end_reading(&reader, read_all(&reader, settings));
 }
 
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)

@@ -45,6 +45,24 @@ static const struct access_info {
             .reads = VK_ACCESS_SHADER_READ_BIT,
             .layout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
         },
+    [VKB_ACCESS_DISPATCH_SAMPLED] =
+        {
+            .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+            .reads = VK_ACCESS_SHADER_READ_BIT,
+            .layout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
+        },
+    [VKB_ACCESS_DISPATCH_LOADED] =
+        {
+            .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+            .reads = VK_ACCESS_SHADER_READ_BIT,
+            .layout = VK_IMAGE_LAYOUT_GENERAL,
+        },
+    [VKB_ACCESS_DISPATCH_STORED] =
+        {
+            .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+            .writes = VK_ACCESS_SHADER_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_GENERAL,
+        },
     [VKB_ACCESS_COPY_SOURCE] =
         {
             .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,
@@ -75,8 +93,6 @@ void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer command
     barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
     barrier.srcAccessMask = before->writes;
     barrier.dstAccessMask = after->reads | after->writes;
-    barrier.oldLayout = before->layout;
-    barrier.newLayout = after->layout;
     barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     device->vk.vkCmdPipelineBarrier(commands, before->stages, after->stages, 0, 0, NULL, 0, NULL, 1,

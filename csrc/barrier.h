@@ -10,7 +10,10 @@ enum vkb_access {
     VKB_ACCESS_COLOR_TARGET,  // written as a colour attachment
     VKB_ACCESS_COLOR_BLEND,   // the same, reading what is there
     VKB_ACCESS_DEPTH_TARGET,
-    VKB_ACCESS_SAMPLED,  // read by a fragment shader
+    VKB_ACCESS_SAMPLED,           // read by a fragment shader
+    VKB_ACCESS_DISPATCH_SAMPLED,  // read by a compute shader, through a sampler
+    VKB_ACCESS_DISPATCH_LOADED,   // read by a compute shader, as a storage image
+    VKB_ACCESS_DISPATCH_STORED,   // written by a compute shader
     VKB_ACCESS_COPY_SOURCE,
     VKB_ACCESS_COPY_TARGET,
     VKB_ACCESS_COUNT,
@@ -18,7 +21,7 @@ enum vkb_access {
 
 VkImageLayout vkb_access_layout(enum vkb_access access);
 
-// Records the barrier that orders two accesses to an image, changing its layout. Nothing is
+// Records the barrier that orders two accesses to an image, with the layouts given. Nothing is
 // recorded between two equal accesses that only read.
 void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,
                         const VkImageMemoryBarrier *image, enum vkb_access from,

@@ -53,9 +53,15 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
                                            }));
 }
 
-bool vkb_commands_run(struct vkb_device *device, struct vkb_commands *commands,
-                      struct vkb_error *error)
+bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
+                         struct vkb_error *error)
 {
     return VK(error, device->vk.vkEndCommandBuffer(commands->buffer))
-        && vkb_device_run(device, commands->buffer, commands->fence, error);
+        && vkb_device_submit(device, commands->buffer, commands->fence, error);
+}
+
+bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands,
+                       struct vkb_error *error)
+{
+    return vkb_device_wait(device, commands->fence, error);
 }

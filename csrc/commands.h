@@ -18,8 +18,11 @@ void vkb_commands_destroy(const struct vkb_device *device, struct vkb_commands *
 // Begins an empty recording; whatever was recorded and not run is dropped.
 bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *commands,
                         struct vkb_error *error);
-// Ends the recording, runs it, waits for it.
-bool vkb_commands_run(struct vkb_device *device, struct vkb_commands *commands,
-                      struct vkb_error *error);
+// Ends the recording and hands it to the device, which runs it after all that it was handed before.
+bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
+                         struct vkb_error *error);
+// Waits until the device has run what was submitted last.
+bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands,
+                       struct vkb_error *error);
 
 #endif

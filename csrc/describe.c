@@ -99,7 +99,7 @@ PyObject *vkb_describe(PyObject *module, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O(II)ps:describe", &settings_object, &source.size.width,
                           &source.size.height, &has_sky, &shading)
-        || !vkb_read_settings(settings_object, &settings))
+        || !vkb_read_settings(vkb_module_state(module), settings_object, &settings))
         return NULL;
     source.has_sky = has_sky;
     if (vkb_build_scene(shading, &settings, &source, &graph, &error)

@@ -1,20 +1,93 @@
 #include "device.h"
 
+#include <string.h>
+
+static bool has_extension(VkPhysicalDevice physical, const char *name, bool *found,
+                          struct vkb_error *error)
+{
+    VkExtensionProperties *extensions;
+    uint32_t count = 0;
+
+    *found = false;
+    if (!VK(error, vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
+        || !(extensions = vkb_alloc(error, count, sizeof *extensions)))
+        return false;
+    bool done = VK(error, vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
+    for (uint32_t i = 0; done && i < count; ++i)
+        *found |= strcmp(extensions[i].extensionName, name) == 0;
+    vkb_free(extensions);
+    return done;
+}
+
+// Whether the device can copy to buffers in memory of the host's own.
+static bool imports_buffers(VkPhysicalDevice physical)
+{
+    VkExternalBufferProperties properties = {
+        .sType = VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES,
+    };
+
+    vkGetPhysicalDeviceExternalBufferProperties(
+        physical,
+        &(VkPhysicalDeviceExternalBufferInfo){
+            .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO,
+            .usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+            .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+        },
+        &properties);
+    const VkExternalMemoryFeatureFlags features =
+        properties.externalMemoryProperties.externalMemoryFeatures;
+    return (features & VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT)
+        && !(features & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
+}
+
+static VkDeviceSize import_alignment(VkPhysicalDevice physical)
+{
+    VkPhysicalDeviceExternalMemoryHostPropertiesEXT host = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT,
+    };
+
+    vkGetPhysicalDeviceProperties2(physical,
+                                   &(VkPhysicalDeviceProperties2){
+                                       .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
+                                       .pNext = &host,
+                                   });
+    return host.minImportedHostPointerAlignment;
+}
+
 static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
-    return VK(error, vkCreateDevice(device->adapter.physical,
-                                    &(VkDeviceCreateInfo){
-                                        .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                                        .queueCreateInfoCount = 1,
-                                        .pQueueCreateInfos =
-                                            &(VkDeviceQueueCreateInfo){
-                                                .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                                                .queueFamilyIndex = device->adapter.queue_family,
-                                                .queueCount = 1,
-                                                .pQueuePriorities = &(float){1.0f},
-                                            },
-                                    },
-                                    NULL, &device->handle));
+    VkPhysicalDeviceFeatures available;
+    bool has_import;
+
+    if (!has_extension(device->adapter.physical, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME,
+                       &has_import, error))
+        return false;
+    has_import = has_import && imports_buffers(device->adapter.physical);
+    if (has_import)
+        device->import_alignment = import_alignment(device->adapter.physical);
+    vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
+    device->dispatch = available.shaderStorageImageWriteWithoutFormat;
+    return VK(error,
+              vkCreateDevice(device->adapter.physical,
+                             &(VkDeviceCreateInfo){
+                                 .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                 .pEnabledFeatures =
+                                     &(VkPhysicalDeviceFeatures){
+                                         .shaderStorageImageWriteWithoutFormat = device->dispatch,
+                                     },
+                                 .queueCreateInfoCount = 1,
+                                 .pQueueCreateInfos =
+                                     &(VkDeviceQueueCreateInfo){
+                                         .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                         .queueFamilyIndex = device->adapter.queue_family,
+                                         .queueCount = 1,
+                                         .pQueuePriorities = &(float){1.0f},
+                                     },
+                                 .enabledExtensionCount = has_import ? 1 : 0,
+                                 .ppEnabledExtensionNames =
+                                     (const char *[]){VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME},
+                             },
+                             NULL, &device->handle));
 }
 
 static uint64_t timestamp_mask(const struct vkb_device *device)
@@ -66,20 +139,49 @@ bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
     return (properties.optimalTilingFeatures & features) == features;
 }
 
-bool vkb_device_run(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
-                    struct vkb_error *error)
+bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
+                             VkImageUsageFlags usage, VkFormatFeatureFlags features, uint32_t width,
+                             uint32_t height)
 {
-    const struct VolkDeviceTable *vk = &device->vk;
+    VkFormatProperties properties;
+    VkImageFormatProperties limits;
+
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU)
+        return false;
+    vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
+    return (properties.linearTilingFeatures & features) == features
+        && vkGetPhysicalDeviceImageFormatProperties(device->adapter.physical, format,
+                                                    VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage,
+                                                    0, &limits)
+               == VK_SUCCESS
+        && width <= limits.maxExtent.width && height <= limits.maxExtent.height;
+}
+
+static bool remember_loss(struct vkb_device *device, bool done, const struct vkb_error *error)
+{
+    if (!done && error->kind == VKB_ERROR_DEVICE_LOST)
+        device->lost = true;
+    return done;
+}
+
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
+                       struct vkb_error *error)
+{
     VkSubmitInfo submit = {
         .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
         .commandBufferCount = 1,
         .pCommandBuffers = &commands,
     };
-    bool done = VK(error, vk->vkQueueSubmit(device->queue, 1, &submit, fence))
-             && VK(error, vk->vkWaitForFences(device->handle, 1, &fence, VK_TRUE, UINT64_MAX))
+    bool done = VK(error, device->vk.vkQueueSubmit(device->queue, 1, &submit, fence));
+
+    return remember_loss(device, done, error);
+}
+
+bool vkb_device_wait(struct vkb_device *device, VkFence fence, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    bool done = VK(error, vk->vkWaitForFences(device->handle, 1, &fence, VK_TRUE, UINT64_MAX))
              && VK(error, vk->vkResetFences(device->handle, 1, &fence));
 
-    if (!done && error->kind == VKB_ERROR_DEVICE_LOST)
-        device->lost = true;
-    return done;
+    return remember_loss(device, done, error);
 }

@@ -14,7 +14,10 @@ struct vkb_device {
     VkQueue queue;
     VkPhysicalDeviceMemoryProperties memory;
     VkPhysicalDeviceLimits limits;
+    bool dispatch;            // compute shaders can write images of every format
     uint64_t timestamp_mask;  // 0: the queue has no timestamps
+    // Host memory that becomes a buffer starts and ends at multiples of it; 0: none can.
+    VkDeviceSize import_alignment;
     bool lost;
 };
 
@@ -27,9 +30,17 @@ void vkb_device_destroy(struct vkb_device *device);
 bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
                          VkFormatFeatureFlags features);
 
-// Submits the recorded commands and waits until the device has run them; `fence` is unsignalled
-// before and after. A lost device is remembered.
-bool vkb_device_run(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
-                    struct vkb_error *error);
+// Whether images of that kind are best in memory that the host can write to: on a CPU, where all
+// memory is the host's and no tiling is faster than rows.
+bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
+                             VkImageUsageFlags usage, VkFormatFeatureFlags features, uint32_t width,
+                             uint32_t height);
+
+// Submits the recorded commands; `fence`, unsignalled before, is signalled when the device has run
+// them and all that was submitted before. A lost device is remembered.
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
+                       struct vkb_error *error);
+// Waits for the fence and leaves it unsignalled. A lost device is remembered.
+bool vkb_device_wait(struct vkb_device *device, VkFence fence, struct vkb_error *error);
 
 #endif

@@ -1,19 +1,21 @@
 #include "frame.h"
 
+#include "plan.h"
+
 #include <string.h>
 
-// The state of one run.
+// The state of one submission, and of the point that is being recorded.
 struct run {
     struct vkb_device *device;
     struct vkb_frame *frame;
-    const struct vkb_graph *graph;
-    struct vkb_slot **slots;  // by the graph's image index
-    bool *needed;             // by pass
-    uint32_t *ran;            // the first pass of each render pass that was recorded
-    uint32_t ran_count;
-    struct vkb_slot *input;  // NULL: none, or none that is needed
-    bool send_input;         // the device does not have it yet
-    VkDeviceSize uniform_used;
+    struct vkb_flight *flight;
+    struct vkb_point *point;
+    const struct vkb_graph *graph;  // the point's
+    struct vkb_slot **slots;        // by the graph's image index
+    bool *wanted;                   // by image
+    bool *needed, *current;         // by pass
+    struct vkb_slot *input;         // NULL: none
+    bool send_input;                // the device does not have it yet
     unsigned char *recipe;
     size_t recipe_size, recipe_capacity;
 };
@@ -27,40 +29,12 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
+    vkb_flights_destroy(device, &frame->flights);
     vkb_slots_destroy(device, &frame->slots);
-    vkb_timer_destroy(device, &frame->timer);
-    device->vk.vkDestroyDescriptorPool(device->handle, frame->descriptors, NULL);
-    vkb_buffer_destroy(device, &frame->uniforms);
-    vkb_readback_destroy(device, &frame->readback);
     vkb_upload_destroy(device, &frame->upload);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
-    vkb_commands_destroy(device, &frame->commands);
     *frame = (struct vkb_frame){0};
-}
-
-// Marks the passes that the outputs depend on, from the last to the first, and their images.
-static void mark_needed(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
-                        bool *wanted)
-{
-    const struct vkb_graph *graph = run->graph;
-
-    for (uint32_t i = 0; i < output_count; ++i)
-        wanted[outputs[i].image] = true;
-    for (uint32_t i = graph->pass_count; i-- > 0;) {
-        const struct vkb_pass_row *pass = &graph->passes[i];
-        for (uint32_t target = 0; target < pass->target_count; ++target)
-            run->needed[i] |= wanted[pass->targets[target]];
-        run->needed[i] |= pass->depth != VKB_NO_IMAGE && wanted[pass->depth];
-        if (!run->needed[i])
-            continue;
-        for (uint32_t read = 0; read < pass->read_count; ++read)
-            wanted[pass->reads[read]] = true;
-        for (uint32_t target = 0; target < pass->target_count; ++target)
-            wanted[pass->targets[target]] = true;
-        if (pass->depth != VKB_NO_IMAGE)
-            wanted[pass->depth] = true;
-    }
 }
 
 static bool append(struct run *run, const void *bytes, size_t size, struct vkb_error *error)
@@ -84,7 +58,7 @@ static bool write_recipe(struct run *run, uint32_t first, uint32_t end, struct v
         memcpy(&row, &run->graph->passes[i], sizeof row);
         for (uint32_t read = 0; read < row.read_count; ++read)
             versions[read] = run->slots[row.reads[read]]->version;
-        if (row.geometry != VKB_GEOMETRY_FULLSCREEN)
+        if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
             versions[VKB_MAX_READS] = run->frame->scene.serial;
         memset(row.reads, 0, sizeof row.reads);
         memset(row.targets, 0, sizeof row.targets);
@@ -93,6 +67,16 @@ static bool write_recipe(struct run *run, uint32_t first, uint32_t end, struct v
             return false;
     }
     return true;
+}
+
+// Whether the image is there and holds what a pass before `end` would make.
+static bool is_current(const struct run *run, uint32_t image, uint32_t end)
+{
+    bool current = run->graph->images[image].input;
+
+    for (uint32_t i = 0; i < end; ++i)
+        current = current || (run->current[i] && vkb_pass_writes(&run->graph->passes[i], image));
+    return current && run->slots[image];
 }
 
 // The slots of a pass's targets, the depth last; returns how many.
@@ -112,11 +96,11 @@ static uint32_t target_slots(const struct run *run, const struct vkb_pass_row *p
 static VkDeviceSize write_params(struct run *run, const struct vkb_pass_row *pass)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
-    const VkDeviceSize offset = run->uniform_used;
+    const VkDeviceSize offset = run->flight->uniform_used;
     const size_t size = vkb_block_sizes[pass->block];
 
-    memcpy((char *)run->frame->uniforms.mapped + offset, &pass->params, size);
-    run->uniform_used = (offset + size + align - 1) / align * align;
+    memcpy((char *)run->flight->uniforms.mapped + offset, &pass->params, size);
+    run->flight->uniform_used = (offset + size + align - 1) / align * align;
     return offset;
 }
 
@@ -141,7 +125,7 @@ static VkDescriptorImageInfo read_image(const struct run *run, const struct vkb_
     return (VkDescriptorImageInfo){
         .sampler = sampler,
         .imageView = image->view,
-        .imageLayout = vkb_access_layout(VKB_ACCESS_SAMPLED),
+        .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
     };
 }
 
@@ -152,9 +136,10 @@ static bool bind_descriptors(struct run *run, const struct vkb_pass_row *pass,
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     const struct vkb_pipelines *pipelines = &run->frame->pipelines;
+    const VkDescriptorSetLayout layout = vkb_pipelines_set_layout(pipelines, pass);
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
-    VkDescriptorImageInfo images[VKB_MAX_READS];
-    VkWriteDescriptorSet writes[VKB_MAX_READS + 1];
+    VkDescriptorImageInfo images[VKB_MAX_READS + 1];
+    VkWriteDescriptorSet writes[VKB_MAX_READS + 2];
     uint32_t write_count = 0;
     VkDescriptorSet set;
 
@@ -162,14 +147,14 @@ static bool bind_descriptors(struct run *run, const struct vkb_pass_row *pass,
                        run->device->handle,
                        &(VkDescriptorSetAllocateInfo){
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                           .descriptorPool = run->frame->descriptors,
+                           .descriptorPool = run->flight->descriptors,
                            .descriptorSetCount = 1,
-                           .pSetLayouts = &pipelines->set_layouts[image_count],
+                           .pSetLayouts = &layout,
                        },
                        &set)))
         return false;
     VkDescriptorBufferInfo params = {
-        .buffer = run->frame->uniforms.handle,
+        .buffer = run->flight->uniforms.handle,
         .offset = params_offset,
         .range = vkb_block_sizes[pass->block],
     };
@@ -189,20 +174,36 @@ static bool bind_descriptors(struct run *run, const struct vkb_pass_row *pass,
             .dstSet = set,
             .dstBinding = i + 1,
             .descriptorCount = 1,
-            .descriptorType = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .descriptorType = pass->loads ? VK_DESCRIPTOR_TYPE_STORAGE_IMAGE
+                                          : VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
             .pImageInfo = &images[i],
         };
     }
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
+        const struct vkb_image *target = &run->slots[pass->targets[0]]->image;
+        images[image_count] = (VkDescriptorImageInfo){
+            .imageView = target->view,
+            .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
+        };
+        writes[write_count++] = (VkWriteDescriptorSet){
+            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+            .dstSet = set,
+            .dstBinding = image_count + 1,
+            .descriptorCount = 1,
+            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .pImageInfo = &images[image_count],
+        };
+    }
     vk->vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
-    vk->vkCmdBindDescriptorSets(run->frame->commands.buffer, VK_PIPELINE_BIND_POINT_GRAPHICS,
-                                pipelines->layouts[image_count], 0, 1, &set, 0, NULL);
+    vk->vkCmdBindDescriptorSets(run->flight->commands.buffer, vkb_pass_bind_point(pass),
+                                vkb_pipelines_layout(pipelines, pass), 0, 1, &set, 0, NULL);
     return true;
 }
 
 static void bind_mesh(const struct run *run, const struct vkb_mesh *mesh, bool textured)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
 
     vk->vkCmdBindVertexBuffers(commands, 0, 1, &mesh->vertices.handle, &(VkDeviceSize){0});
     if (textured)
@@ -221,18 +222,27 @@ static bool draw_surfaces(struct run *run, const struct vkb_pass_row *pass,
         const struct vkb_surface *surface = &mesh->surfaces[i];
         if (!bind_descriptors(run, pass, params, surface, error))
             return false;
-        run->device->vk.vkCmdDrawIndexed(run->frame->commands.buffer, surface->index_count, 1,
+        run->device->vk.vkCmdDrawIndexed(run->flight->commands.buffer, surface->index_count, 1,
                                          first, 0, 0);
         first += surface->index_count;
     }
     return true;
 }
 
+static void dispatch(const struct run *run, const struct vkb_pass_row *pass)
+{
+    const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
+
+    run->device->vk.vkCmdDispatch(
+        run->flight->commands.buffer, (target->width + pass->block_width - 1) / pass->block_width,
+        (target->height + pass->block_height - 1) / pass->block_height, 1);
+}
+
 static bool draw(struct run *run, const struct vkb_pass_row *pass, VkDeviceSize params,
                  struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
     const struct vkb_scene *scene = &run->frame->scene;
     const struct vkb_mesh *mesh = pass->geometry == VKB_GEOMETRY_GLOW ? &scene->glow : &scene->body;
 
@@ -240,7 +250,9 @@ static bool draw(struct run *run, const struct vkb_pass_row *pass, VkDeviceSize 
         return draw_surfaces(run, pass, mesh, params, error);
     if (!bind_descriptors(run, pass, params, NULL, error))
         return false;
-    if (!vkb_is_mesh(pass->geometry)) {
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
+        dispatch(run, pass);
+    } else if (!vkb_is_mesh(pass->geometry)) {
         vk->vkCmdDraw(commands, pass->geometry == VKB_GEOMETRY_SKYBOX ? 36 : 3, 1, 0, 0);
     } else if (mesh->plain_count > 0) {
         bind_mesh(run, mesh, false);
@@ -258,26 +270,32 @@ static bool record_pass(struct run *run, uint32_t index, VkRenderPass render_pas
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
                            error))
         return false;
-    run->device->vk.vkCmdBindPipeline(run->frame->commands.buffer, VK_PIPELINE_BIND_POINT_GRAPHICS,
+    run->device->vk.vkCmdBindPipeline(run->flight->commands.buffer, vkb_pass_bind_point(pass),
                                       pipeline);
     return draw(run, pass, write_params(run, pass), error);
+}
+
+static void transition_reads(struct run *run, uint32_t first, uint32_t end)
+{
+    for (uint32_t i = first; i < end; ++i) {
+        const struct vkb_pass_row *pass = &run->graph->passes[i];
+        for (uint32_t read = 0; read < pass->read_count; ++read)
+            vkb_image_transition(run->device, run->flight->commands.buffer,
+                                 &run->slots[pass->reads[read]]->image, vkb_pass_reads_as(pass));
+    }
 }
 
 // What the passes read, and the targets in the state that the render pass's dependencies go on
 // from.
 static void transition_images(struct run *run, uint32_t first, uint32_t end)
 {
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
     const struct vkb_pass_row *pass = &run->graph->passes[first];
     struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
     const uint32_t use_count = vkb_graph_target_uses(run->graph, first, end, uses);
     const uint32_t depth_uses = use_count - pass->target_count;
 
-    for (uint32_t i = first; i < end; ++i)
-        for (uint32_t read = 0; read < run->graph->passes[i].read_count; ++read)
-            vkb_image_transition(run->device, commands,
-                                 &run->slots[run->graph->passes[i].reads[read]]->image,
-                                 VKB_ACCESS_SAMPLED);
+    transition_reads(run, first, end);
     for (uint32_t i = 0; i < use_count; ++i) {
         uint32_t target = i < depth_uses ? pass->depth : pass->targets[i - depth_uses];
         struct vkb_image *image = &run->slots[target]->image;
@@ -293,7 +311,7 @@ static void begin_render_pass(const struct run *run, VkRenderPass render_pass,
                               VkExtent2D extent)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->frame->commands.buffer;
+    VkCommandBuffer commands = run->flight->commands.buffer;
     VkClearValue clears[VKB_MAX_TARGETS + 1];
 
     for (uint32_t i = 0; i < pass->target_count; ++i)
@@ -318,35 +336,111 @@ static void begin_render_pass(const struct run *run, VkRenderPass render_pass,
     vk->vkCmdSetScissor(commands, 0, 1, &(VkRect2D){.extent = extent});
 }
 
+// The render pass just recorded goes by the name of the image that it writes, a dispatch by its
+// own.
+static void add_timing(struct run *run, uint32_t first)
+{
+    const struct vkb_pass_row *pass = &run->graph->passes[first];
+    struct vkb_timing *timing = &run->point->timings[run->point->timing_count++];
+
+    memcpy(timing->name,
+           pass->geometry == VKB_GEOMETRY_DISPATCH ? pass->name
+                                                   : run->graph->images[pass->targets[0]].name,
+           sizeof timing->name);
+}
+
+static bool record_dispatch(struct run *run, uint32_t index, struct vkb_error *error)
+{
+    struct vkb_device *device = run->device;
+    struct vkb_flight *flight = run->flight;
+    VkCommandBuffer commands = flight->commands.buffer;
+
+    // Started before the barriers: on lavapipe a timestamp is taken at the next barrier.
+    vkb_timer_start(device, commands, &flight->timer);
+    transition_reads(run, index, index + 1);
+    vkb_image_transition(device, commands, &run->slots[run->graph->passes[index].targets[0]]->image,
+                         VKB_ACCESS_DISPATCH_STORED);
+    if (!record_pass(run, index, VK_NULL_HANDLE, error))
+        return false;
+    vkb_timer_stop(device, commands, &flight->timer);
+    return true;
+}
+
 // Passes first..end-1 in one render pass, timed as one: within a render pass tiling devices and
 // lavapipe do not keep the order that single draws could be timed by.
-static bool record_group(struct run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
-                         uint32_t target_count, struct vkb_error *error)
+static bool record_render_pass(struct run *run, uint32_t first, uint32_t end,
+                               struct vkb_slot **targets, uint32_t target_count,
+                               struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
     struct vkb_frame *frame = run->frame;
-    VkCommandBuffer commands = frame->commands.buffer;
+    struct vkb_flight *flight = run->flight;
+    VkCommandBuffer commands = flight->commands.buffer;
     VkRenderPass render_pass;
     VkFramebuffer framebuffer;
 
-    for (uint32_t i = 0; i < target_count; ++i)
-        if (!vkb_slot_begin_writing(&frame->slots, targets[i], run->recipe, run->recipe_size,
-                                    error))
-            return false;
     if (!vkb_pipelines_render_pass(device, &frame->pipelines, run->graph, first, end, &render_pass,
                                    error)
-        || !vkb_slot_framebuffer(device, targets, target_count, render_pass, &framebuffer, error))
+        || !vkb_slots_framebuffer(device, &frame->slots, targets, target_count, render_pass,
+                                  &framebuffer, error))
         return false;
     transition_images(run, first, end);
-    vkb_timer_start(device, commands, &frame->timer, run->ran_count);
+    vkb_timer_start(device, commands, &flight->timer);
     begin_render_pass(run, render_pass, framebuffer, &run->graph->passes[first],
                       (VkExtent2D){targets[0]->image.width, targets[0]->image.height});
     for (uint32_t i = first; i < end; ++i)
         if (!record_pass(run, i, render_pass, error))
             return false;
     device->vk.vkCmdEndRenderPass(commands);
-    vkb_timer_stop(device, commands, &frame->timer, run->ran_count);
-    run->ran[run->ran_count++] = first;
+    vkb_timer_stop(device, commands, &flight->timer);
+    return true;
+}
+
+static bool record_group(struct run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
+                         uint32_t target_count, struct vkb_error *error)
+{
+    const bool is_dispatch = run->graph->passes[first].geometry == VKB_GEOMETRY_DISPATCH;
+
+    for (uint32_t i = 0; i < target_count; ++i)
+        if (!vkb_slot_begin_writing(&run->frame->slots, targets[i], run->recipe, run->recipe_size,
+                                    error))
+            return false;
+    if (is_dispatch ? !record_dispatch(run, first, error)
+                    : !record_render_pass(run, first, end, targets, target_count, error))
+        return false;
+    add_timing(run, first);
+    for (uint32_t i = 0; i < target_count; ++i)
+        targets[i]->valid = true;
+    return true;
+}
+
+// Finds out which passes have nothing to do, from the first to the last: their targets hold what
+// the recipe says, and all that they read is so too.
+static bool mark_current(struct run *run, struct vkb_error *error)
+{
+    const struct vkb_graph *graph = run->graph;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        run->slots[i] = vkb_slots_find(&run->frame->slots, &graph->images[i]);
+    memset(run->current, 0, graph->pass_count * sizeof *run->current);
+    for (uint32_t first = 0, end; first < graph->pass_count; first = end) {
+        struct vkb_slot *targets[VKB_MAX_TARGETS + 1] = {0};
+        const uint32_t target_count = target_slots(run, &graph->passes[first], targets);
+        bool found = true;
+
+        end = vkb_graph_group_end(graph, first);
+        for (uint32_t i = first; i < end; ++i)
+            for (uint32_t read = 0; read < graph->passes[i].read_count; ++read)
+                found = found && is_current(run, graph->passes[i].reads[read], first);
+        for (uint32_t i = 0; i < target_count; ++i)
+            found = found && targets[i];
+        if (found && !write_recipe(run, first, end, error))
+            return false;
+        for (uint32_t i = 0; i < target_count; ++i)
+            found = found && vkb_slot_up_to_date(targets[i], run->recipe, run->recipe_size);
+        for (uint32_t i = first; i < end; ++i)
+            run->current[i] = found;
+    }
     return true;
 }
 
@@ -374,100 +468,83 @@ static bool record_passes(struct run *run, struct vkb_error *error)
     return true;
 }
 
-static bool reserve_descriptors(struct run *run, struct vkb_error *error)
+static bool reserve_descriptors(struct run *run, uint32_t sets, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    struct vkb_frame *frame = run->frame;
-    const uint32_t sets =
-        run->graph->pass_count + frame->scene.body.surface_count + frame->scene.glow.surface_count;
+    struct vkb_flight *flight = run->flight;
 
-    if (sets <= frame->descriptor_capacity)
-        return VK(error, vk->vkResetDescriptorPool(run->device->handle, frame->descriptors, 0));
-    vk->vkDestroyDescriptorPool(run->device->handle, frame->descriptors, NULL);
-    frame->descriptors = VK_NULL_HANDLE;
-    frame->descriptor_capacity = 0;
+    if (sets <= flight->descriptor_capacity)
+        return VK(error, vk->vkResetDescriptorPool(run->device->handle, flight->descriptors, 0));
+    vk->vkDestroyDescriptorPool(run->device->handle, flight->descriptors, NULL);
+    flight->descriptors = VK_NULL_HANDLE;
+    flight->descriptor_capacity = 0;
     if (!VK(error,
             vk->vkCreateDescriptorPool(
                 run->device->handle,
                 &(VkDescriptorPoolCreateInfo){
                     .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
                     .maxSets = sets,
-                    .poolSizeCount = 2,
+                    .poolSizeCount = 3,
                     .pPoolSizes =
                         (VkDescriptorPoolSize[]){
                             {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets},
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, sets * VKB_MAX_READS},
+                            {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_READS + 1)},
                         },
                 },
-                NULL, &frame->descriptors)))
+                NULL, &flight->descriptors)))
         return false;
-    frame->descriptor_capacity = sets;
+    flight->descriptor_capacity = sets;
     return true;
 }
 
-static bool reserve(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
+// Room for all that the points can need.
+static bool reserve(struct run *run, struct vkb_point *points, uint32_t point_count,
                     struct vkb_error *error)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
     const VkDeviceSize params = (sizeof(union vkb_params) + align - 1) / align * align;
-    VkDeviceSize readback = 0;
+    const struct vkb_scene *scene = &run->frame->scene;
+    const uint32_t surfaces = scene->body.surface_count + scene->glow.surface_count;
+    struct vkb_flight *flight = run->flight;
+    uint32_t passes = 0;
 
-    for (uint32_t i = 0; i < output_count; ++i) {
-        const struct vkb_image_row *row = &run->graph->images[outputs[i].image];
-        readback += vkb_readback_size(row->format, row->width, row->height);
+    for (uint32_t i = 0; i < point_count; ++i) {
+        struct vkb_point *point = &points[i];
+        passes += point->graph.pass_count;
+        for (uint32_t output = 0; output < point->output_count; ++output) {
+            const struct vkb_image_row *row = &point->graph.images[point->outputs[output].image];
+            if (!vkb_readback_plan(run->device, &flight->readback, row->format, row->width,
+                                   row->height, &point->outputs[output], error))
+                return false;
+        }
     }
-    return reserve_descriptors(run, error)
-        && vkb_timer_reserve(run->device, run->graph->pass_count, &run->frame->timer, error)
+    return reserve_descriptors(run, passes + point_count * surfaces, error)
+        && vkb_timer_reserve(run->device, passes, &flight->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
-                              params * run->graph->pass_count, &run->frame->uniforms, error)
-        && vkb_readback_begin(run->device, &run->frame->readback, readback, error);
+                              params * passes, &flight->uniforms, error)
+        && vkb_readback_reserve(run->device, &flight->readback, error);
 }
 
-// The images that this run wrote now hold what their recipes say.
-static void end_writing(struct run *run)
+// The slot of the graph's image. One that other commands may still use is replaced only when those
+// have run; the points of this flight have the same images.
+static bool resolve(struct run *run, uint32_t image, struct vkb_error *error)
 {
-    struct vkb_slot *targets[VKB_MAX_TARGETS + 1] = {0};
+    const struct vkb_image_row *row = &run->graph->images[image];
+    struct vkb_slots *slots = &run->frame->slots;
 
-    for (uint32_t i = 0; i < run->ran_count; ++i)
-        for (uint32_t t = target_slots(run, &run->graph->passes[run->ran[i]], targets); t-- > 0;)
-            targets[t]->valid = true;
-    if (run->input)
-        run->input->valid = true;
+    return (!vkb_slots_replaces(slots, row)
+            || vkb_flights_land(run->device, &run->frame->flights, error))
+        && vkb_slots_resolve(run->device, slots, row, &run->slots[image], error);
 }
 
-// One time a render pass, under the name of the image that it writes.
-static bool read_timings(const struct run *run, struct vkb_timing *timings, struct vkb_error *error)
+static bool load_scene(struct run *run, const struct vkb_scene_data *data, struct vkb_error *error)
 {
-    for (uint32_t i = 0; i < run->ran_count; ++i) {
-        const struct vkb_pass_row *pass = &run->graph->passes[run->ran[i]];
-        memcpy(timings[i].name, run->slots[pass->targets[0]]->name, sizeof timings[i].name);
-        if (!vkb_timer_read(run->device, &run->frame->timer, i, &timings[i].seconds, error))
-            return false;
-    }
-    return true;
-}
+    struct vkb_scene *scene = &run->frame->scene;
 
-static bool record_and_run(struct run *run, const struct vkb_output *outputs, uint32_t output_count,
-                           VkDeviceSize *offsets, struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_frame *frame = run->frame;
-    VkCommandBuffer commands = frame->commands.buffer;
-
-    if (!vkb_commands_begin(device, &frame->commands, error))
-        return false;
-    vkb_timer_reset(device, commands, &frame->timer);
-    if (run->send_input)
-        vkb_upload_record(device, commands, &frame->upload, &run->input->image);
-    if (!record_passes(run, error))
-        return false;
-    for (uint32_t i = 0; i < output_count; ++i)
-        vkb_readback_record(device, commands, &frame->readback,
-                            &run->slots[outputs[i].image]->image, &offsets[i]);
-    vkb_barrier_record_host_read(device, commands);
-    return vkb_buffer_flush(device, &frame->uniforms, error)
-        && vkb_commands_run(device, &frame->commands, error)
-        && vkb_buffer_invalidate(device, &frame->readback.staging, error);
+    return scene->serial == data->serial
+        || (vkb_flights_land(run->device, &run->frame->flights, error)
+            && vkb_scene_load(run->device, &run->flight->commands, data, scene, error));
 }
 
 // Stages the image and finds out whether the device has it already.
@@ -475,83 +552,179 @@ static bool stage_input(struct run *run, const struct vkb_input *input, struct v
 {
     bool changed;
 
-    if (!vkb_upload_stage(run->device, &run->frame->upload, input, &changed, error))
-        return false;
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (run->graph->images[i].input)
+        if (run->graph->images[i].input) {
+            if (!resolve(run, i, error))
+                return false;
             run->input = run->slots[i];
-    run->send_input = run->input && (changed || !run->input->valid);
+        }
+    // An image that its last writing did not reach holds nothing to compare with.
+    if (run->input->image.mapped && !run->input->valid)
+        vkb_upload_forget(&run->frame->upload);
+    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->flights, input,
+                          &run->input->image, &changed, error))
+        return false;
+    run->send_input = changed || !run->input->valid;
     return !run->send_input
         || vkb_slot_begin_writing(&run->frame->slots, run->input, NULL, 0, error);
 }
 
-static bool run_frame(struct run *run, const struct vkb_frame_source *source,
-                      const struct vkb_output *outputs, uint32_t output_count, bool *wanted,
-                      VkDeviceSize *offsets, struct vkb_timing *timings, struct vkb_error *error)
+static void record_input(struct run *run)
 {
-    struct vkb_frame *frame = run->frame;
+    if (!run->input->image.mapped)
+        vkb_upload_record(run->device, run->flight->commands.buffer, &run->frame->upload,
+                          &run->input->image);
+    run->input->valid = true;
+}
 
-    if (!frame->commands.pool && !vkb_commands_create(run->device, &frame->commands, error))
+static bool record_point(struct run *run, struct vkb_point *point, struct vkb_error *error)
+{
+    struct vkb_flight *flight = run->flight;
+
+    run->point = point;
+    run->graph = &point->graph;
+    point->timing_count = 0;
+    point->first_span = flight->timer.span_count;
+    if (!mark_current(run, error)
+        || !vkb_plan(run->graph, point->outputs, point->output_count, run->current, run->needed,
+                     run->wanted, error))
         return false;
-    if (source->scene
-        && !vkb_scene_load(run->device, &frame->commands, source->scene, &frame->scene, error))
-        return false;
-    mark_needed(run, outputs, output_count, wanted);
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (wanted[i]
-            && !vkb_slots_resolve(run->device, &frame->slots, &run->graph->images[i],
-                                  &run->slots[i], error))
+        if (run->wanted[i] && !resolve(run, i, error))
             return false;
-    if (source->input && !stage_input(run, source->input, error))
+    if (!record_passes(run, error))
         return false;
-    if (!reserve(run, outputs, output_count, error)
-        || !record_and_run(run, outputs, output_count, offsets, error)
-        || !read_timings(run, timings, error))
-        return false;
-    for (uint32_t i = 0; i < output_count; ++i)
-        vkb_readback_fetch(&frame->readback, offsets[i], &run->slots[outputs[i].image]->image,
-                           &outputs[i]);
-    end_writing(run);
+    for (uint32_t i = 0; i < point->output_count; ++i)
+        vkb_readback_record(run->device, flight->commands.buffer, &flight->readback,
+                            &run->slots[point->outputs[i].image]->image, &point->outputs[i]);
     return true;
 }
 
-// After a failure nothing is known of what the device did: images and commands are made anew.
-static void recover(struct vkb_device *device, struct vkb_frame *frame)
+static bool record_and_submit(struct run *run, struct vkb_point *points, uint32_t point_count,
+                              struct vkb_error *error)
 {
-    if (frame->commands.pool)
-        device->vk.vkDeviceWaitIdle(device->handle);
-    vkb_slots_destroy(device, &frame->slots);
-    vkb_commands_destroy(device, &frame->commands);
+    struct vkb_device *device = run->device;
+    struct vkb_flight *flight = run->flight;
+    VkCommandBuffer commands = flight->commands.buffer;
+
+    if (!vkb_commands_begin(device, &flight->commands, error))
+        return false;
+    vkb_timer_reset(device, commands, &flight->timer);
+    if (run->send_input)
+        record_input(run);
+    for (uint32_t i = 0; i < point_count; ++i)
+        if (!record_point(run, &points[i], error))
+            return false;
+    vkb_barrier_record_host_read(device, commands);
+    return vkb_buffer_flush(device, &flight->uniforms, error)
+        && vkb_flight_submit(device, flight, error);
 }
 
-bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
-                   const struct vkb_frame_source *source, const struct vkb_graph *graph,
-                   const struct vkb_output *outputs, uint32_t output_count,
-                   struct vkb_timing *timings, uint32_t *timing_count, struct vkb_error *error)
+static bool submit(struct run *run, const struct vkb_frame_source *source, struct vkb_point *points,
+                   uint32_t point_count, struct vkb_error *error)
 {
-    struct run run = {.device = device, .frame = frame, .graph = graph};
-    bool *wanted = NULL;
-    VkDeviceSize *offsets = NULL;
+    run->graph = &points[0].graph;
+    return (!source->scene || load_scene(run, source->scene, error))
+        && (!source->input || stage_input(run, source->input, error))
+        && reserve(run, points, point_count, error)
+        && record_and_submit(run, points, point_count, error);
+}
+
+// After a failure nothing is known of what the device did: images and commands are made anew.
+static void recover(const struct vkb_device *device, struct vkb_frame *frame,
+                    struct vkb_flight *flight)
+{
+    device->vk.vkDeviceWaitIdle(device->handle);
+    vkb_slots_destroy(device, &frame->slots);
+    vkb_commands_destroy(device, &flight->commands);
+}
+
+bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
+                      const struct vkb_frame_source *source, struct vkb_point *points,
+                      uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error)
+{
+    struct run run = {.device = device, .frame = frame};
+    const uint32_t image_count = points[0].graph.image_count;
+    uint32_t pass_count = 0;
     bool done;
 
-    *timing_count = 0;
-    if (output_count == 0)
-        return true;
-    done = (run.slots = vkb_alloc(error, graph->image_count, sizeof *run.slots))
-        && (run.needed = vkb_alloc(error, graph->pass_count, sizeof *run.needed))
-        && (run.ran = vkb_alloc(error, graph->pass_count, sizeof *run.ran))
-        && (wanted = vkb_alloc(error, graph->image_count, sizeof *wanted))
-        && (offsets = vkb_alloc(error, output_count, sizeof *offsets))
-        && run_frame(&run, source, outputs, output_count, wanted, offsets, timings, error);
-    if (done)
-        *timing_count = run.ran_count;
-    else
-        recover(device, frame);
+    for (uint32_t i = 0; i < point_count; ++i)
+        if (points[i].graph.pass_count > pass_count)
+            pass_count = points[i].graph.pass_count;
+    if (!vkb_flights_take(device, &frame->flights, &run.flight, error))
+        return false;
+    done = (run.slots = vkb_alloc(error, image_count, sizeof *run.slots))
+        && (run.wanted = vkb_alloc(error, image_count, sizeof *run.wanted))
+        && (run.needed = vkb_alloc(error, pass_count, sizeof *run.needed))
+        && (run.current = vkb_alloc(error, pass_count, sizeof *run.current))
+        && submit(&run, source, points, point_count, error);
     vkb_free(run.slots);
+    vkb_free(run.wanted);
     vkb_free(run.needed);
-    vkb_free(run.ran);
+    vkb_free(run.current);
     vkb_free(run.recipe);
-    vkb_free(wanted);
-    vkb_free(offsets);
+    if (done) {
+        run.flight->points = points;
+        run.flight->point_count = point_count;
+        *flight = run.flight;
+    } else {
+        recover(device, frame, run.flight);
+        vkb_flights_give_back(device, &frame->flights, run.flight);
+    }
     return done;
+}
+
+// Times of the same name are of steps of one thing: they become one.
+static void merge_timings(struct vkb_point *point)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < point->timing_count; ++i) {
+        uint32_t at = 0;
+        while (at < count && strcmp(point->timings[at].name, point->timings[i].name) != 0)
+            ++at;
+        if (at < count)
+            point->timings[at].seconds += point->timings[i].seconds;
+        else
+            point->timings[count++] = point->timings[i];
+    }
+    point->timing_count = count;
+}
+
+// What the device has left for the points of a flight that is over.
+static void fetch(const struct vkb_device *device, const struct vkb_flight *flight)
+{
+    for (uint32_t i = 0; i < flight->point_count; ++i) {
+        struct vkb_point *point = &flight->points[i];
+        for (uint32_t timing = 0; timing < point->timing_count; ++timing)
+            point->timings[timing].seconds =
+                vkb_timer_seconds(device, &flight->timer, point->first_span + timing);
+        merge_timings(point);
+        for (uint32_t output = 0; output < point->output_count; ++output)
+            vkb_readback_fetch(&flight->readback, &point->outputs[output]);
+    }
+}
+
+bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
+                       struct vkb_flight *flight, struct vkb_error *error)
+{
+    bool done = vkb_flight_wait(device, flight, error)
+             && vkb_readback_end(device, &flight->readback, error)
+             && vkb_timer_fetch(device, &flight->timer, error);
+
+    if (done)
+        fetch(device, flight);
+    else
+        recover(device, frame, flight);
+    vkb_flights_give_back(device, &frame->flights, flight);
+    return done;
+}
+
+void vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight)
+{
+    struct vkb_error error;
+
+    if (!vkb_flight_wait(device, flight, &error))
+        recover(device, frame, flight);
+    vkb_flights_give_back(device, &frame->flights, flight);
 }

@@ -1,32 +1,26 @@
-// Runs a graph: what is out of date is recorded, timed, submitted and waited for, and the images
-// that are wanted come back to the host.
+// Runs graphs: what is out of date is recorded, timed and submitted; later it is waited for, and
+// the images that are wanted come back to the host.
 #ifndef VKB_FRAME_H
 #define VKB_FRAME_H
 
-#include "commands.h"
+#include "flight.h"
 #include "graph.h"
 #include "pipeline.h"
-#include "readback.h"
 #include "scene.h"
 #include "slots.h"
-#include "timing.h"
 #include "upload.h"
 
-// Everything that lives from frame to frame.
+// Everything that lives from frame to frame. What the flights share is changed by the device in the
+// order of the submissions, and by the host only when nothing is in the air.
 struct vkb_frame {
-    struct vkb_commands commands;
+    struct vkb_flights flights;
     struct vkb_pipelines pipelines;
     struct vkb_scene scene;
     struct vkb_upload upload;
-    struct vkb_readback readback;
-    struct vkb_buffer uniforms;
-    struct vkb_timer timer;
     struct vkb_slots slots;
-    VkDescriptorPool descriptors;
-    uint32_t descriptor_capacity;  // in sets
 };
 
-// What a graph starts from; what it does not use is NULL.
+// What graphs start from; what they do not use is NULL.
 struct vkb_frame_source {
     const struct vkb_scene_data *scene;
     const struct vkb_input *input;
@@ -42,13 +36,30 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
                       struct vkb_frame *frame, struct vkb_error *error);
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame);
 
-// Runs what the outputs need of the graph and is out of date, then fills the outputs. `timings` has
-// room for every pass of the graph and gets the render passes that ran. `scene` is what the graph
-// draws, NULL for one that draws no scene. A failed run leaves the frame usable, unless the device
-// is lost.
-bool vkb_frame_run(struct vkb_device *device, struct vkb_frame *frame,
-                   const struct vkb_frame_source *source, const struct vkb_graph *graph,
-                   const struct vkb_output *outputs, uint32_t output_count,
-                   struct vkb_timing *timings, uint32_t *timing_count, struct vkb_error *error);
+// One graph to run. `timings` has room for every pass of the graph and gets the render passes that
+// ran. All of it must stay where it is until the flight is over.
+struct vkb_point {
+    struct vkb_graph graph;
+    struct vkb_output *outputs;
+    uint32_t output_count;
+    struct vkb_timing *timings;
+    uint32_t timing_count;
+    uint32_t first_span;  // of its timings, in the flight's timer
+};
+
+// Records what the points' outputs need and is out of date, point after point, and hands it to the
+// device. All points have the same images (vkb_graph_same_images). The source is read before this
+// returns. A failure leaves no flight, the frame usable, unless the device is lost, and earlier
+// flights as they were.
+bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
+                      const struct vkb_frame_source *source, struct vkb_point *points,
+                      uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error);
+
+// Waits for the flight and fills its points' outputs and timings. The flight is over in any case.
+bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
+                       struct vkb_flight *flight, struct vkb_error *error);
+
+// Waits for a flight that nobody wants any more.
+void vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight);
 
 #endif

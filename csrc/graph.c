@@ -39,9 +39,24 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
     return true;
 }
 
-static bool same_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
+bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
 {
-    return a->target_count == b->target_count && a->depth == b->depth
+    if (a->image_count != b->image_count)
+        return false;
+    for (uint32_t i = 0; i < a->image_count; ++i) {
+        const struct vkb_image_row *x = &a->images[i], *y = &b->images[i];
+        if (x->format != y->format || x->width != y->width || x->height != y->height
+            || strcmp(x->name, y->name) != 0)
+            return false;
+    }
+    return true;
+}
+
+static bool share_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
+{
+    return !a->alternative && !b->alternative && a->geometry != VKB_GEOMETRY_DISPATCH
+        && b->geometry != VKB_GEOMETRY_DISPATCH && a->target_count == b->target_count
+        && a->depth == b->depth
         && memcmp(a->targets, b->targets, a->target_count * sizeof a->targets[0]) == 0;
 }
 
@@ -49,7 +64,7 @@ uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first)
 {
     uint32_t end = first + 1;
 
-    while (end < graph->pass_count && same_targets(&graph->passes[first], &graph->passes[end]))
+    while (end < graph->pass_count && share_targets(&graph->passes[first], &graph->passes[end]))
         ++end;
     return end;
 }
@@ -62,7 +77,7 @@ static bool reads(const struct vkb_pass_row *pass, uint32_t image)
     return false;
 }
 
-static bool writes(const struct vkb_pass_row *pass, uint32_t image)
+bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
 {
     for (uint32_t i = 0; i < pass->target_count; ++i)
         if (pass->targets[i] == image)
@@ -70,11 +85,18 @@ static bool writes(const struct vkb_pass_row *pass, uint32_t image)
     return pass->depth == image;
 }
 
+enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
+{
+    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
+        return VKB_ACCESS_SAMPLED;
+    return pass->loads ? VKB_ACCESS_DISPATCH_LOADED : VKB_ACCESS_DISPATCH_SAMPLED;
+}
+
 enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (reads(&graph->passes[i], image))
-            return VKB_ACCESS_SAMPLED;
+            return vkb_pass_reads_as(&graph->passes[i]);
     return graph->images[image].format == VKB_FORMAT_DEPTH32_FLOAT ? VKB_ACCESS_DEPTH_TARGET
                                                                    : VKB_ACCESS_COPY_SOURCE;
 }
@@ -123,7 +145,7 @@ uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
 static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
 {
     for (uint32_t i = 0; i < pass_index; ++i)
-        if (writes(&graph->passes[i], image))
+        if (vkb_pass_writes(&graph->passes[i], image))
             return true;
     return graph->images[image].input;
 }
@@ -167,9 +189,10 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
                         pass->name);
     // Earlier writers may only be those that share this pass's render pass.
     for (uint32_t i = pass_index; i-- > 0;) {
-        if (vkb_graph_group_end(graph, i) > pass_index)
+        if (vkb_graph_group_end(graph, i) > pass_index
+            || (pass->alternative && i == pass_index - 1))
             continue;
-        if (writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
+        if (vkb_pass_writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
             return vkb_fail(error, VKB_ERROR_GENERAL,
                             "graph: pass %s writes %s, which pass %s used before", pass->name,
                             row->name, graph->passes[i].name);
@@ -183,8 +206,16 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
 
     if (pass->target_count > VKB_MAX_TARGETS || pass->read_count > VKB_MAX_READS
         || pass->constant_count > VKB_MAX_CONSTANTS
-        || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE))
+        || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
+        || (pass->geometry == VKB_GEOMETRY_DISPATCH
+            && (pass->target_count != 1 || pass->depth != VKB_NO_IMAGE || pass->blend
+                || pass->block_width == 0 || pass->block_height == 0)))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
+                        pass->name);
+    if (pass->alternative
+        && (index == 0 || pass->target_count != 1
+            || graph->passes[index - 1].targets[0] != pass->targets[0]))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s is an alternative to nothing",
                         pass->name);
     if (pass->textured && (pass->read_count > 0 || !vkb_is_mesh(pass->geometry)))
         return vkb_fail(error, VKB_ERROR_GENERAL,

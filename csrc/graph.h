@@ -12,7 +12,7 @@ enum {
     VKB_NAME_SIZE = 32,
     VKB_MAX_READS = GATHERED_LEVELS,
     VKB_MAX_TARGETS = 4,
-    VKB_MAX_CONSTANTS = 5,
+    VKB_MAX_CONSTANTS = 7,
 };
 
 #define VKB_NO_IMAGE UINT32_MAX
@@ -28,12 +28,14 @@ struct vkb_image_row {
     bool input;         // filled by the host, not by a pass
 };
 
-// What a pass draws; the depth test and the culling follow from it.
+// What a pass draws; the depth test and the culling follow from it. A dispatch draws nothing: a
+// compute shader writes the one target, a block of pixels each workgroup.
 enum vkb_geometry {
     VKB_GEOMETRY_FULLSCREEN,
     VKB_GEOMETRY_SKYBOX,
     VKB_GEOMETRY_BODY,
     VKB_GEOMETRY_GLOW,
+    VKB_GEOMETRY_DISPATCH,
 };
 
 static inline bool vkb_is_mesh(enum vkb_geometry geometry)
@@ -44,18 +46,22 @@ static inline bool vkb_is_mesh(enum vkb_geometry geometry)
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
 enum vkb_blend { VKB_BLEND_NONE, VKB_BLEND_ADD };
 
-// Bindings: 0 the parameter block, then the images read in their order; a skybox reads the scene's
-// cubemap at binding 1, textured triangles the base colour's texture and the emission's. Passes
-// that follow each other with the same targets share a render pass; the first one's load op counts.
+// Bindings: 0 the parameter block, then the images read in their order, then the target of a
+// dispatch; a skybox reads the scene's cubemap at binding 1, textured triangles the base colour's
+// texture and the emission's. Passes that draw and follow each other with the same targets share a
+// render pass; the first one's load op counts.
 struct vkb_pass_row {
     char name[VKB_NAME_SIZE];
     enum vkb_geometry geometry;
     bool textured;  // draws the mesh's triangles that have textures, not those that have none
-    enum vkb_shader vertex, fragment;
+    enum vkb_shader vertex, shader;        // a dispatch has no vertex shader
     int32_t constants[VKB_MAX_CONSTANTS];  // specialization constants 0, 1, ...
     uint32_t constant_count;
     uint32_t reads[VKB_MAX_READS];
     uint32_t read_count;
+    bool loads;        // a dispatch that reads storage images, without a sampler
+    bool alternative;  // may run in place of the pass before it, which has the same target
+    uint32_t block_width, block_height;  // of a dispatch: the pixels that a workgroup writes
     uint32_t targets[VKB_MAX_TARGETS];
     uint32_t target_count;
     uint32_t depth;  // VKB_NO_IMAGE: none
@@ -84,10 +90,18 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
 // Every rule that the rows must keep, so that nothing but a right graph reaches Vulkan.
 bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_size, struct vkb_error *error);
 
+// Whether both have the same images, in the same order; their passes may differ.
+bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b);
+
 // The index after the last pass that shares a render pass with pass `first`.
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 
-// Where an image rests between frames: sampled if any pass reads it, else ready to be copied out;
+bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
+
+// How a pass reads its images.
+enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass);
+
+// Where an image rests between frames: as its first reader reads it, else ready to be copied out;
 // depth that no pass reads stays an attachment.
 enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image);
 

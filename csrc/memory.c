@@ -10,6 +10,9 @@ static const struct memory_wish {
     // Reading memory that the host does not cache is a hundred times slower.
     [VKB_MEMORY_READBACK] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT,
                              VK_MEMORY_PROPERTY_HOST_CACHED_BIT},
+    [VKB_MEMORY_SHARED] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT
+                               | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT,
+                           VK_MEMORY_PROPERTY_HOST_CACHED_BIT},
 };
 
 // The first fitting type with the wanted flags, else the first fitting one at all.
@@ -97,6 +100,86 @@ bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind ki
     return vkb_buffer_create(device, kind, usage, size, buffer, error);
 }
 
+// The first coherent type of the host memory's; UINT32_MAX where there is none.
+static uint32_t find_import_type(const struct vkb_device *device, void *memory, uint32_t allowed)
+{
+    VkMemoryHostPointerPropertiesEXT properties = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT,
+    };
+
+    if (device->vk.vkGetMemoryHostPointerPropertiesEXT(
+            device->handle, VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, memory,
+            &properties)
+        != VK_SUCCESS)
+        return UINT32_MAX;
+    for (uint32_t i = 0; i < device->memory.memoryTypeCount; ++i)
+        if ((allowed & properties.memoryTypeBits) >> i & 1
+            && device->memory.memoryTypes[i].propertyFlags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT)
+            return i;
+    return UINT32_MAX;
+}
+
+static bool import_memory(const struct vkb_device *device, void *memory, struct vkb_buffer *buffer,
+                          struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    VkMemoryRequirements requirements;
+
+    vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
+    const uint32_t type = find_import_type(device, memory, requirements.memoryTypeBits);
+    if (type == UINT32_MAX || requirements.size > buffer->size)
+        return false;
+    return VK(error,
+              vk->vkAllocateMemory(
+                  device->handle,
+                  &(VkMemoryAllocateInfo){
+                      .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                      .pNext =
+                          &(VkImportMemoryHostPointerInfoEXT){
+                              .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
+                              .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+                              .pHostPointer = memory,
+                          },
+                      .allocationSize = buffer->size,
+                      .memoryTypeIndex = type,
+                  },
+                  NULL, &buffer->memory))
+        && VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0));
+}
+
+bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage, void *memory,
+                       size_t size, struct vkb_buffer *buffer, VkDeviceSize *offset)
+{
+    const VkDeviceSize align = device->import_alignment;
+    struct vkb_error ignored;
+
+    *buffer = (struct vkb_buffer){0};
+    if (align == 0)
+        return false;
+    *offset = (uintptr_t)memory % align;
+    buffer->size = (*offset + size + align - 1) / align * align;
+    if (!VK(&ignored,
+            device->vk.vkCreateBuffer(
+                device->handle,
+                &(VkBufferCreateInfo){
+                    .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                    .pNext =
+                        &(VkExternalMemoryBufferCreateInfo){
+                            .sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
+                            .handleTypes = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+                        },
+                    .size = buffer->size,
+                    .usage = usage,
+                },
+                NULL, &buffer->handle))
+        || !import_memory(device, (char *)memory - *offset, buffer, &ignored)) {
+        vkb_buffer_destroy(device, buffer);
+        return false;
+    }
+    buffer->coherent = true;
+    return true;
+}
+
 static VkMappedMemoryRange whole_range(const struct vkb_buffer *buffer)
 {
     return (VkMappedMemoryRange){
@@ -124,24 +207,32 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
         || VK(error, device->vk.vkInvalidateMappedMemoryRanges(device->handle, 1, &range));
 }
 
+// What the host writes to a new image before the device's first access stays there.
+static VkImageLayout initial_layout(bool mapped)
+{
+    return mapped ? VK_IMAGE_LAYOUT_PREINITIALIZED : VK_IMAGE_LAYOUT_UNDEFINED;
+}
+
 static bool create_handle(const struct vkb_device *device, const struct vkb_image_spec *spec,
                           struct vkb_image *image, struct vkb_error *error)
 {
-    return VK(error, device->vk.vkCreateImage(
-                         device->handle,
-                         &(VkImageCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
-                             .flags = spec->layers == 6 ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
-                             .imageType = VK_IMAGE_TYPE_2D,
-                             .format = vkb_formats[spec->format].vk,
-                             .extent = {spec->width, spec->height, 1},
-                             .mipLevels = spec->levels,
-                             .arrayLayers = spec->layers,
-                             .samples = VK_SAMPLE_COUNT_1_BIT,
-                             .tiling = VK_IMAGE_TILING_OPTIMAL,
-                             .usage = spec->usage,
-                         },
-                         NULL, &image->handle));
+    return VK(error,
+              device->vk.vkCreateImage(
+                  device->handle,
+                  &(VkImageCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                      .flags = spec->layers == 6 ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
+                      .imageType = VK_IMAGE_TYPE_2D,
+                      .format = vkb_formats[spec->format].vk,
+                      .extent = {spec->width, spec->height, 1},
+                      .mipLevels = spec->levels,
+                      .arrayLayers = spec->layers,
+                      .samples = VK_SAMPLE_COUNT_1_BIT,
+                      .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR : VK_IMAGE_TILING_OPTIMAL,
+                      .usage = spec->usage,
+                      .initialLayout = initial_layout(spec->mapped),
+                  },
+                  NULL, &image->handle));
 }
 
 static VkImageSubresourceRange whole_image(const struct vkb_image *image)
@@ -169,6 +260,22 @@ static bool create_view(const struct vkb_device *device, struct vkb_image *image
                          NULL, &image->view));
 }
 
+static bool map_image(const struct vkb_device *device, struct vkb_image *image,
+                      struct vkb_error *error)
+{
+    VkSubresourceLayout layout;
+
+    device->vk.vkGetImageSubresourceLayout(
+        device->handle, image->handle,
+        &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
+    if (!VK(error, device->vk.vkMapMemory(device->handle, image->memory, 0, VK_WHOLE_SIZE, 0,
+                                          &image->mapped)))
+        return false;
+    image->mapped = (char *)image->mapped + layout.offset;
+    image->row_pitch = (size_t)layout.rowPitch;
+    return true;
+}
+
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error)
 {
@@ -186,8 +293,10 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
     if (!create_handle(device, spec, image, error))
         return false;
     vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
-    if (!allocate(device, VKB_MEMORY_DEVICE, &requirements, &image->memory, &flags, error)
+    if (!allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE, &requirements,
+                  &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
+        || (spec->mapped && !map_image(device, image, error))
         || !create_view(device, image, error)) {
         vkb_image_destroy(device, image);
         return false;
@@ -203,11 +312,20 @@ void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
     *image = (struct vkb_image){0};
 }
 
+VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access)
+{
+    return !image->mapped            ? vkb_access_layout(access)
+         : access == VKB_ACCESS_NONE ? initial_layout(true)
+                                     : VK_IMAGE_LAYOUT_GENERAL;
+}
+
 void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer commands,
                           struct vkb_image *image, enum vkb_access access)
 {
     vkb_barrier_record(device, commands,
                        &(VkImageMemoryBarrier){
+                           .oldLayout = vkb_image_layout(image, image->access),
+                           .newLayout = vkb_image_layout(image, access),
                            .image = image->handle,
                            .subresourceRange = whole_image(image),
                        },

@@ -57,7 +57,7 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragmen
     snprintf(row.name, sizeof row.name, "%s", name);
     row.geometry = VKB_GEOMETRY_FULLSCREEN;
     row.vertex = VKB_SHADER_fullscreen_vert;
-    row.fragment = fragment;
+    row.shader = fragment;
     row.targets[0] = target;
     row.target_count = 1;
     row.depth = VKB_NO_IMAGE;

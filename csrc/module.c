@@ -202,10 +202,11 @@ static int execute(PyObject *module)
     }
     state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
     state->renderer_type = PyType_FromModuleAndSpec(module, &vkb_renderer_spec, NULL);
-    if (!state->renderer_type
+    state->batch_type = PyType_FromModuleAndSpec(module, &vkb_batch_spec, NULL);
+    if (!state->renderer_type || !state->batch_type
         || PyModule_AddObjectRef(module, "Renderer", state->renderer_type) < 0)
         return -1;
-    return add_steal(module, "VALUES", value_table())
+    return vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
                 && add_steal(module, "CHOICES", choice_table())
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
@@ -218,6 +219,9 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     struct vkb_module_state *state = vkb_module_state(module);
 
     Py_VISIT(state->renderer_type);
+    Py_VISIT(state->batch_type);
+    Py_VISIT(state->attributes);
+    Py_VISIT(state->lacking);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
     return 0;
@@ -228,6 +232,9 @@ static int clear(PyObject *module)
     struct vkb_module_state *state = vkb_module_state(module);
 
     Py_CLEAR(state->renderer_type);
+    Py_CLEAR(state->batch_type);
+    Py_CLEAR(state->attributes);
+    Py_CLEAR(state->lacking);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);
     return 0;

@@ -1,17 +1,20 @@
-// What the files that speak Python share: module.c, renderer.c, arguments.c, scene_arguments.c,
-// describe.c. The only header of the core that includes Python.h.
+// What the files that speak Python share: module.c, renderer.c, batch.c, arguments.c,
+// scene_arguments.c, describe.c. The only header of the core that includes Python.h.
 #ifndef VKB_MODULE_H
 #define VKB_MODULE_H
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
+#include "forms.h"
+#include "frame.h"
 #include "methods.h"
-#include "upload.h"
 
 struct vkb_module_state {
-    PyObject *renderer_type;
+    PyObject *renderer_type, *batch_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
+    PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
+    PyObject *lacking;  // dict of type to bytes: which of those its objects lack
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);
@@ -22,10 +25,31 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 // (name, type, driver, driver_info, api_version, driver UUID as bytes)
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
-extern PyType_Spec vkb_renderer_spec;
+extern PyType_Spec vkb_renderer_spec, vkb_batch_spec;
 
-// A settings object's attributes; one that it lacks keeps its default. False with an exception set.
-bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
+struct vkb_renderer {
+    PyObject_HEAD
+    PyThread_type_lock lock;  // held, without the GIL, around all that touches the device
+    bool open;
+    enum vkb_forms forms;
+    struct vkb_device device;
+    struct vkb_frame frame;
+};
+
+// Fails where the renderer is closed or its device lost.
+bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *error);
+
+// Methods of the Renderer: a new Batch of points of one scene or of one image.
+PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_batch_of_image(PyObject *renderer, PyObject *arguments);
+
+// Makes what vkb_read_settings keeps in the state; false with an exception set.
+bool vkb_make_attributes(struct vkb_module_state *state);
+
+// A settings object's attributes; one that it lacks keeps its default. Objects of one type have the
+// same attributes. False with an exception set.
+bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
+                       struct vkb_settings *settings);
 
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);

@@ -20,8 +20,9 @@ struct vkb_render_pass_entry {
 };
 
 struct pipeline_key {
-    enum vkb_shader vertex, fragment;
+    enum vkb_shader vertex, shader;
     enum vkb_geometry geometry;
+    enum vkb_binding_kind bindings;
     bool textured;
     enum vkb_blend blend;
     uint32_t target_count;
@@ -53,42 +54,71 @@ static bool create_sampler(const struct vkb_device *device, VkSampler *sampler,
                                          NULL, sampler));
 }
 
+static const struct binding_kind {
+    VkDescriptorType read;
+    bool target;
+    VkShaderStageFlags parameter_stages, image_stages;
+} binding_kinds[VKB_BINDING_KINDS] = {
+    [VKB_BINDINGS_DRAW] =
+        {
+            .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .parameter_stages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT,
+            .image_stages = VK_SHADER_STAGE_FRAGMENT_BIT,
+        },
+    [VKB_BINDINGS_DISPATCH] =
+        {
+            .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .target = true,
+            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+        },
+    [VKB_BINDINGS_LOAD] =
+        {
+            .read = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .target = true,
+            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+        },
+};
+
 static bool create_layouts(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                           uint32_t images, struct vkb_error *error)
+                           enum vkb_binding_kind kind, uint32_t images, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
-    VkDescriptorSetLayoutBinding bindings[VKB_MAX_READS + 1] = {
+    const struct binding_kind *types = &binding_kinds[kind];
+    VkDescriptorSetLayoutBinding bindings[VKB_MAX_READS + 2] = {
         {
             .binding = 0,
             .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
             .descriptorCount = 1,
-            .stageFlags = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT,
+            .stageFlags = types->parameter_stages,
         },
     };
+    const uint32_t count = 1 + images + types->target;
 
-    for (uint32_t i = 1; i <= images; ++i)
+    for (uint32_t i = 1; i < count; ++i)
         bindings[i] = (VkDescriptorSetLayoutBinding){
             .binding = i,
-            .descriptorType = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .descriptorType = i <= images ? types->read : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
             .descriptorCount = 1,
-            .stageFlags = VK_SHADER_STAGE_FRAGMENT_BIT,
+            .stageFlags = types->image_stages,
         };
     return VK(error, vk->vkCreateDescriptorSetLayout(
                          device->handle,
                          &(VkDescriptorSetLayoutCreateInfo){
                              .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-                             .bindingCount = images + 1,
+                             .bindingCount = count,
                              .pBindings = bindings,
                          },
-                         NULL, &pipelines->set_layouts[images]))
+                         NULL, &pipelines->set_layouts[kind][images]))
         && VK(error,
               vk->vkCreatePipelineLayout(device->handle,
                                          &(VkPipelineLayoutCreateInfo){
                                              .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
                                              .setLayoutCount = 1,
-                                             .pSetLayouts = &pipelines->set_layouts[images],
+                                             .pSetLayouts = &pipelines->set_layouts[kind][images],
                                          },
-                                         NULL, &pipelines->layouts[images]));
+                                         NULL, &pipelines->layouts[kind][images]));
 }
 
 bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_data,
@@ -106,8 +136,9 @@ bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_dat
                               NULL, &pipelines->cache))
              && create_sampler(device, &pipelines->sampler, error);
 
-    for (uint32_t images = 0; done && images <= VKB_MAX_READS; ++images)
-        done = create_layouts(device, pipelines, images, error);
+    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
+        for (uint32_t images = 0; done && images <= VKB_MAX_READS; ++images)
+            done = create_layouts(device, pipelines, (enum vkb_binding_kind)kind, images, error);
     if (!done)
         vkb_pipelines_destroy(device, pipelines);
     return done;
@@ -121,10 +152,11 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
         vk->vkDestroyPipeline(device->handle, pipelines->entries[i].handle, NULL);
     for (size_t i = 0; i < pipelines->render_pass_count; ++i)
         vk->vkDestroyRenderPass(device->handle, pipelines->render_passes[i].handle, NULL);
-    for (uint32_t i = 0; i <= VKB_MAX_READS; ++i) {
-        vk->vkDestroyPipelineLayout(device->handle, pipelines->layouts[i], NULL);
-        vk->vkDestroyDescriptorSetLayout(device->handle, pipelines->set_layouts[i], NULL);
-    }
+    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
+        for (uint32_t i = 0; i <= VKB_MAX_READS; ++i) {
+            vk->vkDestroyPipelineLayout(device->handle, pipelines->layouts[kind][i], NULL);
+            vk->vkDestroyDescriptorSetLayout(device->handle, pipelines->set_layouts[kind][i], NULL);
+        }
     for (uint32_t i = 0; i < VKB_SHADER_COUNT; ++i)
         vk->vkDestroyShaderModule(device->handle, pipelines->modules[i], NULL);
     vk->vkDestroySampler(device->handle, pipelines->sampler, NULL);
@@ -303,13 +335,36 @@ static const VkPipelineColorBlendAttachmentState blend_states[] = {
         },
 };
 
-static bool create_pipeline(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                            const struct vkb_pass_row *pass, VkRenderPass render_pass,
-                            VkPipeline *pipeline, struct vkb_error *error)
+static bool create_compute(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                           const struct vkb_pass_row *pass, const VkSpecializationInfo *constants,
+                           VkPipeline *pipeline, struct vkb_error *error)
+{
+    VkShaderModule module;
+
+    return get_module(device, pipelines, pass->shader, &module, error)
+        && VK(error, device->vk.vkCreateComputePipelines(
+                         device->handle, pipelines->cache, 1,
+                         &(VkComputePipelineCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                             .stage =
+                                 {
+                                     .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                                     .stage = VK_SHADER_STAGE_COMPUTE_BIT,
+                                     .module = module,
+                                     .pName = "main",
+                                     .pSpecializationInfo = constants,
+                                 },
+                             .layout = vkb_pipelines_layout(pipelines, pass),
+                         },
+                         NULL, pipeline));
+}
+
+static bool create_graphics(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                            const struct vkb_pass_row *pass, const VkSpecializationInfo *constants,
+                            VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
     const bool is_mesh = vkb_is_mesh(pass->geometry);
-    VkSpecializationMapEntry map[VKB_MAX_CONSTANTS];
     VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
     const uint32_t bindings = pass->textured ? VKB_VERTEX_BINDINGS : is_mesh;
     const uint32_t attributes =
@@ -317,19 +372,10 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
     VkShaderModule vertex, fragment;
 
     if (!get_module(device, pipelines, pass->vertex, &vertex, error)
-        || !get_module(device, pipelines, pass->fragment, &fragment, error))
+        || !get_module(device, pipelines, pass->shader, &fragment, error))
         return false;
-    for (uint32_t i = 0; i < pass->constant_count; ++i)
-        map[i] = (VkSpecializationMapEntry){i, i * (uint32_t)sizeof(int32_t), sizeof(int32_t)};
     for (uint32_t i = 0; i < pass->target_count; ++i)
         blends[i] = blend_states[pass->blend];
-
-    VkSpecializationInfo constants = {
-        .mapEntryCount = pass->constant_count,
-        .pMapEntries = map,
-        .dataSize = sizeof pass->constants,
-        .pData = pass->constants,
-    };
     return VK(error,
               device->vk.vkCreateGraphicsPipelines(
                   device->handle, pipelines->cache, 1,
@@ -349,7 +395,7 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
                                   .stage = VK_SHADER_STAGE_FRAGMENT_BIT,
                                   .module = fragment,
                                   .pName = "main",
-                                  .pSpecializationInfo = &constants,
+                                  .pSpecializationInfo = constants,
                               },
                           },
                       .pVertexInputState =
@@ -404,10 +450,29 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
                               .pDynamicStates = (VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT,
                                                                    VK_DYNAMIC_STATE_SCISSOR},
                           },
-                      .layout = pipelines->layouts[vkb_pass_descriptor_images(pass)],
+                      .layout = vkb_pipelines_layout(pipelines, pass),
                       .renderPass = render_pass,
                   },
                   NULL, pipeline));
+}
+
+static bool create_pipeline(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                            const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                            VkPipeline *pipeline, struct vkb_error *error)
+{
+    VkSpecializationMapEntry map[VKB_MAX_CONSTANTS];
+
+    for (uint32_t i = 0; i < pass->constant_count; ++i)
+        map[i] = (VkSpecializationMapEntry){i, i * (uint32_t)sizeof(int32_t), sizeof(int32_t)};
+    VkSpecializationInfo constants = {
+        .mapEntryCount = pass->constant_count,
+        .pMapEntries = map,
+        .dataSize = sizeof pass->constants,
+        .pData = pass->constants,
+    };
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH)
+        return create_compute(device, pipelines, pass, &constants, pipeline, error);
+    return create_graphics(device, pipelines, pass, &constants, render_pass, pipeline, error);
 }
 
 bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
@@ -418,8 +483,9 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
 
     memset(&key, 0, sizeof key);
     key.vertex = pass->vertex;
-    key.fragment = pass->fragment;
+    key.shader = pass->shader;
     key.geometry = pass->geometry;
+    key.bindings = vkb_pass_binding_kind(pass);
     key.textured = pass->textured;
     key.blend = pass->blend;
     key.target_count = pass->target_count;
@@ -445,4 +511,29 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
 {
     return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
+}
+
+enum vkb_binding_kind vkb_pass_binding_kind(const struct vkb_pass_row *pass)
+{
+    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
+        return VKB_BINDINGS_DRAW;
+    return pass->loads ? VKB_BINDINGS_LOAD : VKB_BINDINGS_DISPATCH;
+}
+
+VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
+{
+    return pass->geometry == VKB_GEOMETRY_DISPATCH ? VK_PIPELINE_BIND_POINT_COMPUTE
+                                                   : VK_PIPELINE_BIND_POINT_GRAPHICS;
+}
+
+VkDescriptorSetLayout vkb_pipelines_set_layout(const struct vkb_pipelines *pipelines,
+                                               const struct vkb_pass_row *pass)
+{
+    return pipelines->set_layouts[vkb_pass_binding_kind(pass)][vkb_pass_descriptor_images(pass)];
+}
+
+VkPipelineLayout vkb_pipelines_layout(const struct vkb_pipelines *pipelines,
+                                      const struct vkb_pass_row *pass)
+{
+    return pipelines->layouts[vkb_pass_binding_kind(pass)][vkb_pass_descriptor_images(pass)];
 }

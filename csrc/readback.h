@@ -1,4 +1,5 @@
-// Images back to the host: copied to staging memory by the device, from there to the caller.
+// Images back to the host: copied by the device straight to the caller's memory where it can have
+// that, else to staging memory and by the host from there.
 #ifndef VKB_READBACK_H
 #define VKB_READBACK_H
 
@@ -10,27 +11,43 @@ struct vkb_output {
     uint32_t image;  // in the graph
     uint32_t channels;
     void *memory;
+    // What vkb_readback_plan decides.
+    enum vkb_format format;
+    size_t pixels;
+    VkBuffer imported;    // the caller's memory as a buffer; VK_NULL_HANDLE: through the staging
+    VkDeviceSize offset;  // in either
 };
 
 struct vkb_readback {
     struct vkb_buffer staging;
-    VkDeviceSize used;
+    VkDeviceSize used;           // of the staging memory
+    struct vkb_buffer *imports;  // of the callers' memory, until vkb_readback_release
+    size_t import_count, import_capacity;
 };
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback);
 
-// Makes room for images of `size` bytes in all (by vkb_readback_size) and forgets the last copies.
-bool vkb_readback_begin(const struct vkb_device *device, struct vkb_readback *readback,
-                        VkDeviceSize size, struct vkb_error *error);
-VkDeviceSize vkb_readback_size(enum vkb_format format, uint32_t width, uint32_t height);
+// Decides how the output, an image of that format and size, comes back.
+bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
+                       enum vkb_format format, uint32_t width, uint32_t height,
+                       struct vkb_output *output, struct vkb_error *error);
+// After all of them: makes room for what goes through the staging memory.
+bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
+                          struct vkb_error *error);
 
-// Records the copy of an image; *offset is where vkb_readback_fetch finds it.
+// Records the copy of the output's image.
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
-                         struct vkb_readback *readback, struct vkb_image *image,
-                         VkDeviceSize *offset);
+                         const struct vkb_readback *readback, struct vkb_image *image,
+                         const struct vkb_output *output);
 
-// After the device is done and vkb_buffer_invalidate: the pixels to the caller's memory.
-void vkb_readback_fetch(const struct vkb_readback *readback, VkDeviceSize offset,
-                        const struct vkb_image *image, const struct vkb_output *output);
+// Once the device is done, before the first fetch.
+bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
+                      struct vkb_error *error);
+
+// The pixels to the caller's memory, whatever has become of the image since.
+void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output);
+
+// Lets go of the callers' memory and forgets what was planned; the device must be done.
+void vkb_readback_release(const struct vkb_device *device, struct vkb_readback *readback);
 
 #endif

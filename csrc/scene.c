@@ -120,6 +120,16 @@ static bool load_textures(const struct vkb_device *device, VkCommandBuffer comma
     return true;
 }
 
+static bool check_indices(const struct vkb_mesh_data *data, struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < data->index_count; ++i)
+        if (data->indices[i] >= data->vertex_count)
+            return vkb_fail(error, VKB_ERROR_VALUE,
+                            "scene: index %u is beyond the mesh's %u vertices", data->indices[i],
+                            data->vertex_count);
+    return true;
+}
+
 bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
                     const struct vkb_scene_data *data, struct vkb_scene *scene,
                     struct vkb_error *error)
@@ -128,6 +138,8 @@ bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
 
     if (scene->serial == data->serial)
         return true;
+    if (!check_indices(&data->body, error) || !check_indices(&data->glow, error))
+        return false;
     vkb_scene_destroy(device, scene);
     bool done = vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                   scene_size(data), &staging.buffer, error)
@@ -140,7 +152,8 @@ bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
              && vkb_buffer_flush(device, &staging.buffer, error);
     if (done) {
         vkb_barrier_record_upload(device, commands->buffer);
-        done = vkb_commands_run(device, commands, error);
+        done = vkb_commands_submit(device, commands, error)
+            && vkb_commands_wait(device, commands, error);
     }
     vkb_buffer_destroy(device, &staging.buffer);
     if (done)

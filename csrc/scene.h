@@ -70,7 +70,8 @@ struct vkb_camera {
     double near, far;
 };
 
-// Replaces what the scene holds, unless it holds that data already. On failure it holds nothing.
+// Replaces what the scene holds, unless it holds that data already. On failure it holds nothing, or
+// what it held; an index without a vertex is one.
 bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
                     const struct vkb_scene_data *data, struct vkb_scene *scene,
                     struct vkb_error *error);

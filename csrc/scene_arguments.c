@@ -104,12 +104,6 @@ static bool read_mesh(struct vkb_held_scene *scene, PyObject *tuple, struct vkb_
         PyErr_SetString(PyExc_ValueError, "scene: surfaces need texcoords");
         return false;
     }
-    for (uint32_t i = 0; i < mesh->index_count; ++i)
-        if (mesh->indices[i] >= mesh->vertex_count) {
-            PyErr_Format(PyExc_ValueError, "scene: index %u is beyond the mesh's %u vertices",
-                         mesh->indices[i], mesh->vertex_count);
-            return false;
-        }
     return true;
 }
 
@@ -255,4 +249,5 @@ void vkb_release_scene(struct vkb_held_scene *scene)
     vkb_free(scene->data.textures);
     vkb_free(scene->data.body.surfaces);
     vkb_free(scene->data.glow.surfaces);
+    *scene = (struct vkb_held_scene){0};
 }

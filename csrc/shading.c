@@ -62,7 +62,7 @@ bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_sh
     snprintf(second.name, sizeof second.name, "%.16s_textured", row->name);
     second.textured = true;
     second.vertex = VKB_SHADER_mesh_textured_vert;
-    second.fragment = textured;
+    second.shader = textured;
     return vkb_graph_add_pass(graph, &second, error);
 }
 

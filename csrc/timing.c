@@ -5,6 +5,7 @@
 void vkb_timer_destroy(const struct vkb_device *device, struct vkb_timer *timer)
 {
     device->vk.vkDestroyQueryPool(device->handle, timer->queries, NULL);
+    vkb_free(timer->stamps);
     *timer = (struct vkb_timer){0};
 }
 
@@ -14,22 +15,24 @@ bool vkb_timer_reserve(const struct vkb_device *device, uint32_t spans, struct v
     if (spans <= timer->capacity || device->timestamp_mask == 0)
         return true;
     vkb_timer_destroy(device, timer);
-    if (!VK(error,
-            device->vk.vkCreateQueryPool(device->handle,
-                                         &(VkQueryPoolCreateInfo){
-                                             .sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
-                                             .queryType = VK_QUERY_TYPE_TIMESTAMP,
-                                             .queryCount = 2 * spans,
-                                         },
-                                         NULL, &timer->queries)))
+    if (!(timer->stamps = vkb_alloc(error, (size_t)2 * spans, sizeof *timer->stamps))
+        || !VK(error,
+               device->vk.vkCreateQueryPool(device->handle,
+                                            &(VkQueryPoolCreateInfo){
+                                                .sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
+                                                .queryType = VK_QUERY_TYPE_TIMESTAMP,
+                                                .queryCount = 2 * spans,
+                                            },
+                                            NULL, &timer->queries)))
         return false;
     timer->capacity = spans;
     return true;
 }
 
 void vkb_timer_reset(const struct vkb_device *device, VkCommandBuffer commands,
-                     const struct vkb_timer *timer)
+                     struct vkb_timer *timer)
 {
+    timer->span_count = 0;
     if (timer->queries)
         device->vk.vkCmdResetQueryPool(commands, timer->queries, 0, 2 * timer->capacity);
 }
@@ -44,30 +47,36 @@ static void write_timestamp(const struct vkb_device *device, VkCommandBuffer com
 }
 
 void vkb_timer_start(const struct vkb_device *device, VkCommandBuffer commands,
-                     const struct vkb_timer *timer, uint32_t span)
+                     const struct vkb_timer *timer)
 {
-    write_timestamp(device, commands, timer, 2 * span);
+    write_timestamp(device, commands, timer, 2 * timer->span_count);
 }
 
 void vkb_timer_stop(const struct vkb_device *device, VkCommandBuffer commands,
-                    const struct vkb_timer *timer, uint32_t span)
+                    struct vkb_timer *timer)
 {
-    write_timestamp(device, commands, timer, 2 * span + 1);
+    write_timestamp(device, commands, timer, 2 * timer->span_count + 1);
+    ++timer->span_count;
 }
 
-bool vkb_timer_read(const struct vkb_device *device, const struct vkb_timer *timer, uint32_t span,
-                    double *seconds, struct vkb_error *error)
+bool vkb_timer_fetch(const struct vkb_device *device, struct vkb_timer *timer,
+                     struct vkb_error *error)
 {
-    uint64_t stamps[2];
+    const uint32_t count = 2 * timer->span_count;
 
-    *seconds = NAN;
+    return !timer->queries || count == 0
+        || VK(error, device->vk.vkGetQueryPoolResults(
+                         device->handle, timer->queries, 0, count, count * sizeof *timer->stamps,
+                         timer->stamps, sizeof *timer->stamps,
+                         VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+}
+
+double vkb_timer_seconds(const struct vkb_device *device, const struct vkb_timer *timer,
+                         uint32_t span)
+{
     if (!timer->queries)
-        return true;
-    if (!VK(error, device->vk.vkGetQueryPoolResults(
-                       device->handle, timer->queries, 2 * span, 2, sizeof stamps, stamps,
-                       sizeof stamps[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT)))
-        return false;
-    uint64_t ticks = (stamps[1] - stamps[0]) & device->timestamp_mask;
-    *seconds = (double)ticks * device->limits.timestampPeriod * 1e-9;
-    return true;
+        return NAN;
+    uint64_t ticks =
+        (timer->stamps[2 * span + 1] - timer->stamps[2 * span]) & device->timestamp_mask;
+    return (double)ticks * device->limits.timestampPeriod * 1e-9;
 }

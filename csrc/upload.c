@@ -5,36 +5,9 @@
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload)
 {
     vkb_buffer_destroy(device, &upload->staging);
+    vkb_free(upload->rows);
+    vkb_free(upload->packed);
     *upload = (struct vkb_upload){0};
-}
-
-// Copies bytes where they differ; reading what is there is cheaper than sending it twice.
-static bool replace(unsigned char *to, const unsigned char *from, size_t size)
-{
-    if (memcmp(to, from, size) == 0)
-        return false;
-    memcpy(to, from, size);
-    return true;
-}
-
-// One row of pixels whose channels lie side by side, or each apart.
-static bool pack_row(unsigned char *to, const unsigned char *from, const struct vkb_input *input)
-{
-    const size_t size = vkb_formats[input->format].channel_size, pixel = 4 * size;
-    const bool together = input->channel_stride == (ptrdiff_t)size;
-    bool changed = false;
-
-    if (together && input->channels == 4 && input->pixel_stride == (ptrdiff_t)pixel)
-        return replace(to, from, input->width * pixel);
-    for (uint32_t x = 0; x < input->width; ++x, to += pixel, from += input->pixel_stride) {
-        if (together) {
-            changed |= replace(to, from, input->channels * size);
-            continue;
-        }
-        for (uint32_t channel = 0; channel < input->channels; ++channel)
-            changed |= replace(to + channel * size, from + channel * input->channel_stride, size);
-    }
-    return changed;
 }
 
 // A channel of 1 in each format, as bytes.
@@ -49,78 +22,190 @@ static const void *channel_one(enum vkb_format format)
                                              : (const void *)&single;
 }
 
-// A new image of three channels: its alpha is written once, the packing leaves it alone.
-static void fill_alpha(struct vkb_upload *upload)
+// The next two are compiled once for each size of a channel, so that no copy has a variable size.
+
+// A row of RGB pixels without gaps.
+static inline void pack_rgb(unsigned char *to, const unsigned char *from, uint32_t width,
+                            const void *one, size_t size)
 {
-    const size_t size = vkb_formats[upload->format].channel_size;
-    const void *one = channel_one(upload->format);
-    unsigned char *alpha = (unsigned char *)upload->staging.mapped + 3 * size;
-
-    for (size_t i = 0, count = (size_t)upload->width * upload->height; i < count; ++i)
-        memcpy(alpha + i * 4 * size, one, size);
-}
-
-static void count_special(struct vkb_upload *upload)
-{
-    const size_t count = (size_t)upload->width * upload->height * 4;
-    uint64_t special = 0, infinite = 0;
-
-    if (upload->format == VKB_FORMAT_RGBA16_FLOAT) {
-        const uint16_t *bits = upload->staging.mapped;
-        for (size_t i = 0; i < count; ++i) {
-            special += (bits[i] & 0x7c00) == 0x7c00;
-            infinite += (bits[i] & 0x7fff) == 0x7c00;
-        }
-    } else if (upload->format == VKB_FORMAT_RGBA32_FLOAT) {
-        const uint32_t *bits = upload->staging.mapped;
-        for (size_t i = 0; i < count; ++i) {
-            special += (bits[i] & 0x7f800000) == 0x7f800000;
-            infinite += (bits[i] & 0x7fffffff) == 0x7f800000;
-        }
+    for (uint32_t x = 1; x < width; ++x, to += 4 * size, from += 3 * size) {
+        // With the next pixel's red, which is there, a pixel is one move.
+        memcpy(to, from, 4 * size);
+        memcpy(to + 3 * size, one, size);
     }
-    upload->inf_count = infinite;
-    upload->nan_count = special - infinite;
+    memcpy(to, from, 3 * size);
+    memcpy(to + 3 * size, one, size);
 }
 
-// Staging memory for an image of that kind; *fresh: it holds no such image yet.
-static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
-                    const struct vkb_input *input, bool *fresh, struct vkb_error *error)
+static inline void pack_strided(unsigned char *to, const unsigned char *from,
+                                const struct vkb_input *input, const void *one, size_t size)
 {
-    const VkDeviceSize size =
-        (VkDeviceSize)input->width * input->height * vkb_pixel_size(input->format);
+    for (uint32_t x = 0; x < input->width; ++x, to += 4 * size, from += input->pixel_stride) {
+        for (uint32_t channel = 0; channel < input->channels; ++channel)
+            memcpy(to + channel * size, from + channel * input->channel_stride, size);
+        if (input->channels == 3)
+            memcpy(to + 3 * size, one, size);
+    }
+}
 
-    *fresh = upload->format != input->format || upload->width != input->width
-          || upload->height != input->height || upload->channels != input->channels;
-    if (!*fresh)
-        return true;
-    // Cached memory: it is compared with the next image.
+static bool is_contiguous(const struct vkb_input *input)
+{
+    const ptrdiff_t size = vkb_formats[input->format].channel_size;
+
+    return input->channel_stride == size && input->pixel_stride == input->channels * size;
+}
+
+static const unsigned char *input_row(const struct vkb_input *input, uint32_t y)
+{
+    return (const unsigned char *)input->memory + y * input->row_stride;
+}
+
+static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t y)
+{
+    const unsigned char *from = input_row(input, y);
+    const void *one = channel_one(input->format);
+    const bool contiguous = is_contiguous(input);
+
+    if (contiguous && input->channels == 4) {
+        memcpy(to, from, (size_t)input->width * vkb_pixel_size(input->format));
+        return;
+    }
+    switch (vkb_formats[input->format].channel_size) {
+    case 1:
+        contiguous ? pack_rgb(to, from, input->width, one, 1)
+                   : pack_strided(to, from, input, one, 1);
+        break;
+    case 2:
+        contiguous ? pack_rgb(to, from, input->width, one, 2)
+                   : pack_strided(to, from, input, one, 2);
+        break;
+    default:
+        contiguous ? pack_rgb(to, from, input->width, one, 4)
+                   : pack_strided(to, from, input, one, 4);
+        break;
+    }
+}
+
+static unsigned char *kept_row(const struct vkb_upload *upload, uint32_t y)
+{
+    return upload->pixels + y * upload->row_pitch;
+}
+
+static bool row_differs(const struct vkb_upload *upload, const struct vkb_input *input, uint32_t y)
+{
+    const size_t size = (size_t)input->width * vkb_pixel_size(input->format);
+
+    if (input->channels == 4 && is_contiguous(input))
+        return memcmp(kept_row(upload, y), input_row(input, y), size) != 0;
+    pack_row(upload->packed, input, y);
+    return memcmp(kept_row(upload, y), upload->packed, size) != 0;
+}
+
+enum { COUNTED_AT_ONCE = 32768 };  // a sum of so many fits the narrow counters below
+
+static struct vkb_specials count_halves(const uint16_t *bits, size_t count)
+{
+    // As wide as what is counted, so that compilers keep to vectors of that width.
+    uint16_t special = 0, infinite = 0;
+
+    for (size_t i = 0; i < count; ++i) {
+        special = (uint16_t)(special + ((bits[i] & 0x7c00) == 0x7c00));
+        infinite = (uint16_t)(infinite + ((bits[i] & 0x7fff) == 0x7c00));
+    }
+    return (struct vkb_specials){(uint64_t)(special - infinite), infinite};
+}
+
+static struct vkb_specials count_singles(const uint32_t *bits, size_t count)
+{
+    uint32_t special = 0, infinite = 0;
+
+    for (size_t i = 0; i < count; ++i) {
+        special += (bits[i] & 0x7f800000) == 0x7f800000;
+        infinite += (bits[i] & 0x7fffffff) == 0x7f800000;
+    }
+    return (struct vkb_specials){special - infinite, infinite};
+}
+
+static struct vkb_specials count_row(const struct vkb_upload *upload, uint32_t y)
+{
+    const size_t count = (size_t)upload->width * 4;
+    const void *row = kept_row(upload, y);
+    struct vkb_specials sum = {0};
+
+    for (size_t i = 0; upload->format != VKB_FORMAT_RGBA8_UNORM && i < count;
+         i += COUNTED_AT_ONCE) {
+        const size_t part = count - i < COUNTED_AT_ONCE ? count - i : COUNTED_AT_ONCE;
+        const struct vkb_specials found = upload->format == VKB_FORMAT_RGBA16_FLOAT
+                                            ? count_halves((const uint16_t *)row + i, part)
+                                            : count_singles((const uint32_t *)row + i, part);
+        sum.nan += found.nan;
+        sum.inf += found.inf;
+    }
+    return sum;
+}
+
+void vkb_upload_forget(struct vkb_upload *upload)
+{
     upload->format = VKB_FORMAT_NONE;
-    if (!vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, size,
-                            &upload->staging, error))
+}
+
+static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *input)
+{
+    return upload->format == input->format && upload->width == input->width
+        && upload->height == input->height && upload->channels == input->channels;
+}
+
+// Memory for an image of another kind than the last.
+static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
+                    const struct vkb_input *input, const struct vkb_image *image,
+                    struct vkb_error *error)
+{
+    const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
+
+    vkb_upload_forget(upload);
+    if (!vkb_grow(error, (void **)&upload->rows, &upload->row_capacity, input->height,
+                  sizeof *upload->rows)
+        || !vkb_grow(error, (void **)&upload->packed, &upload->packed_capacity, row_size, 1))
         return false;
+    // Cached memory: it is compared with the next image.
+    if (!image->mapped
+        && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                               row_size * input->height, &upload->staging, error))
+        return false;
+    upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
+    upload->row_pitch = image->mapped ? image->row_pitch : row_size;
     upload->format = input->format;
     upload->width = input->width;
     upload->height = input->height;
     upload->channels = input->channels;
-    if (input->channels == 3)
-        fill_alpha(upload);
     return true;
 }
 
-bool vkb_upload_stage(const struct vkb_device *device, struct vkb_upload *upload,
-                      const struct vkb_input *input, bool *changed, struct vkb_error *error)
+bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
+                      struct vkb_flights *flights, const struct vkb_input *input,
+                      const struct vkb_image *image, bool *changed, struct vkb_error *error)
 {
-    const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
+    const bool fresh = !holds_such(upload, input);
+    uint32_t first = 0;
 
-    if (!prepare(device, upload, input, changed, error))
-        return false;
-    for (uint32_t y = 0; y < input->height; ++y)
-        *changed |= pack_row((unsigned char *)upload->staging.mapped + y * row_size,
-                             (const unsigned char *)input->memory + y * input->row_stride, input);
+    while (!fresh && first < input->height && !row_differs(upload, input, first))
+        ++first;
+    *changed = first < input->height;
     if (!*changed)
         return true;
-    count_special(upload);
-    return vkb_buffer_flush(device, &upload->staging, error);
+    if (!vkb_flights_land(device, flights, error)
+        || (fresh && !prepare(device, upload, input, image, error)))
+        return false;
+    for (uint32_t y = first; y < input->height; ++y) {
+        pack_row(kept_row(upload, y), input, y);
+        upload->rows[y] = count_row(upload, y);
+    }
+    upload->specials = (struct vkb_specials){0};
+    for (uint32_t y = 0; y < input->height; ++y) {
+        upload->specials.nan += upload->rows[y].nan;
+        upload->specials.inf += upload->rows[y].inf;
+    }
+    return image->mapped || vkb_buffer_flush(device, &upload->staging, error);
 }
 
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,

@@ -1,9 +1,9 @@
-// An image from the host: packed into staging memory, where it is kept, so that the same image does
-// not travel twice.
+// An image from the host: packed into staging memory, or into the device's image itself where the
+// host can write to that. There it is kept, so that the same image does not travel twice.
 #ifndef VKB_UPLOAD_H
 #define VKB_UPLOAD_H
 
-#include "memory.h"
+#include "flight.h"
 
 #include <stddef.h>
 
@@ -15,18 +15,34 @@ struct vkb_input {
     uint32_t width, height, channels;
 };
 
+struct vkb_specials {
+    uint64_t nan, inf;
+};
+
 struct vkb_upload {
     struct vkb_buffer staging;
+    unsigned char *pixels;  // the image that it holds, packed: in the staging or mapped
+    size_t row_pitch;
     enum vkb_format format;  // of what it holds; NONE: nothing
     uint32_t width, height, channels;
-    uint64_t nan_count, inf_count;  // in what it holds
+    struct vkb_specials *rows;     // in each row of what it holds
+    struct vkb_specials specials;  // in all
+    unsigned char *packed;         // one row, to be compared
+    size_t row_capacity, packed_capacity;
 };
 
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload);
 
+// What it holds is not compared with the next image.
+void vkb_upload_forget(struct vkb_upload *upload);
+
 // Packs the image to RGBA, alpha 1 where it has none; *changed: it is another one than the last.
-bool vkb_upload_stage(const struct vkb_device *device, struct vkb_upload *upload,
-                      const struct vkb_input *input, bool *changed, struct vkb_error *error);
+// The flights may still read the last one: they are waited for before it is written over. `image`
+// is where the device will read it; if that is mapped, it has it now, else vkb_upload_record brings
+// it there.
+bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
+                      struct vkb_flights *flights, const struct vkb_input *input,
+                      const struct vkb_image *image, bool *changed, struct vkb_error *error);
 
 // Records the copy of what is staged to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,

@@ -14,11 +14,12 @@ layout(constant_id = 1) const int THRESHOLDED = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
 #include "thirteen_taps.glsl"
 
-void main()
+vec4 shade()
 {
     vec3 means[5] = group_means(PLACE_IN(source));
     vec3 sum = vec3(0.0);
@@ -33,5 +34,5 @@ void main()
         float width = params.threshold * params.knee;
         sum = soft_threshold(sum, params.threshold, width, 4.0 * (width + 1e-5), 1e-5);
     }
-    colour = vec4(storable(sum), 1.0);
+    return vec4(storable(sum), 1.0);
 }

@@ -16,7 +16,8 @@ layout(constant_id = 4) const int SAMPLING = SAMPLING_FILTER;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
 float weight(int tap)
 {
@@ -46,7 +47,7 @@ vec3 blur_line(Place place, vec2 centre, vec2 tap_step)
     return sum;
 }
 
-void main()
+vec4 shade()
 {
     float scale = params.blur_scale * params.layer_scale;
     Place place = PLACE_IN(source);
@@ -64,5 +65,5 @@ void main()
             sum += coefficient(tap) * (blur_line(place, float(tap) * down, across)
                                        + blur_line(place, -float(tap) * down, across));
     }
-    colour = vec4(storable(params.layer_strength * sum), 1.0);
+    return vec4(storable(params.layer_strength * sum), 1.0);
 }

@@ -14,7 +14,8 @@ layout(constant_id = 1) const int FIREFLY_FILTER = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
 float tap_share(vec3 value)
 {
@@ -23,7 +24,7 @@ float tap_share(vec3 value)
     return 1.0 / (1.0 + max(max(value.r, max(value.g, value.b)), 0.0));
 }
 
-void main()
+vec4 shade()
 {
     const vec2 corners[4] = vec2[](vec2(-1, -1), vec2(1, -1), vec2(-1, 1), vec2(1, 1));
     Place place = PLACE_IN(source);
@@ -35,5 +36,5 @@ void main()
         sum += share * value;
         shares += share;
     }
-    colour = vec4(storable(sum / shares), 1.0);
+    return vec4(storable(sum / shares), 1.0);
 }

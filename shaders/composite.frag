@@ -2,43 +2,33 @@
 #extension GL_GOOGLE_include_directive : require
 // The finished picture: scene and bloom, exposure, tone map, encoding, dither.
 #include "block.glsl"
-#include "dither.glsl"
-#include "finite.glsl"
-#include "tonemap.glsl"
+#include "sampling.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "storage.glsl"
+#include "composite.glsl"
 
-layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
-layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
-layout(constant_id = 2) const int ENCODING = ENCODING_NONE;
-layout(constant_id = 3) const int DITHER = 0;
+layout(constant_id = 4) const int BLOOM = BLOOM_OWN;
+layout(constant_id = 5) const int BLOOM_FORMAT = STORED_SINGLE;
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 3
+#include "fullscreen.glsl"
 
-vec3 composite(vec3 s, vec3 b)
+// The bloom from its image, or from the lines that end in it, as that image would give it back.
+vec3 bloom_light()
 {
-    if (COMPOSITE == COMPOSITE_MIX)
-        return s + (b - s) * params.intensity;
-    if (COMPOSITE == COMPOSITE_SCREEN)
-        return 1.0 - (1.0 - clamp(s, 0.0, 1.0)) * (1.0 - clamp(params.intensity * b, 0.0, 1.0));
-    return s + params.intensity * b;
+    if (BLOOM == BLOOM_OWN)
+        return texelFetch(bloom, PIXEL, 0).rgb;
+    int sampling = BLOOM_FORMAT == STORED_UNORM8 ? SAMPLING_FILTER : SAMPLING_FETCH;
+    vec3 light = sample_bordered(bloom, PIXEL, textureSize(scene, 0), sampling).rgb;
+    return as_stored(light, BLOOM_FORMAT);
 }
 
-void main()
+vec4 shade()
 {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec4 source = texelFetch(scene, pixel, 0);
-    // Curves that mix the channels must not spread one channel's NaN to the others.
-    vec3 result = finite_or_zero(source.rgb);
-    if (COMPOSITE != COMPOSITE_OFF)
-        result = composite(result, texelFetch(bloom, pixel, 0).rgb);
-    result = apply_encoding(apply_tonemap(result * exp2(params.exposure), TONEMAP), ENCODING);
-    if (DITHER != 0)
-        result = dithered(result, pixel, params.noise_seed);
-    // NaN and infinity of the source stay at their own pixels, whatever the curve makes of them.
-    colour = vec4(mix(source.rgb, storable(result), is_finite(source.rgb)), source.a);
+    vec3 light = COMPOSITE == COMPOSITE_OFF ? vec3(0.0) : bloom_light();
+    return finish(texelFetch(scene, PIXEL, 0), light, PIXEL);
 }

@@ -17,12 +17,13 @@ layout(constant_id = 1) const int SAMPLING = SAMPLING_FETCH;
 
 layout(set = 0, binding = 1) uniform sampler2D image;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
-void main()
+vec4 shade()
 {
     Place place = PLACE_IN(image);
     vec3 reduced = sample_at(image, place, vec2(0.0), SAMPLING).rgb;
     vec3 bright = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
-    colour = vec4(storable(bright), 1.0);
+    return vec4(storable(bright), 1.0);
 }

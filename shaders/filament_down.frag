@@ -12,12 +12,13 @@ layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
 const float OFFSET = 1.761629;
 const float OUTER = 7.46602 / 32.0;
 
-void main()
+vec4 shade()
 {
     const float shares[3] = float[](OUTER, 1.0 - 2.0 * OUTER, OUTER);
     Place place = PLACE_IN(source);
@@ -26,5 +27,5 @@ void main()
         for (int x = -1; x <= 1; ++x)
             sum += shares[x + 1] * shares[y + 1]
                  * sample_at(source, place, OFFSET * vec2(x, y), SAMPLING).rgb;
-    colour = vec4(storable(sum), 1.0);
+    return vec4(storable(sum), 1.0);
 }

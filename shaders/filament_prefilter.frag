@@ -14,14 +14,15 @@ layout(constant_id = 1) const int THRESHOLDED = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
 float brightest(vec3 value)
 {
     return max(max(value.r, max(value.g, value.b)), 0.0);
 }
 
-void main()
+vec4 shade()
 {
     Place place = PLACE_IN(source);
     vec2 part = place.part;
@@ -48,5 +49,5 @@ void main()
         sum = max(sum - params.threshold, vec3(0.0));
         sum /= 1.0 + brightest(sum) / params.highlight;
     }
-    colour = vec4(storable(sum), 1.0);
+    return vec4(storable(sum), 1.0);
 }

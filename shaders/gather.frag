@@ -15,17 +15,18 @@ layout(set = 0, binding = 3) uniform sampler2D level_2;
 layout(set = 0, binding = 4) uniform sampler2D level_3;
 layout(set = 0, binding = 5) uniform sampler2D level_4;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 6
+#include "fullscreen.glsl"
 
 vec3 share(sampler2D image, float weight)
 {
     return weight * sample_at(image, PLACE_IN(image), vec2(0.0), SAMPLING).rgb;
 }
 
-void main()
+vec4 shade()
 {
     vec3 sum = share(level_0, params.shares[0].x) + share(level_1, params.shares[0].y)
              + share(level_2, params.shares[0].z) + share(level_3, params.shares[0].w)
              + share(level_4, params.shares[1].x);
-    colour = vec4(storable(sum), 1.0);
+    return vec4(storable(sum), 1.0);
 }

@@ -13,9 +13,10 @@ layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
-void main()
+vec4 shade()
 {
     const vec2 offsets[5] = vec2[](vec2(0.0, 0.0), vec2(0.9, -0.4), vec2(-0.9, 0.4), vec2(0.4, 0.9),
                                    vec2(-0.4, -0.9));
@@ -29,5 +30,5 @@ void main()
         sum += share * value;
         shares += share;
     }
-    colour = vec4(storable(sum / shares), 1.0);
+    return vec4(storable(sum / shares), 1.0);
 }

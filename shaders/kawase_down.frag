@@ -12,9 +12,10 @@ layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
-void main()
+vec4 shade()
 {
     Place place = PLACE_IN(source);
     vec2 diagonal = vec2(0.5, -0.5) * params.offset;
@@ -23,5 +24,5 @@ void main()
     sum += sample_at(source, place, diagonal.xy, SAMPLING).rgb;
     sum += sample_at(source, place, diagonal.yx, SAMPLING).rgb;
     sum += sample_at(source, place, diagonal.yy, SAMPLING).rgb;
-    colour = vec4(storable(sum / 8.0), 1.0);
+    return vec4(storable(sum / 8.0), 1.0);
 }

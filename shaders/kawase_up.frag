@@ -12,9 +12,10 @@ layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
 
 layout(set = 0, binding = 1) uniform sampler2D smaller;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
-void main()
+vec4 shade()
 {
     Place place = PLACE_IN(smaller);
     vec2 axial = vec2(params.offset, 0.0);
@@ -27,5 +28,5 @@ void main()
     diagonals += sample_at(smaller, place, diagonal.xy, SAMPLING).rgb;
     diagonals += sample_at(smaller, place, diagonal.yx, SAMPLING).rgb;
     diagonals += sample_at(smaller, place, diagonal.yy, SAMPLING).rgb;
-    colour = vec4(storable((sum + 2.0 * diagonals) / 12.0), 1.0);
+    return vec4(storable((sum + 2.0 * diagonals) / 12.0), 1.0);
 }

@@ -15,7 +15,8 @@ layout(constant_id = 2) const int ANTI_FLICKER = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
 vec3 tap(float x, float y)
 {
@@ -28,7 +29,7 @@ vec3 middle(vec3 a, vec3 b, vec3 c)
     return max(min(a, b), min(max(a, b), c));
 }
 
-void main()
+vec4 shade()
 {
     vec3 kept = tap(0.0, 0.0);
     if (ANTI_FLICKER != 0) {
@@ -39,5 +40,5 @@ void main()
         float width = params.threshold * params.knee + 1e-5;
         kept = soft_threshold(kept, params.threshold, width, 4.0 * width, 1e-5);
     }
-    colour = vec4(storable(kept), 1.0);
+    return vec4(storable(kept), 1.0);
 }

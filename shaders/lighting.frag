@@ -12,15 +12,16 @@ layout(set = 0, binding = 2) uniform sampler2D normal;
 layout(set = 0, binding = 3) uniform sampler2D position;
 layout(set = 0, binding = 4) uniform sampler2D brightness;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 5
+#include "fullscreen.glsl"
 
-void main()
+vec4 shade()
 {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    ivec2 pixel = PIXEL;
     vec3 base = texelFetch(albedo, pixel, 0).rgb;
     vec3 n = texelFetch(normal, pixel, 0).xyz;
     vec3 lit = base;
     if (any(notEqual(n, vec3(0.0))))
         lit = phong(base, normalize(n), texelFetch(position, pixel, 0).xyz);
-    colour = vec4(storable(lit + texelFetch(brightness, pixel, 0).rgb), 1.0);
+    return vec4(storable(lit + texelFetch(brightness, pixel, 0).rgb), 1.0);
 }

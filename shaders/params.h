@@ -39,20 +39,56 @@
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, weights, 17)
 
+// The same blur where the source's pixels are the target's: one symmetric kernel on whole texels,
+// v0..v79 with zeros beyond its radius. `origin` is the place of the target's first pixel along the
+// line, in the source's.
+#define LINE_BLOCK(B, SETTING, INPUT, VEC4S) \
+    INPUT(B, int, radius) \
+    INPUT(B, int, origin) \
+    INPUT(B, float, limit) \
+    VEC4S(B, kernel, LINE_VEC4S)
+
+// An image's whole bloom in one pass: threshold, both blurs, composite. Kernels as above.
+#define WHOLE_BLOCK(B, SETTING, INPUT, VEC4S) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, knee) \
+    INPUT(B, float, intensity) \
+    INPUT(B, float, exposure) \
+    INPUT(B, float, limit) \
+    INPUT(B, int, noise_seed) \
+    INPUT(B, int, down_radius) \
+    INPUT(B, int, across_radius) \
+    VEC4S(B, down, WHOLE_VEC4S) \
+    VEC4S(B, across, WHOLE_VEC4S)
+
 // The reduction of an image to the bloom buffer, with the threshold.
 #define EXTRACT_BLOCK(B, SETTING, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, SETTING)
 
 // A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
-// the steps the distance of the tent's taps in texels of the smaller level.
+// the steps the distance of the tent's taps in texels of the smaller level. `taps` are the same
+// weights on whole texels, where a level is exactly twice as large as the one below; the
+// threshold is of a first level that starts from the image itself.
 #define PYRAMID_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, radius, 1.0, 0.0, 16.0) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
     INPUT(B, float, step_x) \
-    INPUT(B, float, step_y)
+    INPUT(B, float, step_y) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, knee) \
+    VEC4S(B, taps, 1)
+
+// The end of a pyramid together with the composite.
+#define DOUBLE_FINAL_BLOCK(B, SETTING, INPUT, VEC4S) \
+    INPUT(B, float, coarse) \
+    INPUT(B, float, intensity) \
+    INPUT(B, float, exposure) \
+    INPUT(B, float, limit) \
+    INPUT(B, int, noise_seed) \
+    VEC4S(B, taps, 1)
 
 // The first pass of a published method, from the frame.
 #define PREFILTER_BLOCK(B, SETTING, INPUT, VEC4S) \
@@ -84,7 +120,10 @@
     BLOCK(mesh, MESH_BLOCK) \
     BLOCK(extract, EXTRACT_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \
+    BLOCK(line, LINE_BLOCK) \
+    BLOCK(whole, WHOLE_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
+    BLOCK(double_final, DOUBLE_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
@@ -122,6 +161,24 @@
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
 #define MAX_LAYERS 8
+
+// Kernels on whole texels, w0.. in vec4s: the longest half-kernel of a line, and of the whole bloom
+// in one pass. A line's shader reads LINE_OUTPUTS - 1 weights beyond the radius, which are 0.
+#define LINE_RADIUS 64
+#define LINE_OUTPUTS 8
+#define LINE_VEC4S 18
+#define STRIP_RADIUS 4
+#define STRIP_COLUMNS 8
+#define STRIP_ROWS 72
+#define HALVE_COLUMNS 4
+#define HALVE_ROWS 16
+#define DOUBLE_COLUMNS 4
+#define DOUBLE_ROWS 32
+#define TILE_LOADED 64
+#define TILE_ROWS 32
+#define TILE_RUNS 4
+#define TILE_RADIUS 16
+#define WHOLE_VEC4S 5
 
 // The levels that one pass gathers.
 #define GATHERED_LEVELS 5
@@ -167,6 +224,11 @@
     NAME(SAMPLING_WHOLE, 0, whole) \
     NAME(SAMPLING_FILTER, 1, filter) \
     NAME(SAMPLING_FETCH, 2, fetch) \
+    NAME(STORED_UNORM8, 0, unorm8) \
+    NAME(STORED_HALF, 1, half) \
+    NAME(STORED_SINGLE, 2, single) \
+    NAME(BLOOM_OWN, 0, own_image) \
+    NAME(BLOOM_LINES, 1, lines) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
     NAME(UPSAMPLE_CUBIC, 2, cubic)

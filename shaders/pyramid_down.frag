@@ -12,7 +12,8 @@ layout(constant_id = 1) const int FIREFLY_FILTER = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
 #include "thirteen_taps.glsl"
 
@@ -24,7 +25,7 @@ float group_share(vec3 mean, float share)
     return share / (1.0 + max(dot(mean, vec3(0.2126, 0.7152, 0.0722)), 0.0));
 }
 
-void main()
+vec4 shade()
 {
     vec3 means[5] = group_means(PLACE_IN(source));
     vec3 sum = vec3(0.0);
@@ -34,5 +35,5 @@ void main()
         sum += share * means[group];
         shares += share;
     }
-    colour = vec4(storable(sum / shares), 1.0);
+    return vec4(storable(sum / shares), 1.0);
 }

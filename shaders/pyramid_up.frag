@@ -15,7 +15,8 @@ layout(constant_id = 2) const int UPSAMPLE = UPSAMPLE_TENT;
 layout(set = 0, binding = 1) uniform sampler2D smaller;
 layout(set = 0, binding = 2) uniform sampler2D own;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 3
+#include "fullscreen.glsl"
 
 // 3 x 3 taps of weights (1 2 1)^2 / 16.
 vec3 tent(Place place)
@@ -39,10 +40,10 @@ vec3 upsample(Place place)
     return tent(place);
 }
 
-void main()
+vec4 shade()
 {
     vec3 sum = params.coarse * upsample(PLACE_IN(smaller));
     if (ADD_OWN != 0)
-        sum += params.own * texelFetch(own, ivec2(gl_FragCoord.xy), 0).rgb;
-    colour = vec4(storable(sum), 1.0);
+        sum += params.own * texelFetch(own, PIXEL, 0).rgb;
+    return vec4(storable(sum), 1.0);
 }

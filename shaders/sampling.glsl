@@ -14,19 +14,24 @@ struct Place {
 // Where the centre of a target's pixel falls. In whole numbers, for a float position at the far end
 // of a large image is off by so much that filtered values of neighbouring texels would show it;
 // unsigned, so that sides of 32768 fit.
-Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
+Place place_in_size(ivec2 source_size, ivec2 pixel, ivec2 target_size)
 {
     uvec2 divisor = 2u * uvec2(target_size);
     // Places up to half a texel before the first texel's centre are negative: one texel is added here
     // and taken away below.
-    uvec2 number = uvec2(2 * pixel + 1) * uvec2(textureSize(source, 0)) + uvec2(target_size);
+    uvec2 number = uvec2(2 * pixel + 1) * uvec2(source_size) + uvec2(target_size);
     uvec2 texel = number / divisor;
     return Place(ivec2(texel) - 1, vec2(number - texel * divisor) / vec2(divisor));
 }
 
-// The place of this fragment, in a shader whose parameters hold SAMPLING_ROWS.
+Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
+{
+    return place_in_size(textureSize(source, 0), pixel, target_size);
+}
+
+// The place of this pixel, in a shader whose parameters hold SAMPLING_ROWS.
 #define PLACE_IN(source) \
-    place_in(source, ivec2(gl_FragCoord.xy), ivec2(params.target_width, params.target_height))
+    place_in(source, PIXEL, ivec2(params.target_width, params.target_height))
 
 vec4 fetch_clamped(sampler2D source, ivec2 texel)
 {
@@ -54,4 +59,18 @@ vec4 sample_at(sampler2D source, Place place, vec2 offset, int sampling)
         return fetch_bilinear(source, place.texel + ivec2(whole), moved - whole);
     }
     return texture(source, (vec2(place.texel) + 0.5 + moved) / vec2(textureSize(source, 0)));
+}
+
+// A source with a border of one texel on its left and right, at a pixel's own place.
+vec4 sample_bordered(sampler2D source, ivec2 pixel, ivec2 target_size, int sampling)
+{
+    ivec2 size = textureSize(source, 0) - ivec2(2, 0);
+    if (sampling == SAMPLING_FILTER) {
+        // The sampler's 8 bits of position ask for no whole numbers, whose division is slow.
+        vec2 at = (vec2(pixel) + 0.5) * (vec2(size) / vec2(target_size));
+        return texture(source, (at + vec2(1.0, 0.0)) / vec2(textureSize(source, 0)));
+    }
+    Place place = place_in_size(size, pixel, target_size);
+    place.texel.x += 1;
+    return sample_at(source, place, vec2(0.0), sampling);
 }

@@ -17,3 +17,14 @@ vec3 storable(vec3 value)
     vec3 kept = clamp(value, -params.limit, params.limit);
     return params.limit == HALF_LIMIT ? nearest_half(kept) : kept;
 }
+
+// What an image of that format would give back of a value: for passes that stand for several, so
+// that their picture is that of the passes they spare.
+vec3 as_stored(vec3 value, int format)
+{
+    if (format == STORED_UNORM8)
+        return roundEven(255.0 * clamp(value, 0.0, 1.0)) * (1.0 / 255.0);
+    if (format == STORED_HALF)
+        return nearest_half(clamp(value, -HALF_LIMIT, HALF_LIMIT));
+    return value;
+}

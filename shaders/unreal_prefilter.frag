@@ -13,14 +13,15 @@ layout(constant_id = 1) const int THRESHOLDED = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
-void main()
+vec4 shade()
 {
     vec3 value = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING).rgb;
     if (THRESHOLDED != 0) {
         float luminance = dot(value, vec3(0.2126729, 0.7151522, 0.0721750));
         value *= smoothstep(params.threshold, params.threshold + params.smooth_width, luminance);
     }
-    colour = vec4(storable(value), 1.0);
+    return vec4(storable(value), 1.0);
 }

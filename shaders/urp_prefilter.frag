@@ -14,14 +14,15 @@ layout(constant_id = 1) const int THRESHOLDED = 0;
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-layout(location = 0) out vec4 colour;
+#define TARGET_BINDING 2
+#include "fullscreen.glsl"
 
-void main()
+vec4 shade()
 {
     vec3 kept = min(sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING).rgb, vec3(params.clamp_max));
     if (THRESHOLDED != 0) {
         float width = params.threshold * params.knee;
         kept = soft_threshold(kept, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
     }
-    colour = vec4(storable(max(kept, vec3(0.0))), 1.0);
+    return vec4(storable(max(kept, vec3(0.0))), 1.0);
 }

@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 from vkbloom.cli.program import program
-from vkbloom.comparison import Comparison, Limits, compare, difference
+from vkbloom.comparison import Comparison, Limits, compare, difference, flip_map
 from vkbloom.image_writing import save
 from vkbloom.images import Picture
 from vkbloom.srgb import decode_srgb
@@ -176,6 +176,48 @@ class TestFigures:
         assert 0 < scale < 1
         tiny = np.full((8, 8, 3), 5e-324)
         assert compare(tiny, np.zeros_like(tiny)).max_error == 5e-324
+
+    def test_relative_threshold(self) -> None:
+        a = np.array([[0.0, 1.0, 10.0, -10.0]])
+        b = a + np.array([[0.05, 0.15, 1.0, 1.2]])
+        # 0.1 + 0.1 |a| allows 0.1, 0.2, 1.1 and 1.1.
+        assert compare(a, b, threshold=0.1, relative=0.1).percent_over == 25.0
+        assert compare(a, b, relative=0.1).percent_over == 75.0
+        assert compare(a, b, threshold=0.1).percent_over == 75.0
+        assert compare(a, b, threshold=math.inf).percent_over == 0.0
+
+    @pytest.mark.parametrize("wanted", [(), ("ssim",), ("psnr",), ("flip",), ("ssim", "flip")])
+    def test_metrics_that_are_asked_for(self, wanted: tuple[Any, ...]) -> None:
+        a, b = image(16, 16, 3), image(16, 16, 3, seed=6)
+        whole, found = compare(a, b), compare(a, b, metrics=wanted)
+        for name in ("ssim", "psnr", "flip"):
+            asked = name in wanted
+            assert getattr(found, name) == (getattr(whole, name) if asked else None)
+            assert found.not_computed.get(name) == (None if asked else "not asked for")
+
+    def test_metrics_that_are_not_needed_are_not_imported(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for package in ("skimage.metrics", "OpenImageIO"):
+            monkeypatch.setitem(sys.modules, package, None)
+        a = image(8, 8, 3)
+        assert compare(a, a, metrics=()).identical
+        for name in ("ssim", "psnr", "flip"):
+            with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\["):
+                compare(a, a, metrics=(name,))
+
+    @pytest.mark.parametrize("dtype", ["uint8", "float32"])
+    def test_flip_map(self, dtype: str) -> None:
+        a = image(24, 32, 3, dtype=dtype)
+        b = a.copy()
+        b[:, 16:] = b[::-1, 16:]
+        found = flip_map(a, b)
+        assert found.shape == (24, 32)
+        assert found.dtype == np.float32
+        assert found.mean(dtype=np.float64) == compare(a, b).flip
+        assert found[:, 24:].mean() > 10 * found[:, :8].mean()
+        with pytest.raises(ValueError, match="there is no FLIP: the sizes differ"):
+            flip_map(a, b[1:])
 
 
 class TestMismatches:
@@ -356,6 +398,15 @@ class TestArguments:
         monkeypatch.setitem(sys.modules, package, None)
         with pytest.raises(ModuleNotFoundError, match=rf"pip install vkbloom\[{extra}\]"):
             compare(image(8, 8, 3), image(8, 8, 3))
+
+    @pytest.mark.parametrize("relative", [-0.1, math.nan, math.inf])
+    def test_relative_out_of_range(self, relative: float) -> None:
+        with pytest.raises(ValueError, match=r"relative: .* is out of range"):
+            compare(image(8, 8), image(8, 8), relative=relative)
+
+    def test_unknown_metric(self) -> None:
+        with pytest.raises(ValueError, match="metrics: 'mse' is not one of ssim, psnr, flip"):
+            compare(image(8, 8), image(8, 8), metrics=("mse",))  # type: ignore[arg-type]
 
 
 class TestDifference:

@@ -112,17 +112,28 @@ class TestPasses:
         axes: dict[str, list[Any]] = {
             list(AXES)[number]: list(AXES.values())[number] for number in order
         }
-        dataset = new_renderer().grid(image, None, axes)
+        dataset = new_renderer().grid(image, None, axes, attachments="all")
         assert list(dataset["final"].dims[:4]) == list(axes)
         points = math.prod(map(len, axes.values()))
         assert dataset.attrs["passes_run"] == fewest(DEPENDS, axes)
+        assert dataset.attrs["passes_run"] + dataset.attrs["passes_saved"] == 4 * points
+
+    def test_no_more_where_one_framebuffer_is_wanted(
+        self, new_renderer: Callable[[], Renderer], image: Any
+    ) -> None:
+        dataset = new_renderer().grid(image, None, AXES)
+        points = math.prod(map(len, AXES.values()))
+        # Several passes may run as one.
+        assert points <= dataset.attrs["passes_run"] <= fewest(DEPENDS, AXES)
         assert dataset.attrs["passes_run"] + dataset.attrs["passes_saved"] == 4 * points
 
     def test_a_scene_is_drawn_once_a_time(
         self, new_renderer: Callable[[], Renderer], scene: Scene
     ) -> None:
         axes = {"exposure": [0.0, 1.0], "time": [0.0, 0.1, 0.2], "blur_scale": [1.0, 2.0]}
-        dataset = new_renderer().grid(scene, None, axes, size=(32, 18))
+        # All but the depths, which their passes share.
+        names = ("glow", "blur_vertical", "bloom", "scene", "final")
+        dataset = new_renderer().grid(scene, None, axes, size=(32, 18), attachments=names)
         depends = {
             "scene": ["time"],
             "glow": ["time"],
@@ -413,6 +424,17 @@ class TestExtras:
             " 'matplotlib', 'tqdm'])); import vkbloom"
         )
         subprocess.run([sys.executable, "-c", code], check=True)
+
+    def test_grids_are_imported_late(self) -> None:
+        code = (
+            "import sys, vkbloom\n"
+            "assert not any(name.startswith('vkbloom.grid') for name in sys.modules)\n"
+            "assert all(hasattr(vkbloom, name) for name in vkbloom.__all__)\n"
+            "from vkbloom import reductions"
+        )
+        subprocess.run([sys.executable, "-c", code], check=True)
+        with pytest.raises(AttributeError, match="no attribute 'grids'"):
+            vkbloom.grids  # noqa: B018
 
 
 class TestProgress:

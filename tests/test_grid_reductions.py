@@ -105,8 +105,3 @@ class TestComparing:
             reductions.SSIM(against=1.0)  # type: ignore[arg-type]
         with pytest.raises(TypeError, match="grid only"):
             reductions.SSIM(against={"blur_scale": 1})(frames(final=noise(9, 9, 3, dtype="uint8")))
-
-    def test_unknown_metrics(self) -> None:
-        image = noise(9, 9, 3, dtype="uint8")
-        with pytest.raises(ValueError, match="metrics: 'mse'"):
-            compare(image, image, metrics=["mse"])

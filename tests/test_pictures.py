@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from vkbloom import Separable
 from vkbloom.frames import Frames
-from vkbloom.pictures import contact_sheet_png
+from vkbloom.pictures import contact_sheet_png, picture
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -65,6 +65,15 @@ class TestPng:
         depth = np.array([[0.5, 0.75, 1.0, np.inf]], np.float32)
         shown = decode(make({"depth": depth})._repr_png_(), tmp_path)
         assert shown[0, :, 0].tolist() == [255, 128, 0, 0]
+
+    def test_stretches_by_the_range_of_another(self) -> None:
+        depth = np.array([[0.5, 0.75, 1.0, 1.5]], np.float32)
+        wider = np.array([[0.0, 1.0]], np.float32)
+        assert picture(depth, range_of=wider).ravel().tolist() == [128, 64, 0, 0]
+
+    def test_shows_16_bits_as_stored(self) -> None:
+        image = np.array([[[0, 32896, 65535]]], np.uint16)
+        assert picture(image).ravel().tolist() == [0, 128, 255]
 
     @pytest.mark.parametrize("value", [0.0, 1.0, np.nan, np.inf, -np.inf])
     @pytest.mark.filterwarnings("error")

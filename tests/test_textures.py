@@ -415,8 +415,7 @@ def test_surfaces_that_are_refused(count: int) -> None:
 
 def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
     """Give a mesh and textures to the core past the checks of `Mesh` and `Texture`."""
-    renderer._core.render(
-        Separable(),
+    batch = renderer._core.render(
         (serial, mesh, None, (), textures),
         ((0, 0, -9), (0, 0, 0), 45, 0.1, 99),
         (4, 4),
@@ -424,8 +423,9 @@ def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
         0.0,
         1.0,
         None,
-        lambda name, shape, dtype: np.empty(shape, dtype),
     )
+    batch.add(Separable(), lambda name, shape, dtype: np.empty(shape, dtype))
+    batch.submit()
 
 
 BODY = panel((4, 4))

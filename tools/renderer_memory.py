@@ -10,7 +10,8 @@ Three things are repeated, and the growth of the process for one repetition is s
 They are so twice: with the driver's library unloaded by the loader whenever the last instance goes
 ("unloaded"), and with an instance kept open beside, so that it stays loaded ("loaded"). What the
 driver allocates once a load is lost at the unloading and shows in the first only. Last ("open"),
-the growth for one more frame of a renderer that stays open, sizes and settings changing.
+the growth for one more frame of a renderer that stays open, sizes and settings changing, and of a
+sequence of frames that is left half taken.
 
 What is measured, after a collection and a trim of the heap, as the median of several rounds:
 
@@ -233,6 +234,10 @@ def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
         def action() -> None:
             chosen, size = next(requests)
             renderer.render(scene, chosen, size, time=next(times))
+            # Of some more, what the device has begun with is left to it.
+            many = renderer.render_many(scene, settings, size, time=next(times))
+            for _ in range(3):
+                next(many)
 
         def settle() -> None:
             # The driver keeps blocks of 64 KiB of its last pictures; those of a pixel need none.

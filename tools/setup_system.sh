@@ -5,6 +5,7 @@ set -eu
 
 missing_packages=""
 missing_names=""
+wanted_packages=""
 
 # need NAME PACKAGE COMMAND...: the package is missing unless the command succeeds.
 need() {
@@ -16,6 +17,13 @@ need() {
         missing_names="$missing_names
   - $name (Debian: $package)"
     fi
+}
+
+# want PACKAGE COMMAND...: the same for what a test is skipped without.
+want() {
+    package=$1
+    shift
+    "$@" >/dev/null 2>&1 || wanted_packages="$wanted_packages $package"
 }
 
 has_header() {
@@ -50,9 +58,14 @@ has_glslang() {
     command -v glslangValidator || command -v glslang
 }
 
+has_chromium() {
+    command -v chromium || command -v chromium-browser
+}
+
 check() {
     missing_packages=""
     missing_names=""
+    wanted_packages=""
     for group in "$@"; do
         case $group in
         build)
@@ -69,23 +82,28 @@ check() {
             ;;
         test)
             need "the Khronos validation layer" vulkan-validationlayers has_validation
+            want chromium has_chromium
             ;;
         esac
     done
 }
 
 check "$@"
-test -z "$missing_names" && exit 0
+test -z "$missing_names$wanted_packages" && exit 0
 
 if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-    echo "Installing with apt:$missing_packages"
+    echo "Installing with apt:$missing_packages$wanted_packages"
     export DEBIAN_FRONTEND=noninteractive
     apt-get update -qq
     # Word splitting is wanted: one argument a package.
     # shellcheck disable=SC2086
     apt-get install -qq -y --no-install-recommends $missing_packages >/dev/null
+    for package in $wanted_packages; do
+        apt-get install -qq -y --no-install-recommends "$package" >/dev/null ||
+            echo "Tests that need $package will be skipped." >&2
+    done
     check "$@"
-    test -z "$missing_names" && exit 0
 fi
+test -z "$missing_names" && exit 0
 echo "vkbloom needs these, which are not here:$missing_names" >&2
 exit 1

@@ -41,7 +41,12 @@ def describe(
 
 class Renderer:
     def __new__(
-        cls, adapter: str, validation: bool, read_cache: Callable[[bytes], bytes | None], /
+        cls,
+        adapter: str,
+        validation: bool,
+        forms: str,
+        read_cache: Callable[[bytes], bytes | None],
+        /,
     ) -> Renderer: ...
     @property
     def closed(self) -> bool: ...
@@ -53,7 +58,6 @@ class Renderer:
     def pipeline_cache(self) -> bytes: ...
     def render(
         self,
-        settings: object,
         scene: _Scene,
         camera: _Camera,
         size: tuple[int, int],
@@ -61,14 +65,13 @@ class Renderer:
         time: float,
         glow_intensity: float,
         names: tuple[str, ...] | None,
-        allocate: _Allocate,
         /,
-    ) -> _Result: ...
-    def apply(
-        self,
-        settings: object,
-        image: _Array,
-        names: tuple[str, ...] | None,
-        allocate: _Allocate,
-        /,
-    ) -> _Result: ...
+    ) -> Batch: ...
+    def apply(self, image: _Array, names: tuple[str, ...] | None, /) -> Batch: ...
+
+class Batch:
+    @property
+    def size(self) -> int: ...
+    def add(self, settings: object, allocate: _Allocate, /) -> bool: ...
+    def submit(self) -> None: ...
+    def collect(self) -> list[_Result]: ...

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Final
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,14 @@ from vkbloom.extras import import_extra
 from vkbloom.settings import check_number
 from vkbloom.srgb import decode_srgb
 
-__all__ = ["METRICS", "Comparison", "Limits", "compare", "difference"]
+__all__ = ["Comparison", "Limits", "Metric", "compare", "difference", "flip_map"]
 
-#: What `compare` computes beside the errors.
-METRICS: Final = ("ssim", "psnr", "flip")
+Metric = Literal["ssim", "psnr", "flip"]
 
 _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
 # Taps to a side of scikit-image's default window.
 _SSIM_WINDOW: Final = 7
+_METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,9 +93,9 @@ class Comparison:
     mean_error : float or None
         Mean absolute difference of all finite values.
     percent_over : float or None
-        Percentage of pixels of which a channel differs by more than `threshold`, or is not
-        finite in one image only.
-    threshold : float
+        Percentage of pixels of which a channel differs by more than `threshold` and `relative`
+        allow, or is not finite in one image only.
+    threshold, relative : float
         As given to `compare`.
     data_range : float or None
         Of SSIM and PSNR.
@@ -103,11 +103,12 @@ class Comparison:
         Structural similarity, peak signal-to-noise ratio in dB (inf where nothing differs) and
         mean FLIP.
     not_computed : mapping of str to str
-        Why one of these three is None, by its name.
+        Why one of these three is None, by its name; "not asked for" too.
     """
 
     mismatches: tuple[str, ...]
     threshold: float
+    relative: float = 0.0
     max_error: float | None = None
     max_error_at: tuple[int, int, int] | None = None
     max_error_values: tuple[float, float] | None = None
@@ -199,9 +200,10 @@ def compare(
     b: NDArray[Any],
     *,
     threshold: float = 0.0,
+    relative: float = 0.0,
     allow_nan: bool = False,
     data_range: float | None = None,
-    metrics: Sequence[str] = METRICS,
+    metrics: Collection[Metric] = _METRICS,
 ) -> Comparison:
     """Compare two images.
 
@@ -213,14 +215,15 @@ def compare(
         three, or the first alone as grey.
     threshold : float, default 0
         Difference from which on, exclusively, a pixel counts in `percent_over`.
+    relative : float, default 0
+        Added to `threshold`, times the absolute value that `a` has.
     allow_nan : bool, default False
         Take NaN, and infinity of one sign, as equal where both images have it.
     data_range : float, optional
         Of SSIM and PSNR. By default 1 for integers, and for floats what their values span
         together with 0 and 1, so that images within 0..1 have 1.
-    metrics : sequence of str
-        Which of SSIM, PSNR and FLIP to compute, under their names in `Comparison`; the others
-        are left None.
+    metrics : collection of {"ssim", "psnr", "flip"}
+        Which of the three to compute; the others are None. They cost far more than the rest.
 
     Returns
     -------
@@ -235,15 +238,15 @@ def compare(
     TypeError
         An image is no array of one of these types.
     ValueError
-        An image has another number of dimensions or no pixel, `threshold` or `data_range` is out
-        of range, or `metrics` names something else.
+        An image has another number of dimensions or no pixel; `threshold`, `relative` or
+        `data_range` is out of range, or a metric is unknown.
     ModuleNotFoundError
         scikit-image (for SSIM and PSNR) or OpenImageIO (for FLIP) is missing.
     """
-    for name in metrics:
-        if name not in METRICS:
-            raise ValueError(f"metrics: {name!r} is not one of {', '.join(METRICS)}")
     check_number("threshold", threshold, 0.0, math.inf)
+    check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
+    if unknown := [name for name in metrics if name not in _METRICS]:
+        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(_METRICS)}")
     if data_range is not None and not 0 < data_range < math.inf:
         raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
     a, b = _checked("a", a), _checked("b", b)
@@ -252,7 +255,8 @@ def compare(
         return Comparison(
             mismatches=mismatches,
             threshold=threshold,
-            not_computed=dict.fromkeys(metrics, "the images are no match"),
+            relative=relative,
+            not_computed=dict.fromkeys(("ssim", "psnr", "flip"), "the images are no match"),
         )
     pair = _pair(a, b)
     unequal, common = pair.unequal, ~pair.valid & ~pair.unequal
@@ -263,12 +267,13 @@ def compare(
     if data_range is None:
         data_range = 1.0 if pair.is_integer else _span(pair)
     computed, not_computed = _metrics(pair, data_range, metrics)
-    over = (pair.error > threshold) | unequal
+    over = _over(pair, threshold, relative)
     place, values = _largest(pair)
     is_any = bool(pair.valid.any())
     return Comparison(
         mismatches=mismatches,
         threshold=threshold,
+        relative=relative,
         max_error=float(pair.error.max()) if is_any else None,
         max_error_at=place,
         max_error_values=values,
@@ -375,6 +380,14 @@ def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
     return _Pair(plain_a, plain_b, error, valid, ~valid & ~same, False)
 
 
+def _over(pair: _Pair, threshold: float, relative: float) -> NDArray[np.bool_]:
+    """Return which values differ by more than the thresholds, or are finite in one image only."""
+    with np.errstate(over="ignore"):
+        allowed = threshold + relative * np.abs(pair.a)
+    over: NDArray[np.bool_] = (pair.error > allowed) | pair.unequal
+    return over
+
+
 def _places(where: NDArray[np.bool_]) -> str:
     """Describe how many values of an (H, W, C) image are meant, and which is the first."""
     y, x, channel = (int(index[0]) for index in np.nonzero(where))
@@ -397,57 +410,99 @@ def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, flo
 
 
 def _metrics(
-    pair: _Pair, data_range: float, wanted: Sequence[str]
+    pair: _Pair, data_range: float, wanted: Collection[Metric]
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Return the metrics that can be computed, and why the others cannot, by their names."""
+    """Return the metrics that can be computed, and why the others are not, by their names."""
     computed: dict[str, float] = {}
-    reasons: dict[str, str] = {}
-    for name in wanted:
-        # Extreme floats end in a figure that is not finite.
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            value = _METRICS[name](pair, data_range)
-        if isinstance(value, str):
-            reasons[name] = value
-        elif math.isnan(value) or value == -math.inf:
-            reasons[name] = "the values are too large"
+    reasons: dict[str, str] = {name: "not asked for" for name in _METRICS if name not in wanted}
+    # Extreme floats end in a figure that is not finite, which is looked at below.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if "ssim" in wanted:
+            _add_ssim(pair, data_range, computed, reasons)
+        if "psnr" in wanted:
+            _add_psnr(pair, data_range, computed, reasons)
+    if "flip" in wanted:
+        if hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
+            computed["flip"] = float(_flip(pair).mean(dtype=np.float64))
         else:
-            computed[name] = value
+            reasons["flip"] = "OpenImageIO 3.2 is needed"
+    for name, value in list(computed.items()):
+        if math.isnan(value) or value == -math.inf:
+            reasons[name] = "the values are too large"
+            del computed[name]
     return computed, reasons
 
 
-def _ssim(pair: _Pair, data_range: float) -> float | str:
+def _add_ssim(
+    pair: _Pair, data_range: float, computed: dict[str, float], reasons: dict[str, str]
+) -> None:
     metrics = import_extra("skimage.metrics", "quality", "Comparing images")
     if min(pair.a.shape[:2]) < _SSIM_WINDOW:
-        return f"a side is under the window's {_SSIM_WINDOW} pixels"
-    return float(
+        reasons["ssim"] = f"a side is under the window's {_SSIM_WINDOW} pixels"
+        return
+    computed["ssim"] = float(
         metrics.structural_similarity(
             pair.a, pair.b, win_size=_SSIM_WINDOW, data_range=data_range, channel_axis=-1
         )
     )
 
 
-def _psnr(pair: _Pair, data_range: float) -> float | str:
+def _add_psnr(
+    pair: _Pair, data_range: float, computed: dict[str, float], reasons: dict[str, str]
+) -> None:
     metrics = import_extra("skimage.metrics", "quality", "Comparing images")
     if not pair.valid.any():
-        return "no values to compare"
-    if not pair.error.any():
-        return math.inf
-    return float(
-        metrics.peak_signal_noise_ratio(
-            pair.a[pair.valid], pair.b[pair.valid], data_range=data_range
+        reasons["psnr"] = "no values to compare"
+    elif not pair.error.any():
+        computed["psnr"] = math.inf
+    else:
+        computed["psnr"] = float(
+            metrics.peak_signal_noise_ratio(
+                pair.a[pair.valid], pair.b[pair.valid], data_range=data_range
+            )
         )
-    )
 
 
-def _flip(pair: _Pair, data_range: float) -> float | str:
-    """Return the mean of OpenImageIO's FLIP, whose range is fixed.
+def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
+    """Return FLIP of every pixel, whose mean is the figure of `compare`.
+
+    Parameters
+    ----------
+    a, b : ndarray
+        As for `compare`, of one shape, both integers or both floats.
+
+    Returns
+    -------
+    ndarray, shape (H, W)
+        0 (no difference that is seen) to 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `compare`; also for images that it calls no match.
+    ModuleNotFoundError
+        OpenImageIO 3.2 or later is missing.
+    """
+    a, b = _checked("a", a), _checked("b", b)
+    mismatches = _mismatches(a, b)
+    if mismatches:
+        raise ValueError(f"there is no FLIP: {'; '.join(mismatches)}")
+    if not hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
+        raise ModuleNotFoundError("FLIP needs OpenImageIO 3.2: pip install vkbloom[images]")
+    return _flip(_pair(a, b))
+
+
+def _oiio() -> Any:
+    return import_extra("OpenImageIO", "images", "Comparing images")
+
+
+def _flip(pair: _Pair) -> NDArray[np.float32]:
+    """Return OpenImageIO's FLIP of every pixel.
 
     Sources: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020;
     "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021.
     """
-    oiio = import_extra("OpenImageIO", "images", "Comparing images")
-    if not hasattr(oiio.ImageBufAlgo, "FLIP_diff"):
-        return "OpenImageIO 3.2 is needed"
+    oiio = _oiio()
     colours = 3 if pair.a.shape[2] >= 3 else 1
     largest = np.finfo(np.float32).max
     buffers = []
@@ -458,9 +513,4 @@ def _flip(pair: _Pair, data_range: float) -> float | str:
         limited = np.clip(linear, -largest, largest).astype(np.float32)
         buffers.append(oiio.ImageBuf(np.repeat(limited, 3 // colours, axis=2)))
     errors = oiio.ImageBufAlgo.FLIP_diff(*buffers, hdr=0 if pair.is_integer else 1)
-    return float(errors.get_pixels().mean(dtype=np.float64))
-
-
-_METRICS: Final[Mapping[str, Callable[[_Pair, float], float | str]]] = dict(
-    zip(METRICS, (_ssim, _psnr, _flip), strict=True)
-)
+    return np.asarray(errors.get_pixels(), np.float32)[:, :, 0]

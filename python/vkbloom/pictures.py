@@ -28,10 +28,10 @@ __all__ = [
     "in_range",
     "labelled",
     "leading_png",
+    "picture",
     "png",
     "resized",
     "scaled",
-    "shown_picture",
 ]
 
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
@@ -225,57 +225,63 @@ def labelled(
 def _picture(
     frames: Frames, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
 ) -> NDArray[np.uint8]:
-    is_encoded = frames.settings.encoding != "none"
-    return shown_picture(frames[name], name, size, is_encoded=is_encoded, stops=stops)
+    """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
+    encoded = name == "final" and frames.settings.encoding != "none"
+    return picture(frames[name], name, encoded=encoded, size=size, stops=stops)
 
 
-def shown_picture(
+def picture(
     array: NDArray[Any],
-    name: str,
-    size: tuple[int, int] | None = None,
+    name: str = "",
     *,
-    is_encoded: bool,
+    encoded: bool = False,
+    size: tuple[int, int] | None = None,
+    range_of: NDArray[Any] | None = None,
     stops: float = 0.0,
 ) -> NDArray[np.uint8]:
-    """Return a framebuffer as an 8-bit picture, shown as in `leading_png`.
+    """Return an image as 8 bits to look at, as `leading_png` describes.
 
     Parameters
     ----------
-    array : ndarray, shape (H, W, C) or (H, W)
+    array : ndarray, shape (H, W) or (H, W, C)
     name : str
-        Of the framebuffer.
+        Of the framebuffer; "normal" and "position" are shown in their own ways.
+    encoded : bool, default False
+        Whether floats have passed a transfer curve already.
     size : (int, int), optional
-        Width and height that the picture shall have; by default those of the array.
-    is_encoded : bool
-        Whether `final` has an encoding already.
+        Width and height of the picture: pixels are averaged or repeated.
+    range_of : ndarray, optional
+        What is stretched to 0..1, depth and position, is stretched by this array's range, so that
+        two pictures can be compared.
     stops : float, default 0
         Exposure that colours of light in floats are shown with; others are shown as they are.
 
     Returns
     -------
-    ndarray, shape (H, W, C)
+    ndarray of uint8, shape (H, W, C)
     """
     values = np.atleast_3d(array).astype(np.float32)
+    ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)
     linear = False
-    if array.dtype == np.uint8:
-        shown = values / np.float32(255)
+    if array.dtype.kind == "u":
+        shown = values / np.float32(np.iinfo(array.dtype).max)
     elif array.ndim == 2:
-        shown = np.float32(1) - _stretched(values)
+        shown = np.float32(1) - _stretched(values, ranged)
     elif name == "position":
-        shown = _stretched(values)
+        shown = _stretched(values, ranged)
     elif name == "normal":
         shown = _clipped(values * np.float32(0.5) + np.float32(0.5))
     else:
         if stops != 0:
             values[:, :, :3] *= np.float32(2.0**stops)
         shown = _clipped(values)
-        linear = name != "final" or not is_encoded
+        linear = not encoded
     if size is not None:
         shown = resized(shown, *size)
     if linear:
         shown[:, :, :3] = encode_srgb(shown[:, :, :3])
-    picture: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
-    return picture
+    pixels: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
+    return pixels
 
 
 def _viewing_stops(frames: Frames, name: str) -> float:
@@ -335,11 +341,11 @@ def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.clip(finite, 0.0, 1.0)
 
 
-def _stretched(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Map each channel's finite range to 0..1; a channel of one value gives 0."""
-    finite = np.isfinite(values)
-    low: NDArray[np.float32] = values.min(axis=(0, 1), where=finite, initial=np.inf)
-    high: NDArray[np.float32] = values.max(axis=(0, 1), where=finite, initial=-np.inf)
+def _stretched(values: NDArray[np.float32], ranged: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Map the finite range that each channel has in `ranged` to 0..1; one value gives 0."""
+    finite = np.isfinite(ranged)
+    low: NDArray[np.float32] = ranged.min(axis=(0, 1), where=finite, initial=np.inf)
+    high: NDArray[np.float32] = ranged.max(axis=(0, 1), where=finite, initial=-np.inf)
     # Also positive where no value is finite, and the range therefore inf to -inf.
     span = np.maximum(high - low, np.finfo(np.float32).tiny)
     return _clipped((np.clip(values, low, high) - low) / span)
@@ -365,10 +371,22 @@ def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.f
 
 
 def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
-    """Encode an (H, W, C) picture of 1, 3 or 4 channels as PNG (W3C PNG specification).
+    """Encode a picture as PNG (W3C PNG specification).
 
     Here so that notebooks show pictures with nothing but NumPy installed; files that users
-    save are written by OpenImageIO. `level` is zlib's, 1 (quick) to 9 (small).
+    save are written by OpenImageIO.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8, shape (H, W, C)
+        Of 1, 3 or 4 channels.
+    level : int, default -1
+        Of zlib: 1 (quick) to 9 (small), -1 being its own choice.
+
+    Returns
+    -------
+    bytes
+        A whole file.
     """
     height, width, channels = pixels.shape
     rows = pixels.reshape(height, width * channels)

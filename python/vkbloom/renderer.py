@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 from collections import abc
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from vkbloom import _core, pipeline_cache
+from vkbloom import _core, batches, pipeline_cache
 from vkbloom.adapter import AdapterInfo
 from vkbloom.frames import Frames
 from vkbloom.settings import Separable, Settings, check_size
@@ -27,6 +26,9 @@ if TYPE_CHECKING:
 
 Shading = Literal["forward", "deferred"]
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
+
+# In this machine's byte order: for all but those, more is asked.
+_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 
 
 def _version() -> str:
@@ -47,13 +49,15 @@ def _check_image(image: object) -> NDArray[Any]:
     """Return the image, in this machine's byte order, if the core can take it."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"image: an array is needed, not {type(image).__name__}")
-    if image.dtype.name not in ("uint8", "float16", "float32"):
-        raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+    if image.dtype not in _DTYPES:
+        if image.dtype.name not in ("uint8", "float16", "float32"):
+            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+        image = image.astype(image.dtype.newbyteorder("="), copy=False)
     if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
         raise ValueError(
             f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
         )
-    return image.astype(image.dtype.newbyteorder("="), copy=False)
+    return image
 
 
 def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
@@ -140,9 +144,15 @@ class Renderer:
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        self._core = _core.Renderer(adapter, bool(validation), pipeline_cache.read)
+        forms = os.environ.get("VKBLOOM_FORM") or "auto"
+        self._core = _core.Renderer(adapter, bool(validation), forms, pipeline_cache.read)
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
+        self._made_by = {
+            "adapter": self.info.name,
+            "driver": self.info.driver_info or self.info.driver,
+            "version": _version(),
+        }
         self._saved_pipelines = 0
 
     @property
@@ -246,33 +256,8 @@ class Renderer:
         ``timings`` of the result names the passes that ran.
         """
         settings = _check_settings(settings)
-        if shading not in SHADINGS:
-            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-        try:
-            finite = math.isfinite(time)
-        except (TypeError, OverflowError):
-            raise TypeError(f"time: a number is needed, not {time!r}") from None
-        if not finite:
-            raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
-        from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
-
-        if not isinstance(scene, Scene):
-            raise TypeError(f"scene: a Scene is needed, not {scene!r}")
-        camera = scene.camera
-        arrays, timings, specials = self._core.render(
-            settings,
-            _scene_arrays(scene),
-            (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
-            check_size("size", size),
-            shading,
-            # Whole turns change nothing; without them large times keep their precision.
-            math.fmod(time, 1.0),
-            scene.glow_intensity,
-            _check_attachments(attachments),
-            _allocator(out),
-        )
-        _check_filled(out, arrays)
-        return self._frames(arrays, timings, specials, settings)
+        arguments = _render_arguments(scene, size, shading, time, attachments)
+        return self._run_one(self._core.render(*arguments), settings, out)
 
     def apply(
         self,
@@ -320,11 +305,8 @@ class Renderer:
         when what they read or their settings changed.
         """
         settings = _check_settings(settings)
-        arrays, timings, specials = self._core.apply(
-            settings, _check_image(image), _check_attachments(attachments), _allocator(out)
-        )
-        _check_filled(out, arrays)
-        return self._frames(arrays, timings, specials, settings)
+        batch = self._core.apply(_check_image(image), _check_attachments(attachments))
+        return self._run_one(batch, settings, out)
 
     def apply_many(
         self,
@@ -348,9 +330,16 @@ class Renderer:
         Frames
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
+
+        Notes
+        -----
+        The device works on the next settings while a frame is used: after the first frame,
+        settings are taken from their iterable before the frames that come before theirs.
+        What a wrong one of them raises is raised in its turn, after the frames before it.
         """
-        for settings in settings_seq:
-            yield self.apply(image, settings, attachments=attachments)
+        image = _check_image(image)
+        names = _check_attachments(attachments)
+        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -375,11 +364,13 @@ class Renderer:
         Frames
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
+
+        Notes
+        -----
+        As for `apply_many`.
         """
-        for settings in settings_seq:
-            yield self.render(
-                scene, settings, size, shading=shading, time=time, attachments=attachments
-            )
+        arguments = _render_arguments(scene, size, shading, time, attachments)
+        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
 
     def grid(
         self,
@@ -426,7 +417,7 @@ class Renderer:
             One dimension an axis, in the order given, then "y", "x" and "channel"; one variable a
             framebuffer and a reduction. The attributes hold the remaining settings (as JSON), the
             adapter, the driver and the version, and how many passes ran ("passes_run") and how
-            many rendering every point alone would have run beyond ("passes_saved").
+            many more all points have, each pass of each by itself ("passes_saved").
 
         Raises
         ------
@@ -464,35 +455,38 @@ class Renderer:
         self, image: NDArray[Any], settings: Settings
     ) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and dtype of all framebuffers that `apply` would give, without rendering."""
-        return _surveyed(lambda allocate: self._core.apply(settings, image, None, allocate))
+        return _surveyed(self._core.apply(image, None), settings)
 
     def _survey_render(
         self, scene: Scene, settings: Settings, size: tuple[int, int], shading: Shading
     ) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and dtype of all framebuffers that `render` would give, likewise."""
-        camera = scene.camera
-        place = (camera.position, camera.rotation, camera.fov, camera.near, camera.far)
-        return _surveyed(
-            lambda allocate: self._core.render(
-                settings, _scene_arrays(scene), place, size, shading, 0.0, 1.0, None, allocate
-            )
-        )
+        arguments = _render_arguments(scene, size, shading, 0.0, "all")
+        return _surveyed(self._core.render(*arguments), settings)
 
-    def _frames(
+    def _run_one(
         self,
-        arrays: dict[str, NDArray[Any]],
-        timings: dict[str, float],
-        specials: tuple[int, int],
+        batch: _core.Batch,
         settings: Settings,
+        out: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
+        batch.add(settings, _allocator(out))
+        batch.submit()
+        (result,) = batch.collect()
+        _check_filled(out, result[0])
+        return self._frames(settings, result)
+
+    def _run_many(
+        self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
+    ) -> Iterator[Frames]:
+        checked = map(_check_settings, settings_seq)
+        for settings, result in batches.run(checked, open_batch, _allocator(None)):
+            yield self._frames(settings, result)
+
+    def _frames(self, settings: Settings, result: batches.Result) -> Frames:
         self._save_pipelines()
-        info = {
-            "adapter": self.info.name,
-            "driver": self.info.driver_info or self.info.driver,
-            "version": _version(),
-            "nan": specials[0],
-            "inf": specials[1],
-        }
+        arrays, timings, (nan, inf) = result
+        info = {**self._made_by, "nan": nan, "inf": inf}
         return Frames(arrays, timings=timings, settings=settings, info=info)
 
     def _save_pipelines(self) -> None:
@@ -503,28 +497,52 @@ class Renderer:
             pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
 
 
-class _Surveyed(Exception):
-    """All framebuffers are known."""
-
-
 def _surveyed(
-    call: Callable[[Callable[[str, tuple[int, ...], str], NDArray[Any]]], object],
+    batch: _core.Batch, settings: Settings
 ) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-    """Return what a call of the core asks arrays for, and stop it before the device works.
-
-    The core asks for all of them in the order that the data flows, before anything else.
-    """
+    """Return what a batch asks arrays for; it is not submitted, so that the device does nothing."""
     found: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
 
     def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
         found[name] = (shape, np.dtype(dtype))
-        if name == "final":
-            raise _Surveyed
+        # Memory that nobody touches costs nothing.
         return np.empty(shape, dtype)
 
-    with contextlib.suppress(_Surveyed):
-        call(allocate)
+    batch.add(settings, allocate)
     return found
+
+
+def _render_arguments(
+    scene: Scene,
+    size: tuple[int, int],
+    shading: Shading,
+    time: float,
+    attachments: str | Sequence[str],
+) -> tuple[Any, ...]:
+    """Return what the core renders, checked."""
+    if shading not in SHADINGS:
+        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+    try:
+        finite = math.isfinite(time)
+    except (TypeError, OverflowError):
+        raise TypeError(f"time: a number is needed, not {time!r}") from None
+    if not finite:
+        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+    from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: a Scene is needed, not {scene!r}")
+    camera = scene.camera
+    return (
+        _scene_arrays(scene),
+        (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
+        check_size("size", size),
+        shading,
+        # Whole turns change nothing; without them large times keep their precision.
+        math.fmod(time, 1.0),
+        scene.glow_intensity,
+        _check_attachments(attachments),
+    )
 
 
 def _scene_arrays(scene: Scene) -> Any:

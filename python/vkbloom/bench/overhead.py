@@ -30,20 +30,33 @@ Case = Callable[[vkbloom.Renderer, int], vkbloom.Frames]
 
 
 class _Stopwatch:
-    """The core of a renderer, with the seconds that were spent in its calls."""
+    """The core of a renderer, or a batch of it, with the seconds that were spent in its calls."""
 
-    def __init__(self, core: Any) -> None:
+    def __init__(self, core: Any, watch: _Stopwatch | None = None) -> None:
         self._core = core
+        self._watch = watch or self
         self.seconds = 0.0
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._core, name)
 
-    def apply(self, *arguments: Any) -> Any:
+    def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:
         start = time.perf_counter()
-        result = self._core.apply(*arguments)
-        self.seconds += time.perf_counter() - start
+        result = method(*arguments)
+        self._watch.seconds += time.perf_counter() - start
         return result
+
+    def apply(self, *arguments: Any) -> Any:
+        return _Stopwatch(self._call(self._core.apply, *arguments), self)
+
+    def add(self, *arguments: Any) -> Any:
+        return self._call(self._core.add, *arguments)
+
+    def submit(self) -> Any:
+        return self._call(self._core.submit)
+
+    def collect(self) -> Any:
+        return self._call(self._core.collect)
 
 
 def run(plan: Plan) -> Section:

@@ -43,7 +43,7 @@ def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float
             halves = np.ascontiguousarray(array[:, :, :3]).astype(np.float16, copy=False)
         picture = _levels(stops, name == "final" and is_encoded)[halves.view(np.uint16)]
     else:
-        picture = pictures.shown_picture(array, name, is_encoded=is_encoded)[:, :, :3]
+        picture = pictures.picture(array, name)[:, :, :3]
     return pictures.png(picture, _LEVEL)
 
 
@@ -52,9 +52,8 @@ def _levels(stops: float, is_encoded: bool) -> NDArray[np.uint8]:
     """Return the 8-bit level of every half float, by its bits."""
     halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16).reshape(1, -1, 1)
     with np.errstate(all="ignore"):
-        shown = pictures.shown_picture(
-            halves.repeat(3, axis=2), "final", is_encoded=is_encoded, stops=stops
-        )
+        colours = halves.repeat(3, axis=2)
+        shown = pictures.picture(colours, encoded=is_encoded, stops=stops)
     return shown[0, :, 0]
 
 

@@ -24,7 +24,7 @@ from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import Block
 from vkbloom.grid.plan import Grid, Layout, lay_out
 from vkbloom.grid.progress import Progress
-from vkbloom.grid.running import Sink, Writer, empty_arrays
+from vkbloom.grid.running import Sink, Writer, written_behind
 from vkbloom.renderer import Renderer
 
 # Dask's own types are incomplete.
@@ -113,15 +113,12 @@ def _render(grid: Grid, run: _Run) -> Tally:
         total = Tally()
         try:
             filler = Filler(grid, run.layout, renderer)
-            for block in run.blocks:
-                arrays = empty_arrays(run.layout, block)
-                total.add(filler.fill(block, arrays))
-                run.writer.write(block, arrays)
+            blocks = written_behind(filler, run.writer, run.blocks, run.layout, total.add)
+            run.writer.flush(list(blocks))
         except DeviceLostError:
             # The next try gets a new device.
             renderer.close()
             raise
-        run.writer.flush(run.blocks)
         return total
 
 

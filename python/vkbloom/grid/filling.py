@@ -32,7 +32,7 @@ class Tally:
     ran : int
         Passes that ran, those for points to compare with included.
     alone : int
-        Passes of the same points, each rendered alone.
+        Passes of the same points, each rendered alone and no form standing for several passes.
     """
 
     points: int = 0

@@ -45,7 +45,6 @@ def ranking(
     source: Source,
     settings: Settings,
     axes: Sequence[Axis],
-    attachments: str | Sequence[str],
 ) -> tuple[int, ...]:
     """Return the axes from the one whose steps run the most passes to the one with the fewest.
 
@@ -60,8 +59,6 @@ def ranking(
     source : Source
     settings : Settings
     axes : sequence of Axis
-    attachments : "all" or sequence of str
-        The framebuffers that will be asked for.
 
     Returns
     -------
@@ -76,7 +73,9 @@ def ranking(
         for backwards in (False, True):
             steps = list(_walk(axes, backwards=backwards))
             path = (point_at(small, settings, axes, index) for _, index in steps)
-            frames = visit(renderer, small, path, attachments)
+            # Of all framebuffers, so that each pass runs by itself: where `final` alone is wanted,
+            # one form may stand for several passes, at some points and not at others.
+            frames = visit(renderer, small, path, "all")
             for (stepped, _), (_, seen) in zip(steps, frames, strict=True):
                 if stepped is not None:
                     costs[stepped] += len(seen.timings)
@@ -114,7 +113,7 @@ def passes_alone(
     Returns
     -------
     int
-        As `Frames.timings` counts them.
+        As `Frames.timings` counts them where no form stands for several passes.
     """
     is_image = source.shading == "image"
     if bloom_size is not None and is_image:

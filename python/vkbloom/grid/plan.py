@@ -235,7 +235,7 @@ def lay_out(grid: Grid, renderer: Renderer) -> Layout:
             if name in grid.references() and isinstance(reduction, Reduction):
                 reference_size += sample[reduction.attachment].nbytes
     return Layout(
-        ranking=passes.ranking(renderer, grid.source, grid.settings, grid.axes, grid.wanted),
+        ranking=passes.ranking(renderer, grid.source, grid.settings, grid.axes),
         variables=variables,
         coordinates=coordinates,
         reference_size=reference_size,

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.comparison import compare
+from vkbloom.comparison import Metric, compare
 from vkbloom.frames import Frames
 
 __all__ = ["FLIP", "PSNR", "SSIM", "EncircledEnergy", "Max", "Mean", "Reduction"]
@@ -177,7 +177,7 @@ class Comparing(Reduction):
     against: NDArray[Any] | Mapping[str, Any]
     data_range: float | None = None
 
-    metric: ClassVar[str]
+    metric: ClassVar[Metric]
 
     def __post_init__(self) -> None:
         if not isinstance(self.against, np.ndarray | Mapping):
@@ -207,14 +207,14 @@ class Comparing(Reduction):
 class SSIM(Comparing):
     """Structural similarity to a reference (scikit-image's, window of 7 x 7)."""
 
-    metric: ClassVar[str] = "ssim"
+    metric: ClassVar[Metric] = "ssim"
 
 
 @dataclass(frozen=True, kw_only=True)
 class PSNR(Comparing):
     """Peak signal-to-noise ratio to a reference; infinite where nothing differs."""
 
-    metric: ClassVar[str] = "psnr"
+    metric: ClassVar[Metric] = "psnr"
     units: ClassVar[str] = "dB"
 
 
@@ -222,4 +222,4 @@ class PSNR(Comparing):
 class FLIP(Comparing):
     """Mean FLIP against a reference (OpenImageIO's; HDR-FLIP for floats)."""
 
-    metric: ClassVar[str] = "flip"
+    metric: ClassVar[Metric] = "flip"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.grid.filling import Filler
+from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import Block
 from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.progress import Progress
@@ -17,7 +18,7 @@ from vkbloom.grid.progress import Progress
 if TYPE_CHECKING:
     from vkbloom.renderer import Renderer
 
-__all__ = ["Sink", "Writer", "empty_arrays", "run_here"]
+__all__ = ["Sink", "Writer", "empty_arrays", "run_here", "written_behind"]
 
 # How long and how much may be rendered before it is brought to the disk and marked.
 _COMMIT_SECONDS: Final = 2.0
@@ -98,10 +99,7 @@ def run_here(
             pending.clear()
 
     try:
-        for block in todo:
-            arrays = empty_arrays(layout, block)
-            filler.fill(block, arrays, progress.add)
-            sink.writer.write(block, arrays)
+        for block in written_behind(filler, sink.writer, todo, layout, progress.add):
             pending.append(block)
             if len(pending) >= _COMMIT_BLOCKS or time.monotonic() - committed > _COMMIT_SECONDS:
                 commit()
@@ -112,7 +110,51 @@ def run_here(
         raise
 
 
-def _commit_after(error: BaseException, commit: Any) -> None:
+def written_behind(
+    filler: Filler,
+    writer: Writer,
+    todo: Iterable[Block],
+    layout: Layout,
+    on_point: Callable[[Tally], object],
+) -> Iterator[Block]:
+    """Render blocks, each written while the next is rendered.
+
+    Parameters
+    ----------
+    filler : Filler
+    writer : Writer
+    todo : iterable of Block
+    layout : Layout
+    on_point : callable
+        Called with the count of each point that is rendered.
+
+    Yields
+    ------
+    Block
+        That is written; when rendering fails, the one before it still is.
+    """
+    with ThreadPoolExecutor(1, "vkbloom-grid") as pool:
+        behind: tuple[Block, Future[None]] | None = None
+        failure: Exception | None = None
+        for block in todo:
+            arrays = empty_arrays(layout, block)
+            try:
+                filler.fill(block, arrays, on_point)
+            except Exception as error:
+                failure = error
+                break
+            if behind is not None:
+                behind[1].result()
+                yield behind[0]
+            behind = block, pool.submit(writer.write, block, arrays)
+        if behind is not None:
+            behind[1].result()
+            yield behind[0]
+    if failure is not None:
+        raise failure
+
+
+def _commit_after(error: BaseException, commit: Callable[[], None]) -> None:
     try:
         commit()
     except OSError as second:

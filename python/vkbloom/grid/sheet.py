@@ -160,7 +160,6 @@ def _cell(
     point = part.isel({axis: number for axis, number in place.items() if axis is not None})
     if "done" in point and not bool(point["done"].values):
         return np.full((size[1], size[0], 3), _CELL, np.uint8)
-    picture = pictures.shown_picture(
-        point[name].values, name, size, is_encoded=views.encoding_of(point) != "none"
-    )
+    is_encoded = name == "final" and views.encoding_of(point) != "none"
+    picture = pictures.picture(point[name].values, name, encoded=is_encoded, size=size)
     return np.broadcast_to(picture[:, :, :3], (size[1], size[0], 3))

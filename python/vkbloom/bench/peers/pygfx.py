@@ -57,6 +57,15 @@ class Bloom:
     def radius(self, radius: float) -> None:
         self._pass.filter_radius = radius
 
+    @property
+    def karis_average(self) -> bool:
+        """Whether the first level is to be weighted against fireflies."""
+        return bool(self._pass.use_karis_average)
+
+    @karis_average.setter
+    def karis_average(self, is_on: bool) -> None:
+        self._pass.use_karis_average = is_on
+
     def bloom(self, image: NDArray[np.float16], strength: float = 1.0) -> NDArray[np.float16]:
         """Return image + (bloom - image) * strength, the bloom being the sum of its levels."""
         self._pass.bloom_strength = strength

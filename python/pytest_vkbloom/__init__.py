@@ -1,0 +1,253 @@
+"""vkbloom's pytest plugin: fixtures and options for tests of bloom and other rendered images.
+
+A package of its own, because pytest imports its plugins on every run: nothing of vkbloom, and so
+no NumPy, is imported before a test asks for a fixture.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from vkbloom import Renderer
+    from vkbloom.testing.records import Record
+    from vkbloom.testing.regression import FrameRegression
+
+__all__ = ["bloom_renderer", "frame_regression"]
+
+_RECORDS = pytest.StashKey[list["Record"]]()
+_RUN = pytest.StashKey["_Run"]()
+# Attributes in which the report of a test carries its checks, and what is known of its module,
+# from an xdist worker to the controller.
+_CHECKS = "vkbloom_checks"
+_MODULE = "vkbloom_module"
+_FOLDER = "bloom_references"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options."""
+    group = parser.getgroup("vkbloom", "bloom and other rendered images")
+    group.addoption(
+        "--bloom-update",
+        action="store_true",
+        help="write the references of checks that fail or have none, in place of the old ones",
+    )
+    group.addoption(
+        "--bloom-add",
+        action="store_true",
+        help="write them as further valid references, beside those of other machines",
+    )
+    group.addoption(
+        "--bloom-allow-missing",
+        action="store_true",
+        help="let checks pass that have no reference",
+    )
+    group.addoption(
+        "--bloom-adapter",
+        metavar="NAME",
+        default="auto",
+        help='what bloom_renderer runs on: "software", "hardware" or a part of a name',
+    )
+    group.addoption(
+        "--bloom-expect-adapter",
+        metavar="NAME",
+        help="a part of the name or of the driver of the adapter; any other is an error",
+    )
+    group.addoption(
+        "--bloom-report",
+        metavar="DIR",
+        help="write a page with all checks, and with pictures of those that fail",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Check the options."""
+    writes = config.getoption("bloom_update") or config.getoption("bloom_add")
+    is_worker = hasattr(config, "workerinput")
+    if writes and (is_worker or config.getoption("dist", "no") != "no"):
+        raise pytest.UsageError(
+            "--bloom-update and --bloom-add write files that all workers share: run without -n"
+        )
+    if config.getoption("bloom_update") and config.getoption("bloom_add"):
+        raise pytest.UsageError("--bloom-update replaces references, --bloom-add keeps them")
+    if config.getoption("bloom_expect_adapter") == "":
+        raise pytest.UsageError("--bloom-expect-adapter: a name is needed")
+    run = _Run(config)
+    config.stash[_RUN] = run
+    config.pluginmanager.register(run, "vkbloom-run")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tell an xdist worker where the parts of the report belong."""
+    parts = node.config.stash[_RUN].parts
+    node.workerinput["vkbloom_parts"] = None if parts is None else str(parts)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Hand what the checks of a test found to whoever reports it."""
+    report = yield
+    records = item.stash.get(_RECORDS, None)
+    if records:
+        setattr(report, _CHECKS, list(records))
+        records.clear()
+    setattr(report, _MODULE, item.config.stash[_RUN].describe(item))
+    return report
+
+
+@pytest.fixture(scope="session")
+def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
+    """One `vkbloom.Renderer` for the whole process, on the adapter of ``--bloom-adapter``.
+
+    No adapter, and another than ``--bloom-expect-adapter`` names, is an error.
+    """
+    from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
+
+    with Renderer(pytestconfig.getoption("bloom_adapter")) as renderer:
+        wanted = pytestconfig.getoption("bloom_expect_adapter")
+        info = renderer.info
+        known = f"{info.name} {info.driver_info or info.driver}"
+        if wanted is not None and wanted.lower() not in known.lower():
+            raise ValueError(f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}")
+        yield renderer
+
+
+@pytest.fixture
+def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
+    """Compare frames with references: see `vkbloom.testing.FrameRegression.check`."""
+    from vkbloom.testing.regression import (  # noqa: PLC0415  costs start-up time
+        FrameRegression,
+        Mode,
+        name_of_test,
+    )
+
+    config, item = request.config, request.node
+    return FrameRegression(
+        folder=folder_of(item.path),
+        test=item.nodeid,
+        name=name_of_test(item.nodeid.partition("::")[2] or item.name),
+        mode=Mode(
+            update=config.getoption("bloom_update"),
+            add=config.getoption("bloom_add"),
+            allow_missing=config.getoption("bloom_allow_missing"),
+            expect_adapter=config.getoption("bloom_expect_adapter"),
+            parts=config.stash[_RUN].parts,
+        ),
+        records=item.stash.setdefault(_RECORDS, []),
+    )
+
+
+def folder_of(module: Path) -> Path:
+    """Return the folder with the references of a test module."""
+    return module.parent / _FOLDER / module.stem
+
+
+class _Run:
+    """What is known of all checks of a run; registered as a plugin of its own."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+        self._worker_input: dict[str, Any] | None = getattr(config, "workerinput", None)
+        self._records: list[Record] = []
+        # By folder of references: how many tests their modules have, and which of them passed.
+        self._totals: Counter[str] = Counter()
+        self._passed: dict[str, set[str]] = {}
+        self._partly: set[Path] = set()
+        self._page: Path | None = None
+        wanted = config.getoption("bloom_report")
+        self._report = None if wanted is None else config.invocation_params.dir / wanted
+        self.parts = None if self._report is None else self._report / ".parts"
+        if self._worker_input is not None:
+            given = self._worker_input["vkbloom_parts"]
+            self.parts = None if given is None else Path(given)
+        elif self.parts is not None:
+            # What a run left that was interrupted.
+            shutil.rmtree(self.parts, ignore_errors=True)
+
+    def pytest_deselected(self, items: list[pytest.Item]) -> None:
+        """Note whose references cannot be called unused."""
+        self._partly.update(item.path for item in items)
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Count the tests by module."""
+        for argument in session.config.args:
+            path, _, test = argument.partition("::")
+            if test:
+                self._partly.add((session.config.invocation_params.dir / path).resolve())
+        self._totals.update(str(folder_of(item.path)) for item in session.items)
+
+    def describe(self, item: pytest.Item) -> tuple[str, int] | None:
+        """Return a test's folder of references and how many tests have it; None if unknown."""
+        if item.path in self._partly:
+            return None
+        folder = str(folder_of(item.path))
+        return folder, self._totals[folder]
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Take what a report carries, from this process or from a worker."""
+        self._records += getattr(report, _CHECKS, [])
+        module = getattr(report, _MODULE, None)
+        if module is not None and report.when == "call" and report.passed:
+            folder, total = module
+            self._totals[folder] = total
+            self._passed.setdefault(folder, set()).add(report.nodeid)
+
+    def pytest_sessionfinish(self) -> None:
+        """Write the report."""
+        if self._report is None or self.parts is None or self._worker_input is not None:
+            return
+        from vkbloom.testing.report import write_report  # noqa: PLC0415  costs start-up time
+
+        self._page = write_report(self._report, self.parts, self._records)
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """List references that were written, are missing or are unused; say where the report is."""
+        lines = [
+            f"{record['outcome']}: {self._relative(Path(record['folder']) / record['name'])}.json"
+            for record in self._records
+            if record["outcome"] in ("written", "missing")
+        ]
+        lines += [f"unused: {self._relative(file)}" for file in self._unused()]
+        if self._page is not None:
+            lines.append(f"report: {self._relative(self._page)}")
+        if lines:
+            terminalreporter.section("vkbloom")
+            for line in lines:
+                terminalreporter.write_line(line)
+
+    def _unused(self) -> list[Path]:
+        """Find references that no test asked for, of modules whose tests all ran and passed."""
+        used = {
+            (record["folder"], record["name"]) for record in self._records if record["has_files"]
+        }
+        unused: list[Path] = []
+        for folder, tests in self._passed.items():
+            if len(tests) != self._totals[folder]:
+                continue
+            unused += (
+                file
+                for file in Path(folder).glob("*.json")
+                if (folder, file.name.removesuffix(".json")) not in used
+            )
+        for parent in {Path(folder).parent for folder in self._passed}:
+            if parent.is_dir():
+                unused += (
+                    folder
+                    for folder in parent.iterdir()
+                    if folder.is_dir() and not (parent.parent / f"{folder.name}.py").exists()
+                )
+        return sorted(unused)
+
+    def _relative(self, path: Path) -> str:
+        """Shorten a path for the terminal."""
+        base = self._config.invocation_params.dir
+        return str(path.relative_to(base) if path.is_relative_to(base) else path)

@@ -1,0 +1,387 @@
+"""Laws of a blur or bloom as a whole, on any callable that takes an image and returns one.
+
+Each assertion says what the law is, the largest deviation from it with its place, and what the
+value there should have been. How large a deviation may be follows from how exact a single value of
+a result is (`vkbloom.testing.Probe`): the errors of all values that enter a law are added up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NoReturn
+
+import numpy as np
+
+from vkbloom.settings import check_number
+from vkbloom.testing.probe import Bloom, Image, Probe
+
+__all__ = [
+    "assert_additive",
+    "assert_bounded_fireflies",
+    "assert_gain",
+    "assert_no_ringing",
+    "assert_superposition",
+    "assert_symmetric",
+    "compare_with_law",
+    "fail",
+]
+
+_DEFAULT = Probe()
+
+
+def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+    """Assert that the bloom of a mixture of two images is the mixture of their blooms.
+
+    The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise; additivity and
+    homogeneity at once, which is linearity (Oppenheim and Willsky, "Signals and Systems", chapter
+    1). It does not hold for a method with a threshold, a clamp or a firefly filter.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+        What is tried, and how exact it has to be.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+    """
+    __tracebackhide__ = True
+    # Quarters and halves of levels would be rounded before the bloom sees them.
+    a, b = (_whole_quarters(probe, probe.noise(index, probe.value)) for index in (0, 1))
+    whole, whole_error = probe.apply(bloom, a / 2 + b / 4)
+    of_a, error_a = probe.apply(bloom, a)
+    of_b, error_b = probe.apply(bloom, b)
+    compare_with_law(
+        "assert_superposition",
+        "B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4",
+        whole,
+        of_a / 2 + of_b / 4,
+        whole_error + error_a / 2 + error_b / 4,
+    )
+
+
+def assert_additive(
+    bloom: Bloom,
+    glow: Bloom | None = None,
+    intensity: float = 1.0,
+    probe: Probe = _DEFAULT,
+) -> None:
+    """Assert that a picture with bloom is the picture plus light.
+
+    The law: F(a) = a + intensity * G(a), for an image of noise, where F is the picture with bloom
+    and G the bloom alone: additive blending, which is how the aperture of a camera or an eye
+    spreads light over what is there (Spencer et al., "Physically-Based Glare Effects for Digital
+    Images", SIGGRAPH 1995). Without G, all that can be asked is F(a) >= a: light is added and none
+    is taken. A mix, which takes from bright pixels what it gives to others, fails.
+
+    Parameters
+    ----------
+    bloom : callable
+        Image to the picture with bloom.
+    glow : callable, optional
+        Image to the bloom alone.
+    intensity : float
+        Factor of the bloom in the picture, 0 or more.
+    probe : Probe
+        For integers, `value` must leave room for the bloom, or it will be clamped.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or `intensity` is out of range.
+    """
+    __tracebackhide__ = True
+    check_number("intensity", intensity, 0.0, math.inf)
+    image = probe.noise(0, probe.value)
+    picture, error = probe.apply(bloom, image)
+    if glow is None:
+        compare_with_law(
+            "assert_additive",
+            "F(a) >= a: light is added and none is taken",
+            picture,
+            np.maximum(picture, image),
+            error,
+        )
+        return
+    light, light_error = probe.apply(glow, image)
+    compare_with_law(
+        "assert_additive",
+        f"F(a) = a + {intensity:g} G(a)",
+        picture,
+        image + intensity * light,
+        error + intensity * light_error,
+    )
+
+
+def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
+    """Assert what a flat image becomes.
+
+    The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, a half and a
+    quarter of it: the sum of the kernel's weights is the gain, at the border too where the image is
+    continued by its edge. A gain of 1 keeps the energy.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    gain : float
+        For `vkbloom`'s own methods, `vkbloom.reference.gain` computes it.
+    probe : Probe
+        For integers, `value` times `gain` must not be over 1.
+    border : int
+        Pixels to each side that are not looked at, for methods that see black beyond the image.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an argument is out of range.
+    """
+    __tracebackhide__ = True
+    check_number("gain", gain, 0.0, math.inf)
+    for part in (1.0, 0.5, 0.25):
+        image = _whole_quarters(probe, probe.flat(probe.value)) * part
+        result, error = probe.apply(bloom, image)
+        inner = _inner(probe, border)
+        compare_with_law(
+            "assert_gain",
+            f"B(v) = {gain:.6g} v, for a flat image of v = {image.flat[0]:.6g}",
+            result[inner],
+            gain * image[inner],
+            error,
+            border=border,
+        )
+
+
+def assert_symmetric(
+    bloom: Bloom,
+    probe: Probe = _DEFAULT,
+    *,
+    axes: Sequence[Literal["x", "y", "xy"]] = ("x", "y"),
+) -> None:
+    """Assert that the bloom of a mirrored image is the mirrored bloom.
+
+    The law: B(M a) = M B(a), for an image of noise and each mirroring M. A kernel that is not
+    symmetric breaks it, and so does a shift by any part of a pixel, such as a missing half-texel.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+    axes : sequence of {"x", "y", "xy"}
+        "x" swaps left and right, "y" top and bottom, "xy" rows and columns.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an axis is unknown.
+    """
+    __tracebackhide__ = True
+    image = probe.noise(0, probe.value)
+    result, error = probe.apply(bloom, image)
+    for axis in axes:
+        if axis not in ("x", "y", "xy"):
+            raise ValueError(f"axes: {axis!r} is not one of x, y, xy")
+        mirrored, mirrored_error = probe.apply(bloom, _mirrored(image, axis))
+        law = {
+            "x": "left and right swapped before or after the bloom are the same",
+            "y": "top and bottom swapped before or after the bloom are the same",
+            "xy": "rows and columns swapped before or after the bloom are the same",
+        }[axis]
+        compare_with_law(
+            "assert_symmetric", law, _mirrored(mirrored, axis), result, error + mirrored_error
+        )
+
+
+def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
+    """Assert that an edge stays one edge: no dark or bright line beside it.
+
+    The law: across a step from black to `probe.value`, in either direction, values only rise, and
+    they stay between those of the black and of the flat bright image. It holds if no weight of the
+    kernel is negative (Mitchell and Netravali, "Reconstruction Filters in Computer Graphics",
+    SIGGRAPH 1988, on ringing).
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+    border : int
+        Pixels to each side that are not looked at, for methods that see black beyond the image.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or `border` is out of range.
+    """
+    __tracebackhide__ = True
+    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
+    bright, bright_error = probe.apply(bloom, probe.flat(probe.value))
+    inner = _inner(probe, border)
+    width, height = probe.size
+    for axis, across, lit in (
+        (1, "x", (slice(None), slice(width // 2, None))),
+        (0, "y", (slice(height // 2, None), slice(None))),
+    ):
+        step = probe.flat(0.0)
+        step[lit] = probe.value
+        result, error = probe.apply(bloom, step)
+        compare_with_law(
+            "assert_no_ringing",
+            f"a step along {across} stays between the bloom of black and of the flat image",
+            result[inner],
+            np.clip(result, dark, bright)[inner],
+            error + max(dark_error, bright_error),
+            border=border,
+        )
+        inside = result[inner]
+        # The largest value so far: what a later one must not be under.
+        compare_with_law(
+            "assert_no_ringing",
+            f"along {across}, values only rise across a step from black to bright",
+            inside,
+            np.maximum.accumulate(inside, axis=axis),
+            2 * error,
+            border=border,
+        )
+
+
+def assert_bounded_fireflies(
+    bloom: Bloom,
+    limit: float = 1.0,
+    probe: Probe = _DEFAULT,
+    *,
+    brightness: Sequence[float] = (10.0, 1e3, 6e4),
+    period: int = 2,
+) -> None:
+    """Assert that one very bright pixel does not light up its surroundings.
+
+    The law: with a pixel of brightness L on a dark image, no other pixel rises by more than
+    `limit`, for each L, wherever the pixel lies. A linear bloom spreads a share of L and so has no
+    limit, which in an animation is a flicker; an average weighted by 1 / (1 + luminance) (Karis,
+    "Tone Mapping", 2013) or a clamp is to set one.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    limit : float
+        By how much another pixel may rise, in real units.
+    probe : Probe
+        Of floats; `value` is not used.
+    brightness : sequence of float
+        Infinity is allowed: what is not finite must not spread.
+    period : int
+        The pixel is tried in a square of as many places to a side, as chains of halved images
+        treat places differently: 2 for one halving, 4 for two.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an argument is out of range.
+    """
+    __tracebackhide__ = True
+    if probe.dtype.kind == "u":
+        raise TypeError(f"probe: {probe.dtype} has nothing brighter than 1; floats are needed")
+    check_number("limit", limit, 0.0, math.inf)
+    if not 1 <= period <= min(probe.size):
+        raise ValueError(f"period: {period!r} is out of range, 1 to {min(probe.size)}")
+    left, top = (max(0, side // 2 - period // 2) for side in probe.size)
+    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
+    for light in brightness:
+        for place in ((left + x, top + y) for y in range(period) for x in range(period)):
+            image = probe.point(place, light)
+            result, error = probe.apply(bloom, image, exempt=place)
+            compare_with_law(
+                "assert_bounded_fireflies",
+                f"a pixel of {light:g} at x {place[0]}, y {place[1]} lifts others by {limit:g} at "
+                "most",
+                result,
+                np.minimum(result, dark + limit),
+                error + dark_error,
+            )
+
+
+def compare_with_law(
+    assertion: str,
+    law: str,
+    found: Image,
+    expected: Image,
+    allowed: float,
+    *,
+    border: int = 0,
+    note: str = "",
+) -> None:
+    """Raise AssertionError with figure, place and law unless all values are as expected.
+
+    Parameters
+    ----------
+    assertion, law : str
+        Which assertion it is, and what it is about.
+    found, expected : ndarray of float64, shape (H, W, C)
+    allowed : float
+        Largest difference.
+    border : int
+        Pixels that were cut off above and to the left.
+    note : str
+        A further figure for the message.
+    """
+    __tracebackhide__ = True
+    difference = np.abs(found - expected)
+    place = np.unravel_index(int(difference.argmax()), difference.shape)
+    if difference[place] > allowed:
+        y, x, channel = (int(index) for index in place)
+        fail(
+            assertion,
+            law,
+            f"{found[place]:.6g} instead of {expected[place]:.6g} at x {x + border}, "
+            f"y {y + border}, channel {channel}: off by {difference[place]:.3g}, {allowed:.3g} "
+            f"allowed{note}",
+        )
+
+
+def fail(assertion: str, law: str, figure: str) -> NoReturn:
+    """Raise AssertionError with what was found and the law that it breaks."""
+    __tracebackhide__ = True
+    raise AssertionError(f"{assertion}: {figure}\n  law: {law}")
+
+
+def _whole_quarters(probe: Probe, image: Image) -> Image:
+    """Round values so that a half and a quarter of two of them add up without rounding.
+
+    Integers to multiples of four levels; floats to 256 levels, of which half has 8 times as many.
+    """
+    levels = np.iinfo(probe.dtype).max / 4 if probe.dtype.kind == "u" else 256 / probe.value
+    whole: Image = np.floor(image * levels + 1e-9) / levels
+    return whole
+
+
+def _mirrored(image: Image, axis: str) -> Image:
+    if axis == "xy":
+        return image.swapaxes(0, 1)
+    return np.flip(image, 1 if axis == "x" else 0)
+
+
+def _inner(probe: Probe, border: int) -> tuple[slice, slice]:
+    width, height = probe.size
+    if not 0 <= border < min(width, height) / 2:
+        raise ValueError(
+            f"border: {border!r} is out of range, 0 to under half of {min(width, height)}"
+        )
+    return slice(border, height - border), slice(border, width - border)

@@ -1,0 +1,410 @@
+"""The point spread of a blur or bloom, and the laws that are about its shape."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.settings import check_number
+from vkbloom.testing.laws import compare_with_law, fail
+from vkbloom.testing.probe import Bloom, Image, Probe
+
+__all__ = [
+    "Response",
+    "assert_centroid_kept",
+    "assert_separable",
+    "assert_spread",
+    "point_spread",
+    "response",
+]
+
+_DEFAULT = Probe()
+# Share of a point's light that may lie in the outermost pixels. Clamping to the edge doubles what
+# lies there at most, and so moves a centroid by a thousandth of half the image.
+_AT_THE_BORDER: Final = 1e-3
+
+
+def point_spread(
+    bloom: Bloom, probe: Probe = _DEFAULT, *, at: tuple[int, int] | None = None
+) -> Image:
+    """Return what one lit pixel becomes.
+
+    The point-spread function h(x, y) = (B(v d) - B(0)) / v, d being an image with one pixel of 1
+    and v the probe's value. A linear, shift-invariant blur is the convolution with it (Goodman,
+    "Introduction to Fourier Optics", chapter 2).
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+    at : (int, int), optional
+        x and y of the pixel; by default the one in the middle.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, C)
+        With the pixel at its place.
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or `at` is not in the image.
+    """
+    __tracebackhide__ = True
+    return _measured(bloom, probe, at)[0]
+
+
+def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+    """Assert that the point spread is the product of a row and a column.
+
+    The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), with (x0, y0) the place of the largest value;
+    equivalently, h as a matrix has the rank 1, and its second singular value is 0 (Treitel and
+    Shanks, "The Design of Multistage Separable Planar Filters", IEEE Transactions on Geoscience
+    Electronics, 1971). Of a sum of separable layers it does not hold.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone, as the
+        picture itself under it is a second layer.
+    probe : Probe
+        `value` must be dark enough for nothing to be clamped.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, the result is black, or it is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+    """
+    __tracebackhide__ = True
+    spread, error = _measured(bloom, probe, None)
+    _check_lit("assert_separable", spread, error)
+    product = np.empty_like(spread)
+    shares = []
+    for channel in range(spread.shape[2]):
+        plane = spread[:, :, channel]
+        y, x = np.unravel_index(int(np.abs(plane).argmax()), plane.shape)
+        product[:, :, channel] = np.outer(plane[:, x], plane[y]) / plane[y, x]
+        singular = np.linalg.svd(plane, compute_uv=False)
+        shares.append(float(singular[1] / singular[0]) if len(singular) > 1 else 0.0)
+    compare_with_law(
+        "assert_separable",
+        "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column",
+        spread,
+        product,
+        # Four values, none of them larger than the one that is divided by.
+        4 * error,
+        note=f"; the second singular value is {100 * max(shares):.3g} % of the first",
+    )
+
+
+def assert_centroid_kept(
+    bloom: Bloom,
+    probe: Probe = _DEFAULT,
+    *,
+    at: tuple[int, int] | None = None,
+    within: float = 0.01,
+) -> None:
+    """Assert that light spreads around the place that it comes from.
+
+    The law: the centroid of the point spread, sum of h(x, y) (x, y) / sum of h, is the pixel that
+    was lit. Chains of halved images keep it on average over places, and miss it at each: there a
+    larger `within` is the law.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+        With a border wide enough for what is spread.
+    at : (int, int), optional
+        x and y of the lit pixel; by default the one in the middle.
+    within : float
+        Distance along each axis that is allowed, in pixels, on top of what the exactness of single
+        values leads to.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, the result is black, or it is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the light reaches the
+        border.
+    """
+    __tracebackhide__ = True
+    check_number("within", within, 0.0, math.inf)
+    spread, error = _measured(bloom, probe, at)
+    _check_lit("assert_centroid_kept", spread, error)
+    _check_inside(spread)
+    place = at or probe.centre
+    for channel in range(spread.shape[2]):
+        for axis, name in ((0, "x"), (1, "y")):
+            profile = spread[:, :, channel].sum(axis=axis)
+            distance = np.arange(len(profile), dtype=np.float64) - place[axis]
+            off = float((profile * distance).sum() / profile.sum())
+            allowed = within + _moment_error(spread[:, :, channel], error, axis, distance)
+            if abs(off) > allowed:
+                fail(
+                    "assert_centroid_kept",
+                    "the centroid of the light of a pixel is that pixel",
+                    f"the centroid is {name} {place[axis] + off:.6g}, {off:+.3g} pixels from "
+                    f"{name} {place[axis]}, channel {channel}: {allowed:.3g} allowed",
+                )
+
+
+def assert_spread(
+    bloom: Bloom,
+    sigma: float | tuple[float, float],
+    probe: Probe = _DEFAULT,
+    *,
+    rtol: float = 0.02,
+) -> None:
+    """Assert how far light spreads.
+
+    The law: the standard deviation of the point spread along x and y is sigma. Variances add up
+    under convolution (Bracewell, "The Fourier Transform and Its Applications", chapter 8), so
+    that of several passes is the root of the sum of squares, and a kernel with weights w_i at
+    distances d_i has the variance sum w_i d_i^2 / sum w_i.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    sigma : float or (float, float)
+        Along both axes or along x and y, in pixels.
+    probe : Probe
+        With a border wide enough for what is spread.
+    rtol : float
+        Relative difference that is allowed. The default has room for a Gaussian that is cut off at
+        three sigma, whose standard deviation is 1.3 % smaller.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, the result is black, or it is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the light reaches the
+        border.
+    """
+    __tracebackhide__ = True
+    pair = sigma if isinstance(sigma, tuple) else (sigma, sigma)
+    for number in pair:
+        check_number("sigma", number, 0.0, math.inf)
+    check_number("rtol", rtol, 0.0, math.inf)
+    spread, error = _measured(bloom, probe, None)
+    _check_lit("assert_spread", spread, error)
+    _check_inside(spread)
+    for channel in range(spread.shape[2]):
+        for axis, name in ((0, "x"), (1, "y")):
+            profile = spread[:, :, channel].sum(axis=axis)
+            distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
+            found = _deviation(profile)
+            # The variance's error, which is 2 sigma times that of the deviation.
+            variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
+            allowed = rtol * pair[axis] + variance_error / max(2 * found, 1e-6)
+            if not abs(found - pair[axis]) <= allowed:
+                fail(
+                    "assert_spread",
+                    f"the standard deviation of the light of a pixel along {name} is "
+                    f"{pair[axis]:.6g} pixels",
+                    f"it is {found:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
+                    f"{channel}: off by {abs(found - pair[axis]):.3g}, {allowed:.3g} allowed",
+                )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Response:
+    """How the point spread of a bloom follows a parameter.
+
+    Parameters
+    ----------
+    parameter : str
+        Its name.
+    values : tuple
+        What it was set to.
+    gain : ndarray of float64, shape (N,)
+        What all the light of a pixel adds up to, for a pixel of 1; of the first channel, as all of
+        these.
+    peak : ndarray of float64, shape (N,)
+        The largest value.
+    shift : ndarray of float64, shape (N, 2)
+        Of the centroid, in pixels along x and y; NaN where there is no light.
+    sigma : ndarray of float64, shape (N, 2)
+        Standard deviation along x and y in pixels; NaN where there is no light, or where negative
+        values outweigh.
+    at_border : ndarray of float64, shape (N,)
+        Share of the light in the outermost pixels: where it is not small, the others are too
+        small.
+    """
+
+    parameter: str
+    values: tuple[Any, ...]
+    gain: NDArray[np.float64]
+    peak: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    at_border: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        """Return a table."""
+        rows = [(self.parameter, "gain", "peak", "shift x, y", "sigma x, y", "at border")]
+        for index, value in enumerate(self.values):
+            rows.append(
+                (
+                    str(value),
+                    f"{self.gain[index]:.5g}",
+                    f"{self.peak[index]:.5g}",
+                    "{:.3g}, {:.3g}".format(*self.shift[index]),
+                    "{:.4g}, {:.4g}".format(*self.sigma[index]),
+                    f"{self.at_border[index]:.2g}",
+                )
+            )
+        widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+        return "\n".join(
+            "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+            for row in rows
+        )
+
+
+def response(
+    bloom: Callable[..., NDArray[Any]],
+    parameter: str,
+    values: Sequence[Any],
+    probe: Probe = _DEFAULT,
+) -> Response:
+    """Measure how the point spread of a bloom follows a parameter.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and, as a keyword, the parameter; returns an image of the same height and
+        width.
+    parameter : str
+        The keyword.
+    values : sequence
+        What to set it to.
+    probe : Probe
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or there is no value.
+    """
+    __tracebackhide__ = True
+    if not len(values):
+        raise ValueError("values: one at least is needed")
+    rows = []
+    for value in values:
+        one = functools.partial(bloom, **{parameter: value})
+        spread = point_spread(one, probe)[:, :, 0]
+        total = float(spread.sum())
+        profiles = [spread.sum(axis=0), spread.sum(axis=1)]
+        shifts = [math.nan, math.nan]
+        if total:
+            shifts = [
+                _centroid(profile) - place
+                for profile, place in zip(profiles, probe.centre, strict=True)
+            ]
+        rows.append(
+            (
+                total,
+                float(spread.max()),
+                shifts,
+                [_deviation(profile) for profile in profiles],
+                _border_share(spread),
+            )
+        )
+    gain, peak, shift, sigma, at_border = (
+        np.array(column, np.float64) for column in zip(*rows, strict=True)
+    )
+    return Response(
+        parameter=parameter,
+        values=tuple(values),
+        gain=gain,
+        peak=peak,
+        shift=shift,
+        sigma=sigma,
+        at_border=at_border,
+    )
+
+
+def _measured(bloom: Bloom, probe: Probe, at: tuple[int, int] | None) -> tuple[Image, float]:
+    """Return the point spread and by how much its values may be off."""
+    __tracebackhide__ = True
+    place = at or probe.centre
+    if not all(0 <= number < side for number, side in zip(place, probe.size, strict=True)):
+        raise ValueError(f"at: {at!r} is not in an image of {probe.size}")
+    lit, lit_error = probe.apply(bloom, probe.point(place, probe.value))
+    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
+    return (lit - dark) / probe.value, (lit_error + dark_error) / probe.value
+
+
+def _check_lit(assertion: str, spread: Image, error: float) -> None:
+    """Fail where there is nothing to measure."""
+    __tracebackhide__ = True
+    for channel in range(spread.shape[2]):
+        largest = float(np.abs(spread[:, :, channel]).max())
+        if largest <= error or not spread[:, :, channel].sum() > 0:
+            fail(
+                assertion,
+                "a lit pixel gives light",
+                f"the largest value is {largest:.3g} in channel {channel}, which may be off by "
+                f"{error:.3g}",
+            )
+
+
+def _check_inside(spread: Image) -> None:
+    for channel in range(spread.shape[2]):
+        share = _border_share(spread[:, :, channel])
+        if share > _AT_THE_BORDER:
+            raise ValueError(
+                f"probe: of the light, {100 * share:.3g} % lies in the outermost pixels of an "
+                f"image of {spread.shape[1]} x {spread.shape[0]}; a larger size is needed"
+            )
+
+
+def _border_share(plane: Image) -> float:
+    total = float(np.abs(plane).sum())
+    inside = float(np.abs(plane[1:-1, 1:-1]).sum())
+    return (total - inside) / total if total else 0.0
+
+
+def _centroid(profile: Image) -> float:
+    return float((profile * np.arange(len(profile))).sum() / profile.sum())
+
+
+def _deviation(profile: Image) -> float:
+    """Return the standard deviation of a profile, NaN if it has none."""
+    total = float(profile.sum())
+    if not total:
+        return math.nan
+    distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
+    variance = float((profile * distance**2).sum() / total)
+    return math.sqrt(variance) if variance >= 0 else math.nan
+
+
+def _moment_error(plane: Image, error: float, axis: int, weights: Image) -> float:
+    """Return by how much a moment may be off, for values that are off independently.
+
+    Only where there is light: elsewhere a value is 0 and exactly so. Independent errors add up as
+    the root of the sum of their squares; three times that is what is allowed.
+    """
+    lit = plane != 0
+    along = np.broadcast_to(weights if axis == 0 else weights[:, np.newaxis], plane.shape)
+    return 3 * error * math.sqrt(float((along[lit] ** 2).sum())) / abs(float(plane.sum()))

@@ -1,0 +1,44 @@
+"use strict";
+// One picture at the size of the window. The arrow keys change between expected, actual,
+// difference and FLIP in the same place, so that the eye sees what moves; Escape closes.
+const dialog = document.querySelector("dialog");
+const large = dialog.querySelector("img");
+const caption = document.getElementById("caption");
+const kinds = dialog.querySelector(".kinds");
+let pictures = [];
+let current = 0;
+
+function show(index) {
+  current = (index + pictures.length) % pictures.length;
+  const image = pictures[current].querySelector("img");
+  large.src = image.src;
+  large.alt = image.alt;
+  caption.textContent = `${image.alt} (${current + 1} of ${pictures.length}; arrow keys change)`;
+  for (const [place, button] of [...kinds.children].entries()) {
+    button.setAttribute("aria-pressed", String(place === current));
+  }
+}
+
+function open(button) {
+  pictures = [...button.closest(".pictures").querySelectorAll("button")];
+  kinds.replaceChildren(...pictures.map((picture, place) => {
+    const choice = document.createElement("button");
+    choice.type = "button";
+    choice.textContent = picture.dataset.kind;
+    choice.addEventListener("click", () => show(place));
+    return choice;
+  }));
+  show(pictures.indexOf(button));
+  dialog.showModal();
+}
+
+for (const button of document.querySelectorAll(".pictures button")) {
+  button.addEventListener("click", () => open(button));
+}
+dialog.addEventListener("keydown", (event) => {
+  const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+  if (step) {
+    event.preventDefault();
+    show(current + step);
+  }
+});

@@ -1,0 +1,22 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The finished picture from the largest level of a bloom of twice its size.
+#include "block.glsl"
+
+UNIFORM_BLOCK(DOUBLE_FINAL_BLOCK);
+#include "storage.glsl"
+#include "composite.glsl"
+
+layout(constant_id = 4) const int FORMAT = STORED_SINGLE;
+
+layout(local_size_x = 8) in;
+layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D smaller;
+layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D scene;
+layout(set = 0, binding = 3) uniform writeonly image2D target;
+
+#include "double.glsl"
+
+vec4 shade(ivec2 pixel, vec3 sum)
+{
+    return finish(imageLoad(scene, pixel), as_stored(sum, FORMAT), pixel);
+}

@@ -1,0 +1,31 @@
+// A pass over every pixel of one target, in two forms: a fragment shader, or (with DISPATCH) a
+// compute shader of one invocation a pixel. A shader that includes this gives PIXEL's colour as
+// shade(); TARGET_BINDING is the binding after its images.
+
+vec4 shade();
+
+#ifdef DISPATCH
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
+
+#define PIXEL ivec2(gl_GlobalInvocationID.xy)
+
+void main()
+{
+    if (all(lessThan(PIXEL, imageSize(target))))
+        imageStore(target, PIXEL, shade());
+}
+
+#else
+
+layout(location = 0) out vec4 colour;
+
+#define PIXEL ivec2(gl_FragCoord.xy)
+
+void main()
+{
+    colour = shade();
+}
+
+#endif

@@ -1,0 +1,417 @@
+"""The laws of `vkbloom.testing`, on blurs that keep them and on blurs that break one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from vkbloom import DualKawase, Pyramid, Renderer, Separable, gaussian_weights, reference, testing
+from vkbloom.testing import Probe
+
+Image = NDArray[Any]
+Bloom = Callable[[Image], Image]
+
+SMALL = Probe(size=(41, 33))
+DTYPES = ["uint8", "uint16", "float16", "float32", "float64"]
+
+
+def in_floats(blur: Bloom) -> Bloom:
+    """Let a blur work in doubles, and round its result to the image's dtype as an engine does."""
+
+    def apply(image: Image) -> Image:
+        scale = 1 if image.dtype.kind == "f" else np.iinfo(image.dtype).max
+        result = blur(image.astype(np.float64) / scale) * scale
+        if image.dtype.kind == "u":
+            result = np.rint(np.clip(result, 0, scale))
+        return result.astype(image.dtype)
+
+    return apply
+
+
+def over_the_plane(blur: Callable[[Image], Image]) -> Bloom:
+    """Make a blur of planes one of images of any number of channels."""
+
+    def apply(image: Image) -> Image:
+        if image.ndim == 2:
+            return blur(image)
+        return np.stack([blur(image[..., c]) for c in range(image.shape[2])], axis=-1)
+
+    return in_floats(apply)
+
+
+def kernel(weights: list[list[float]], **options: Any) -> Bloom:
+    """Return the correlation with a kernel, continued by the edge."""
+    taps = np.array(weights)
+    return over_the_plane(
+        lambda plane: ndimage.correlate(plane, taps, **{"mode": "nearest", **options})
+    )
+
+
+GAUSSIAN = over_the_plane(lambda plane: ndimage.gaussian_filter(plane, 1.5, mode="nearest"))
+BOX = kernel([[1 / 9] * 3] * 3)
+IDENTITY = kernel([[1.0]])
+# 1 2 1 down and across, a quarter each, with one weight moved, and its sum kept.
+SHARPENED = kernel([[0, -0.25, 0], [-0.25, 2, -0.25], [0, -0.25, 0]])
+LEANING = kernel([[0, 0, 0], [0.2, 0.5, 0.3], [0, 0, 0]])
+SHIFTED = kernel([[0.5, 0.5]])
+PLUS = kernel([[0, 0.125, 0], [0.125, 0.5, 0.125], [0, 0.125, 0]])
+SEEING_BLACK = kernel([[1 / 9] * 3] * 3, mode="constant")
+
+
+def fails(assertion: Callable[..., None], *arguments: Any, **options: Any) -> str:
+    """Return the message, having looked for its parts: assertion, figure, place and law."""
+    with pytest.raises(AssertionError) as caught:
+        assertion(*arguments, **options)
+    message = str(caught.value)
+    first, law = message.split("\n  law: ")
+    assert first.startswith(assertion.__name__ + ": ")
+    assert "allowed" in first
+    assert law
+    return message
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4])
+@pytest.mark.parametrize("blur", [GAUSSIAN, BOX, IDENTITY], ids=["gaussian", "box", "identity"])
+def test_blurs_that_keep_all_laws(blur: Bloom, channels: int | None, dtype: str) -> None:
+    probe = Probe(size=(41, 33), channels=channels, dtype=dtype)
+    testing.assert_superposition(blur, probe)
+    testing.assert_gain(blur, 1.0, probe)
+    testing.assert_symmetric(blur, probe, axes=("x", "y", "xy"))
+    testing.assert_centroid_kept(blur, probe)
+    testing.assert_separable(blur, probe)
+    testing.assert_spread(blur, {GAUSSIAN: 1.5, BOX: (2 / 3) ** 0.5, IDENTITY: 0.0}[blur], probe)
+    testing.assert_no_ringing(blur, probe)
+
+
+@pytest.mark.parametrize("format", ["rgba8unorm", "rgba16float", "rgba32float"])
+@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+def test_separable_on_the_device(renderer: Renderer, dtype: str, format: Any) -> None:
+    settings = Separable(weights=gaussian_weights(1.5, 6), blur_strength=1.0, format=format)
+    probe = Probe(size=(41, 33), dtype=dtype)
+    bloom = bloom_of(renderer, settings)
+    testing.assert_superposition(bloom, probe)
+    testing.assert_gain(bloom, 1.0, probe)
+    testing.assert_symmetric(bloom, probe, axes=("x", "y", "xy"))
+    testing.assert_centroid_kept(bloom, probe)
+    testing.assert_separable(bloom, probe)
+    testing.assert_spread(bloom, 1.5, probe)
+    testing.assert_no_ringing(bloom, probe)
+
+
+def bloom_of(renderer: Renderer, settings: Any, name: str = "bloom") -> Bloom:
+    return lambda image: renderer.apply(image, settings, attachments=(name,))[name]
+
+
+@pytest.mark.parametrize("settings", [Pyramid(levels=3), DualKawase(levels=3)])
+def test_chains_on_the_device(renderer: Renderer, settings: Any) -> None:
+    bloom = bloom_of(renderer, settings)
+    probe = Probe(size=(45, 37))
+    testing.assert_superposition(bloom, probe)
+    testing.assert_gain(bloom, 1.0, probe)
+    testing.assert_symmetric(bloom, probe, axes=("x", "y", "xy"))
+    testing.assert_no_ringing(bloom, probe)
+    assert "instead of" in fails(testing.assert_separable, bloom, probe)
+    wide = Probe(size=(128, 128))
+    # A pixel's light goes to the middle of the square of 8 x 8 pixels that becomes one.
+    testing.assert_centroid_kept(bloom, wide, within=3.5)
+
+
+def test_the_picture_with_its_bloom(renderer: Renderer) -> None:
+    settings = Separable(intensity=0.5)
+    picture, glow = (bloom_of(renderer, settings, name) for name in ("final", "bloom"))
+    testing.assert_additive(picture, probe=SMALL)
+    testing.assert_additive(picture, glow, 0.5, SMALL)
+    fails(testing.assert_additive, picture, glow, 0.49, SMALL)
+    testing.assert_gain(picture, 1 + 0.5 * reference.gain(settings), SMALL)
+    mixed = Separable(composite="mix", intensity=0.5, blur_strength=0.1)
+    message = fails(testing.assert_additive, bloom_of(renderer, mixed, "final"), probe=SMALL)
+    assert "light is added and none is taken" in message
+
+
+class TestBrokenLaws:
+    def test_superposition(self) -> None:
+        message = fails(testing.assert_superposition, in_floats(lambda image: image**1.1), SMALL)
+        assert "B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4" in message
+        # Additive, not homogeneous: nothing else would notice a constant.
+        fails(testing.assert_superposition, in_floats(lambda image: image + 0.01), SMALL)
+        fails(
+            testing.assert_superposition,
+            in_floats(lambda image: np.where(image > 0.5, image, 0.0)),
+            SMALL,
+        )
+
+    @pytest.mark.parametrize("gain", [0.0, 0.98, 1.02])
+    def test_gain(self, gain: float) -> None:
+        assert f"{gain:g} v" in fails(testing.assert_gain, BOX, gain, SMALL)
+
+    def test_gain_at_the_border(self) -> None:
+        assert "x 0, y 0" in fails(testing.assert_gain, SEEING_BLACK, 1.0, SMALL)
+        testing.assert_gain(SEEING_BLACK, 1.0, SMALL, border=1)
+        # The place is that in the whole image.
+        spot = Probe(size=(41, 33))
+
+        def dark_spot(image: Image) -> Image:
+            image = image.copy()
+            image[7, 9, 1] = 0
+            return image
+
+        assert "at x 9, y 7, channel 1" in fails(
+            testing.assert_gain, dark_spot, 1.0, spot, border=2
+        )
+
+    def test_symmetry(self) -> None:
+        message = fails(testing.assert_symmetric, LEANING, SMALL)
+        assert "left and right" in message
+        testing.assert_symmetric(LEANING, SMALL, axes=("y",))
+        fails(testing.assert_symmetric, LEANING, SMALL, axes=("xy",))
+        fails(testing.assert_symmetric, SHIFTED, SMALL)
+        with pytest.raises(ValueError, match="axes: 'z' is not one of x, y, xy"):
+            testing.assert_symmetric(BOX, SMALL, axes=("z",))  # type: ignore[arg-type]
+
+    def test_centroid(self) -> None:
+        message = fails(testing.assert_centroid_kept, SHIFTED, SMALL)
+        assert "+0.5 pixels from x 20, channel 0" in message
+        testing.assert_centroid_kept(SHIFTED, SMALL, within=0.51)
+        fails(testing.assert_centroid_kept, LEANING, SMALL, within=0.09)
+
+    def test_separability(self) -> None:
+        message = fails(testing.assert_separable, PLUS, SMALL)
+        assert "second singular value" in message
+        # Two separable layers.
+        wide = over_the_plane(lambda plane: ndimage.gaussian_filter(plane, 3.0, mode="nearest"))
+        fails(testing.assert_separable, lambda image: GAUSSIAN(image) / 2 + wide(image) / 2, SMALL)
+
+    @pytest.mark.parametrize("sigma", [0.0, 1.45, 1.55, (1.5, 1.45), (1.45, 1.5)])
+    def test_spread(self, sigma: Any) -> None:
+        message = fails(testing.assert_spread, GAUSSIAN, sigma, SMALL)
+        assert "it is 1.49" in message or "it is 1.5" in message
+
+    def test_spread_has_room_for_a_gaussian_that_is_cut_off(self) -> None:
+        cut = over_the_plane(
+            lambda plane: ndimage.gaussian_filter(plane, 3.0, mode="nearest", truncate=3)
+        )
+        testing.assert_spread(cut, 3.0, SMALL)
+
+    def test_ringing(self) -> None:
+        message = fails(testing.assert_no_ringing, SHARPENED, SMALL)
+        assert "between the bloom of black and of the flat image" in message
+        # Within those bounds, but there is a second edge.
+        echo = kernel([[0.0, 0.0, 0.3, 0.7, 0.0, 0.0, -0.1, 0.0, 0.1]])
+        assert "only rise" in fails(testing.assert_no_ringing, echo, SMALL)
+
+    def test_ringing_at_the_border(self) -> None:
+        fails(testing.assert_no_ringing, SEEING_BLACK, SMALL)
+        testing.assert_no_ringing(SEEING_BLACK, SMALL, border=1)
+        with pytest.raises(ValueError, match="border: 20 is out of range"):
+            testing.assert_no_ringing(SEEING_BLACK, SMALL, border=20)
+
+    def test_fireflies(self) -> None:
+        message = fails(testing.assert_bounded_fireflies, BOX, 2.0, SMALL)
+        assert "lifts others by 2 at most" in message
+        clamped = in_floats(lambda image: BOX(np.minimum(image, 9.0)))
+        testing.assert_bounded_fireflies(clamped, 1.0, SMALL, brightness=(1, 1e4, math.inf))
+        fails(testing.assert_bounded_fireflies, clamped, 0.9, SMALL)
+        # The lit pixel itself may be as bright as it was.
+        testing.assert_bounded_fireflies(IDENTITY, 0.0, SMALL)
+
+    def test_fireflies_on_the_device(self, renderer: Renderer) -> None:
+        probe = Probe(size=(64, 64))
+        clamped = Pyramid(levels=2, format="rgba8unorm")
+        testing.assert_bounded_fireflies(bloom_of(renderer, clamped), 1.0, probe)
+        fails(testing.assert_bounded_fireflies, bloom_of(renderer, Pyramid(levels=2)), 1.0, probe)
+
+    def test_infinity_that_spreads(self) -> None:
+        with pytest.raises(AssertionError, match="what a bloom makes of finite values is finite"):
+            testing.assert_bounded_fireflies(BOX, 1.0, SMALL, brightness=(math.inf,))
+
+    @pytest.mark.parametrize(
+        "assertion",
+        [
+            testing.assert_superposition,
+            testing.assert_additive,
+            testing.assert_symmetric,
+            testing.assert_centroid_kept,
+            testing.assert_separable,
+            testing.assert_no_ringing,
+        ],
+    )
+    def test_results_that_are_not_finite(self, assertion: Callable[..., None]) -> None:
+        def broken(image: Image) -> Image:
+            image = image.copy()
+            image[3, 5, 2] = np.nan
+            return image
+
+        with pytest.raises(AssertionError, match="nan at x 5, y 3, channel 2"):
+            assertion(broken)
+
+    @pytest.mark.parametrize("assertion", [testing.assert_separable, testing.assert_centroid_kept])
+    def test_black(self, assertion: Callable[..., None]) -> None:
+        with pytest.raises(AssertionError, match="a lit pixel gives light"):
+            assertion(np.zeros_like)
+
+    @pytest.mark.parametrize("assertion", [testing.assert_centroid_kept, testing.assert_spread])
+    def test_light_that_leaves_the_image(self, assertion: Callable[..., None]) -> None:
+        arguments = (1.5,) if assertion is testing.assert_spread else ()
+        with pytest.raises(ValueError, match="% lies in the outermost pixels of an image of 7 x 7"):
+            assertion(GAUSSIAN, *arguments, Probe(size=(7, 7)))
+
+
+class TestSmallFaults:
+    """What a careless edit of a blur does, as large as it is there."""
+
+    WEIGHTS = gaussian_weights(1.5, 4)
+
+    def line(self, weights: list[float]) -> Bloom:
+        taps = np.array(weights)
+
+        def blur(plane: Image) -> Image:
+            rows = ndimage.correlate1d(plane, taps, axis=0, mode="nearest")
+            return np.asarray(ndimage.correlate1d(rows, taps, axis=1, mode="nearest"))
+
+        return over_the_plane(blur)
+
+    @property
+    def weights(self) -> list[float]:
+        return [*self.WEIGHTS[:0:-1], *self.WEIGHTS]
+
+    def test_none(self) -> None:
+        blur = self.line(self.weights)
+        testing.assert_gain(blur, 1.0)
+        testing.assert_symmetric(blur)
+
+    def test_a_weight_wrong_by_2_percent(self) -> None:
+        weights = self.weights
+        weights[5] *= 1.02
+        fails(testing.assert_gain, self.line(weights), 1.0)
+        fails(testing.assert_symmetric, self.line(weights))
+
+    def test_a_missing_half_texel(self) -> None:
+        halved = over_the_plane(
+            lambda plane: ndimage.shift(plane, (0, 0.5), order=1, mode="nearest")
+        )
+        fails(testing.assert_symmetric, halved)
+        assert "0.5 pixels" in fails(testing.assert_centroid_kept, halved)
+
+
+class TestMeasurements:
+    def test_point_spread(self) -> None:
+        spread = testing.point_spread(LEANING, SMALL, at=(10, 12))
+        assert spread.shape == (33, 41, 3)
+        np.testing.assert_allclose(spread[12, 9:12, 0], [0.3, 0.5, 0.2], atol=1e-6)
+        assert np.count_nonzero(spread[..., 0]) == 3
+
+    def test_point_spread_of_a_picture_over_a_constant(self) -> None:
+        spread = testing.point_spread(lambda image: 2 * image + 5, Probe(size=(3, 3), value=4))
+        np.testing.assert_allclose(spread[..., 0], [[0, 0, 0], [0, 2, 0], [0, 0, 0]])
+
+    @pytest.mark.parametrize("at", [(41, 0), (0, 33), (-1, 0)])
+    def test_point_spread_outside(self, at: tuple[int, int]) -> None:
+        with pytest.raises(ValueError, match=r"at: .* is not in an image"):
+            testing.point_spread(BOX, SMALL, at=at)
+
+    def test_response(self) -> None:
+        def blur(image: Image, *, sigma: float) -> Image:
+            blurred = ndimage.gaussian_filter(image, (sigma, sigma / 2, 0), mode="nearest")
+            return np.asarray(3 * blurred)
+
+        found = testing.response(blur, "sigma", [2.0, 4.0], Probe(size=(81, 81)))
+        np.testing.assert_allclose(found.gain, 3, rtol=1e-5)
+        # y first: the filter's axes are those of arrays.
+        np.testing.assert_allclose(found.sigma[:, 1], [2.0, 4.0], rtol=2e-3)
+        np.testing.assert_allclose(found.sigma[:, 0], [1.0, 2.0], rtol=2e-3)
+        np.testing.assert_allclose(found.shift, 0, atol=1e-5)
+        assert found.peak[0] > found.peak[1]
+        lines = str(found).splitlines()
+        assert lines[0].split()[:3] == ["sigma", "gain", "peak"]
+        assert len(lines) == 3
+
+    def test_response_of_nothing(self) -> None:
+        found = testing.response(lambda image, gain: gain * image, "gain", [0.0, 1.0], SMALL)
+        assert np.isnan(found.sigma[0]).all()
+        np.testing.assert_array_equal(found.sigma[1], 0)
+        with pytest.raises(ValueError, match="values"):
+            testing.response(lambda image, gain: image, "gain", [], SMALL)
+
+    def test_response_of_settings(self, renderer: Renderer) -> None:
+        def bloom(image: Image, blur_scale: float) -> Image:
+            settings = Separable(
+                weights=gaussian_weights(1.5, 6), blur_strength=1.0, blur_scale=blur_scale
+            )
+            return renderer.apply(image, settings, attachments=("bloom",))["bloom"]
+
+        found = testing.response(bloom, "blur_scale", [1.0, 2.0], SMALL)
+        np.testing.assert_allclose(found.sigma, [[1.5, 1.5], [3.0, 3.0]], rtol=1e-3)
+
+
+class TestProbe:
+    @pytest.mark.parametrize(
+        ("field", "value"),
+        [
+            ("size", (0, 3)),
+            ("channels", 5),
+            ("channels", 0),
+            ("dtype", "int32"),
+            ("value", 0),
+            ("value", math.inf),
+            ("atol", -1),
+            ("rtol", math.nan),
+        ],
+    )
+    def test_out_of_range(self, field: str, value: Any) -> None:
+        with pytest.raises(ValueError, match=f"^{field}"):
+            Probe(**{field: value})
+
+    def test_integers_end_at_1(self) -> None:
+        with pytest.raises(ValueError, match="value: 2 is out of range"):
+            Probe(dtype="uint8", value=2)
+        with pytest.raises(TypeError, match="nothing brighter than 1"):
+            testing.assert_bounded_fireflies(BOX, 1.0, Probe(dtype="uint8"))
+
+    def test_own_tolerance(self) -> None:
+        def off(image: Image) -> Image:
+            return image * np.float32(1.001)
+
+        fails(testing.assert_gain, off, 1.0, SMALL)
+        testing.assert_gain(off, 1.0, Probe(atol=0.002))
+        testing.assert_gain(off, 1.0, Probe(rtol=0.002))
+        fails(testing.assert_gain, off, 1.0, Probe(atol=0.0005))
+
+    @pytest.mark.parametrize(
+        ("bloom", "error", "message"),
+        [
+            (None, TypeError, "a callable is needed"),
+            (lambda image: {"bloom": image}, TypeError, "it returns a mapping; name the"),
+            (lambda image: "text", TypeError, "it returns <U4"),
+            (lambda image: image.astype(int), TypeError, "it returns int64"),
+            (lambda image: image[1:], ValueError, "it returns shape"),
+            (lambda image: image[..., :2], ValueError, "it returns 2 channels for 3"),
+            (lambda image: image.sum(), ValueError, "it returns shape"),
+        ],
+    )
+    def test_what_is_no_bloom(self, bloom: Any, error: type[Exception], message: str) -> None:
+        with pytest.raises(error, match=f"bloom: {message}"):
+            testing.assert_gain(bloom, 1.0, SMALL)
+
+    def test_a_bloom_may_change_what_it_is_given(self) -> None:
+        def in_place(image: Image) -> Image:
+            image *= 0.5
+            return image
+
+        testing.assert_superposition(in_place, SMALL)
+        testing.assert_symmetric(in_place, SMALL)
+
+    def test_alpha_is_1_and_is_not_looked_at(self) -> None:
+        def bloom(image: Image) -> Image:
+            assert (image[..., 3] == 1).all()
+            return np.dstack([image[..., :3], np.full(image.shape[:2], 7.0, image.dtype)])
+
+        testing.assert_gain(bloom, 1.0, Probe(channels=4))
+        # And of a result with alpha for an image without it.
+        testing.assert_gain(lambda image: np.dstack([image, image[..., 0] * 9]), 1.0, SMALL)

@@ -1,0 +1,646 @@
+"""The pytest plugin, run on small projects of its own."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+# Here, as an inner run forgets what it imported, and these cannot be imported twice.
+import skimage.metrics  # noqa: F401
+
+import vkbloom.testing.report  # noqa: F401
+from vkbloom.testing import read_frame
+from vkbloom.testing.references import cpu_vendor
+from vkbloom.testing.regression import name_of_test
+
+pytest.importorskip("xdist")
+
+# Two framebuffers of half floats and one of 8 bits; SHIFT changes the second one.
+PROJECT = """
+import numpy as np
+import os
+import pytest
+
+def frames(shift=float(os.environ.get("SHIFT", 0))):
+    ramp = np.linspace(0, 1, 16 * 12 * 3).reshape(12, 16, 3)
+    return {
+        "glow": ramp.astype(np.float16),
+        "bloom": (ramp / 2 + shift).astype(np.float16),
+        "final": np.round(np.minimum(ramp * 1.5 + shift, 1) * 255).astype(np.uint8),
+    }
+"""
+ONE = PROJECT + "def test_frames(frame_regression): frame_regression.check(frames())\n"
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    """A folder in which pytest runs with this plugin."""
+    monkeypatch.delenv("SHIFT", raising=False)
+    # The outer run's, which an inner one would take for its own.
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
+    return pytester
+
+
+def write(project: pytest.Pytester, text: str, name: str = "test_one") -> None:
+    project.makepyfile(**{name: text})
+
+
+def run(project: pytest.Pytester, *arguments: str) -> pytest.RunResult:
+    # Hypothesis would be imported anew in each run.
+    quick = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest")
+    return project.runpytest_inprocess(*quick, *arguments)
+
+
+def run_workers(
+    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *arguments: str
+) -> pytest.RunResult:
+    """Run with two workers of xdist, without other plugins, which take most of their time."""
+    with monkeypatch.context() as patch:
+        patch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+        return run(project, "-p", "vkbloom", "-p", "xdist", "-n", "2", *arguments)
+
+
+def references(project: pytest.Pytester, module: str = "test_one") -> list[str]:
+    return sorted(file.name for file in (project.path / "bloom_references" / module).iterdir())
+
+
+class TestReferences:
+    def test_missing_fails_and_says_what_to_do(self, project: pytest.Pytester) -> None:
+        write(project, ONE)
+        result = run(project)
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines(
+            ["*test_frames: there is no reference *test_one/test_frames.json*--bloom-update*"]
+        )
+        result.stdout.fnmatch_lines(["missing: bloom_references/test_one/test_frames.json"])
+
+    def test_missing_may_be_allowed(self, project: pytest.Pytester) -> None:
+        write(project, ONE)
+        result = run(project, "--bloom-allow-missing")
+        result.assert_outcomes(passed=1)
+        result.stdout.fnmatch_lines(["missing: bloom_references/test_one/test_frames.json"])
+
+    def test_update_writes_and_the_next_run_passes(self, project: pytest.Pytester) -> None:
+        write(project, ONE)
+        result = run(project, "--bloom-update")
+        result.assert_outcomes(passed=1)
+        result.stdout.fnmatch_lines(["written: bloom_references/test_one/test_frames.json"])
+        assert references(project) == [
+            "test_frames.bloom.exr",
+            "test_frames.final.png",
+            "test_frames.glow.exr",
+            "test_frames.json",
+        ]
+        run(project).assert_outcomes(passed=1)
+
+    def test_says_who_made_it(self, project: pytest.Pytester) -> None:
+        write(
+            project,
+            PROJECT + "def test_frames(frame_regression):\n"
+            "    frame_regression.check(frames(), info={'adapter': 'An <engine>', 'driver': '7'})",
+        )
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        file = project.path / "bloom_references" / "test_one" / "test_frames.json"
+        (reference,) = json.loads(file.read_text())["references"]
+        assert reference["origin"]["adapter"] == "An <engine>"
+        assert reference["origin"]["driver"] == "7"
+        assert reference["origin"]["cpu_vendor"] == cpu_vendor()
+        assert [each["name"] for each in reference["framebuffers"]] == ["glow", "bloom", "final"]
+
+    def test_update_leaves_alone_what_passes(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write(project, ONE)
+        run(project, "--bloom-update")
+        folder = project.path / "bloom_references" / "test_one"
+        before = {file.name: file.read_bytes() for file in folder.iterdir()}
+        monkeypatch.setenv("SHIFT", "0.00005")
+        result = run(project, "--bloom-update")
+        result.assert_outcomes(passed=1)
+        result.stdout.no_fnmatch_line("written:*")
+        assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+        monkeypatch.setenv("SHIFT", "0.1")
+        run(project, "--bloom-update").stdout.fnmatch_lines(["written:*"])
+        run(project).assert_outcomes(passed=1)
+        monkeypatch.delenv("SHIFT")
+        run(project).assert_outcomes(failed=1)
+
+    def test_one_of_several_is_enough(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write(
+            project,
+            PROJECT + "def test_frames(frame_regression):\n"
+            "    info = {'adapter': os.environ.get('SHIFT', '0')}\n"
+            "    frame_regression.check(frames(), info=info)",
+        )
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        monkeypatch.setenv("SHIFT", "0.1")
+        run(project).assert_outcomes(failed=1)
+        run(project, "--bloom-add").assert_outcomes(passed=1)
+        assert "test_frames.bloom.2.exr" in references(project)
+        for shift, outcome in (("0.1", "passed"), ("0", "passed"), ("0.05", "failed")):
+            monkeypatch.setenv("SHIFT", shift)
+            run(project).assert_outcomes(**{outcome: 1})
+        # Replacing all of them leaves no file behind.
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        assert "test_frames.bloom.2.exr" not in references(project)
+
+    def test_the_same_machine_replaces_its_own(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write(project, ONE)
+        for shift in ("0", "0.1", "0.2"):
+            monkeypatch.setenv("SHIFT", shift)
+            run(project, "--bloom-add").assert_outcomes(passed=1)
+        assert len(references(project)) == 4
+
+    @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32"])
+    @pytest.mark.parametrize(
+        "shape", ["(5, 7)", "(5, 7, 1)", "(5, 7, 2)", "(1, 1, 3)", "(5, 7, 4)"]
+    )
+    def test_no_value_is_lost(self, project: pytest.Pytester, dtype: str, shape: str) -> None:
+        write(
+            project,
+            f"""
+import numpy as np
+def test_image(frame_regression):
+    generator = np.random.default_rng(1)
+    dtype, shape = np.dtype({dtype!r}), {shape}
+    # All bits, so that there are subnormals, NaN, infinities and colours under alpha 0.
+    image = generator.integers(0, 256, (*shape, dtype.itemsize), np.uint8).view(dtype)[..., 0]
+    if dtype.kind == "f":
+        image.flat[:1] = -np.inf
+    image = np.where(np.isnan(image), dtype.type(np.nan), image) if dtype.kind == "f" else image
+    frame_regression.check(image, atol=0, allow_nan=True)
+    frame_regression.check(image, "named.one", atol=0, allow_nan=True)
+""",
+        )
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        result = run(project, "--bloom-report=report")
+        result.assert_outcomes(passed=1)
+        checks = json.loads((project.path / "report" / "report.json").read_text())["checks"]
+        assert [each["framebuffers"][0]["outcome"] for each in checks] == ["equal", "equal"]
+        folder = project.path / "bloom_references" / "test_one"
+        (file,) = folder.glob("named.one.image.*")
+        assert str(oiio.ImageBuf(str(file)).spec().format) == {
+            "float16": "half",
+            "float32": "float",
+        }.get(dtype, dtype)
+
+    @pytest.mark.parametrize(
+        ("image", "message"),
+        [
+            ("np.zeros((3, 4, 3))", "*image: float64 cannot be kept without loss*"),
+            ("np.zeros((3, 4, 5), np.float32)", "*image: shape (3, 4, 5) is not*"),
+            ("np.full((3, 4, 3), np.nan, np.float32)", "*image has NaN or infinity; allow_nan*"),
+            ("{'a/b': np.zeros((3, 4), np.float32)}", "*'a/b' cannot name a framebuffer*"),
+            ("{}", "*TypeError: frames: Frames, a mapping*"),
+            ("[[1.0]]", "*TypeError: frames: Frames, a mapping*"),
+            ("{'a': [[1.0]]}", "*TypeError: frames: a must be an array, not list*"),
+        ],
+    )
+    def test_what_cannot_be_a_reference(
+        self, project: pytest.Pytester, image: str, message: str
+    ) -> None:
+        write(
+            project,
+            "import numpy as np\n"
+            f"def test_image(frame_regression): frame_regression.check({image})",
+        )
+        result = run(project, "--bloom-update")
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines([message])
+        assert not (project.path / "bloom_references").exists()
+
+    @pytest.mark.parametrize(
+        ("damage", "message"),
+        [
+            (lambda folder: (folder / "test_frames.glow.exr").unlink(), "*test_frames.glow.exr*"),
+            (
+                lambda folder: (folder / "test_frames.glow.exr").write_bytes(b"no"),
+                "*ValueError: *test_frames.glow.exr: not an image*",
+            ),
+            (
+                lambda folder: shutil.copy(
+                    folder / "test_frames.final.png", folder / "test_frames.glow.exr"
+                ),
+                "*ValueError: *test_frames.glow.exr: holds uint8*, not float16*",
+            ),
+            (
+                lambda folder: (folder / "test_frames.json").write_text("{}"),
+                "*ValueError: *test_frames.json: not a list of references*",
+            ),
+            (
+                lambda folder: (folder / "test_frames.json").write_text("[1"),
+                "*ValueError: *test_frames.json: not a list of references*",
+            ),
+        ],
+    )
+    def test_damaged_files_are_named(
+        self, project: pytest.Pytester, damage: Any, message: str
+    ) -> None:
+        write(project, ONE)
+        run(project, "--bloom-update")
+        damage(project.path / "bloom_references" / "test_one")
+        result = run(project)
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines([message])
+
+    def test_names(self, project: pytest.Pytester) -> None:
+        write(
+            project,
+            PROJECT
+            + """
+class TestAll:
+    @pytest.mark.parametrize("text", ["a", "a b", "a/b", "a<b"])
+    def test_names(self, frame_regression, text):
+        frame_regression.check(frames())
+
+def test_second_needs_a_name(frame_regression):
+    frame_regression.check(frames())
+    frame_regression.check(frames(), "own")
+    with pytest.raises(ValueError, match="name: a second check"):
+        frame_regression.check(frames())
+    for name in ("", ".hidden", "a/b", "a" * 101):
+        with pytest.raises(ValueError, match="name: .* cannot name a reference"):
+            frame_regression.check(frames(), name)
+""",
+        )
+        run(project, "--bloom-update").assert_outcomes(passed=5)
+        names = [name for name in references(project) if name.endswith(".json")]
+        assert len(names) == 6
+        assert {"own.json", "TestAll.test_names-a.json"} <= set(names)
+
+    def test_long_names_stay_apart(self) -> None:
+        names = {name_of_test(f"test[{'x' * 200}{end}]") for end in "ab"}
+        assert len(names) == 2
+        assert all(len(name) <= 100 for name in names)
+
+
+class TestUnused:
+    TWO = PROJECT + (
+        "def test_frames(frame_regression): frame_regression.check(frames())\n"
+        "def test_other(frame_regression):\n"
+        "    if not os.environ.get('IDLE'): frame_regression.check(frames(), 'other')\n"
+    )
+    LINE = "unused: bloom_references/test_one/other.json"
+
+    @pytest.fixture(autouse=True)
+    def idle(self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+        write(project, self.TWO)
+        run(project, "--bloom-update").assert_outcomes(passed=2)
+        monkeypatch.setenv("IDLE", "1")
+
+    def test_is_listed(self, project: pytest.Pytester) -> None:
+        run(project).stdout.fnmatch_lines([self.LINE])
+
+    def test_is_listed_of_workers(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        result = run_workers(project, monkeypatch)
+        result.assert_outcomes(passed=2)
+        result.stdout.fnmatch_lines([self.LINE])
+
+    @pytest.mark.parametrize("arguments", [("-k", "other"), ("test_one.py::test_other",)])
+    def test_not_where_tests_were_left_out(
+        self, project: pytest.Pytester, arguments: tuple[str, ...]
+    ) -> None:
+        run(project, *arguments).stdout.no_fnmatch_line("unused:*")
+
+    def test_not_where_a_test_failed_before(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("SHIFT", "0.5")
+        run(project).stdout.no_fnmatch_line("unused:*")
+
+    def test_a_module_that_is_gone(self, project: pytest.Pytester) -> None:
+        folder = project.path / "bloom_references"
+        shutil.copytree(folder / "test_one", folder / "test_gone")
+        run(project).stdout.fnmatch_lines(["unused: bloom_references/test_gone"])
+
+
+class TestChecks:
+    """What is compared, in which order."""
+
+    @pytest.mark.parametrize(
+        ("change", "arguments", "message"),
+        [
+            ("image[:5]", "", "*(shape and dtype): its shape is (5, 16, 3), not (12, 16, 3)*"),
+            ("image.astype(np.float32)", "", "*(shape and dtype): its dtype is float32, not*"),
+            ("image[:, :, 0]", "", "*(shape and dtype): its shape is (12, 16), not (12, 16, 3)*"),
+            (
+                "np.where(image == image.max(), np.nan, image).astype(image.dtype)",
+                "atol=9, fail_percent=100",
+                "*(finiteness): NaN or infinity in one image only, 1 values, *x 15, y 11*",
+            ),
+            ("image + np.float16(0.01)", "atol=0", "*(exact): 100 % of the pixels differ; *"),
+            (
+                "image + np.float16(0.01)",
+                "",
+                "*(tolerances): * differ by more than 0.0001 + 0.002 |reference|; largest "
+                "difference 0.01* at x *, y *, channel *: *, not *",
+            ),
+            ("image * np.float16(1.01)", "rtol=0.005", "*(tolerances): * differ by more than 0 +*"),
+            ("spot", "atol=0.1, fail_percent=0.2", "*(tolerances): 0.5208 % *, 0.2 % allowed;*"),
+            (
+                "spot",
+                "atol=0.1, fail_percent=1, hard_fail=0.4",
+                "*(tolerances): largest difference 0.5* at x 3, y 2,*, over hard_fail 0.4*",
+            ),
+            ("np.flip(image, 0)", "atol=9, ssim=0.9", "*(SSIM): SSIM * is under 0.9*"),
+            ("np.flip(image, 0)", "atol=9, flip=0.01", "*(FLIP): FLIP * is over 0.01*"),
+        ],
+    )
+    def test_fails(
+        self, project: pytest.Pytester, change: str, arguments: str, message: str
+    ) -> None:
+        write(project, self.text(change, arguments))
+        run(project, "--bloom-update", "-k", "right").assert_outcomes(passed=1, deselected=1)
+        result = run(project, "-k", "changed")
+        result.assert_outcomes(failed=1, deselected=1)
+        result.stdout.fnmatch_lines(
+            ["*one: the first framebuffer that differs is image", "*image: FAILED " + message]
+        )
+
+    @pytest.mark.parametrize(
+        ("change", "arguments"),
+        [
+            ("image + np.float16(0.01)", "atol=0.02"),
+            ("image * np.float16(1.01)", "rtol=0.02"),
+            ("spot", "atol=0.1, fail_percent=1, hard_fail=0.6"),
+            ("image + np.float16(0.01)", "atol=0.02, ssim=0.9, flip=0.2"),
+            ("np.flip(image, 0)", "atol=float('inf')"),
+            # Equal images need no figure: this is too small for SSIM's window.
+            ("image", "ssim=1.0, flip=0.0"),
+        ],
+    )
+    def test_passes(self, project: pytest.Pytester, change: str, arguments: str) -> None:
+        write(project, self.text(change, arguments))
+        run(project, "--bloom-update", "-k", "right").assert_outcomes(passed=1, deselected=1)
+        run(project, "-k", "changed").assert_outcomes(passed=1, deselected=1)
+
+    @staticmethod
+    def text(change: str, arguments: str) -> str:
+        return (
+            PROJECT
+            + f"""
+def test_right(frame_regression):
+    frame_regression.check(frames()["glow"], "one")
+
+def test_changed(frame_regression):
+    image = frames()["glow"]
+    spot = image.copy()
+    spot[2, 3, 1] += 0.5
+    frame_regression.check({change}, "one", {arguments})
+"""
+        )
+
+    def test_names_the_first_in_the_order_of_the_data(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write(project, ONE)
+        run(project, "--bloom-update")
+        monkeypatch.setenv("SHIFT", "0.1")
+        result = run(project)
+        result.stdout.fnmatch_lines(
+            [
+                "*test_frames: the first framebuffer that differs is bloom (glow: right)",
+                "*  glow: equal",
+                "*  bloom: FAILED (tolerances): *",
+                "*  final: FAILED (tolerances): *",
+            ]
+        )
+
+    def test_framebuffers_that_come_and_go(self, project: pytest.Pytester) -> None:
+        write(
+            project,
+            PROJECT
+            + """
+def test_right(frame_regression):
+    frame_regression.check(frames(), "one")
+
+def test_fewer(frame_regression):
+    frame_regression.check({"glow": frames()["glow"], "final": frames()["final"]}, "one")
+
+def test_more(frame_regression):
+    frame_regression.check({**frames(), "extra": frames()["glow"]}, "one")
+""",
+        )
+        run(project, "--bloom-update", "-k", "right")
+        result = run(project)
+        result.assert_outcomes(passed=1, failed=2)
+        result.stdout.fnmatch_lines(["*  bloom: FAILED (shape and dtype): it is missing"])
+        result.stdout.fnmatch_lines(["*  extra: FAILED (shape and dtype): the reference does not*"])
+
+    def test_warns(self, project: pytest.Pytester) -> None:
+        write(project, self.text("image + np.float16(0.01)", "atol=0.02, warn=0.005"))
+        run(project, "--bloom-update", "-k", "right")
+        # Else the outer run's filter makes an error of it.
+        result = run(project, "-k", "changed", "-W", "default")
+        result.assert_outcomes(passed=1, deselected=1, warnings=1)
+        result.stdout.fnmatch_lines(["*FrameDifferenceWarning: one: image: largest difference*"])
+
+    def test_compares_what_a_test_has_made(self, project: pytest.Pytester) -> None:
+        write(
+            project,
+            PROJECT
+            + """
+def test_same(frame_regression):
+    frame_regression.compare(frames(), frames(0.00005))
+
+def test_other(frame_regression):
+    frame_regression.compare(frames(0.1), frames())
+""",
+        )
+        result = run(project, "--bloom-report=report")
+        result.assert_outcomes(passed=1, failed=1)
+        result.stdout.fnmatch_lines(["*test_other: the first framebuffer that differs is bloom *"])
+        assert not (project.path / "bloom_references").exists()
+
+    @pytest.mark.parametrize(
+        "argument",
+        ["atol=-1", "rtol=float('nan')", "fail_percent=101", "hard_fail=-1", "ssim=2", "flip=-1"],
+    )
+    def test_wrong_arguments(self, project: pytest.Pytester, argument: str) -> None:
+        write(
+            project,
+            PROJECT + "def test_frames(frame_regression):\n"
+            f"    with pytest.raises(ValueError, match={argument.split('=', maxsplit=1)[0]!r}):\n"
+            f"        frame_regression.check(frames(), {argument})",
+        )
+        run(project).assert_outcomes(passed=1)
+
+
+class TestFrameFiles:
+    @pytest.mark.parametrize(
+        ("name", "dtype", "channels"),
+        [("a.exr", "float16", 3), ("a.exr", "float32", 4), ("a.png", "uint8", 4)],
+    )
+    def test_values_are_as_stored(
+        self, tmp_path: Path, name: str, dtype: str, channels: int
+    ) -> None:
+        image = np.arange(5 * 7 * channels).reshape(5, 7, channels).astype(dtype)
+        buffer = oiio.ImageBuf(image)
+        buffer.specmod().attribute("oiio:UnassociatedAlpha", 1)
+        assert buffer.write(str(tmp_path / name))
+        read = read_frame(tmp_path / name)
+        assert read.dtype == image.dtype
+        np.testing.assert_array_equal(read, image)
+
+    def test_files_that_are_no_frames(self, tmp_path: Path) -> None:
+        with pytest.raises(FileNotFoundError, match="nothing"):
+            read_frame(tmp_path / "nothing.exr")
+        file = tmp_path / "two.exr"
+        buffer = oiio.ImageBuf(np.zeros((2, 2, 2), np.float32))
+        buffer.specmod().channelnames = ("X", "Z")
+        assert buffer.write(str(file))
+        with pytest.raises(ValueError, match=r"two\.exr: the channels are"):
+            read_frame(file)
+
+
+class TestOptions:
+    def test_without_the_plugin(self, project: pytest.Pytester) -> None:
+        write(project, "def test_one(): pass\ndef test_two(bloom_renderer): pass")
+        result = run(project, "-p", "no:vkbloom")
+        result.assert_outcomes(passed=1, errors=1)
+        result.stdout.fnmatch_lines(["*fixture 'bloom_renderer' not found*"])
+
+    def test_unused_it_imports_nothing(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write(
+            project,
+            "import sys\n"
+            "def test_one():\n"
+            "    assert 'pytest_vkbloom' in sys.modules\n"
+            "    assert not {'vkbloom', 'numpy', 'OpenImageIO', 'skimage'} & set(sys.modules)",
+        )
+        # A process of its own, as this one has imported all of them, without other plugins, which
+        # may do the same.
+        monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+        result = project.runpytest_subprocess("-p", "no:cacheprovider", "-p", "vkbloom")
+        result.assert_outcomes(passed=1)
+
+    @pytest.mark.parametrize("option", ["--bloom-update", "--bloom-add"])
+    def test_no_writing_by_workers(self, project: pytest.Pytester, option: str) -> None:
+        write(project, ONE)
+        result = run(project, option, "-n", "2")
+        assert result.ret == pytest.ExitCode.USAGE_ERROR
+        result.stderr.fnmatch_lines(["*--bloom-update and --bloom-add write files*without -n*"])
+        assert not (project.path / "bloom_references").exists()
+        run(project, option, "-n", "0").assert_outcomes(passed=1)
+
+    @pytest.mark.parametrize(
+        "options", [("--bloom-update", "--bloom-add"), ("--bloom-expect-adapter=",)]
+    )
+    def test_wrong_use(self, project: pytest.Pytester, options: tuple[str, ...]) -> None:
+        write(project, ONE)
+        assert run(project, *options).ret == pytest.ExitCode.USAGE_ERROR
+
+    RENDER = """
+import vkbloom
+def test_render(bloom_renderer, frame_regression):
+    image = vkbloom.Scene.ufo()
+    frames = bloom_renderer.render(image, size=(32, 18), attachments=("final",))
+    frame_regression.check(frames)
+def test_again(bloom_renderer):
+    assert not bloom_renderer.closed
+"""
+
+    def test_renders(self, project: pytest.Pytester) -> None:
+        write(project, self.RENDER)
+        run(project, "--bloom-adapter=software", "--bloom-update").assert_outcomes(passed=2)
+        text = (project.path / "bloom_references" / "test_one" / "test_render.json").read_text()
+        origin = json.loads(text)["references"][0]["origin"]
+        assert "llvmpipe" in origin["adapter"]
+        assert "Mesa" in origin["driver"]
+        for wanted in ("llvmpipe", "mesa"):
+            run(
+                project, "--bloom-adapter=software", f"--bloom-expect-adapter={wanted}"
+            ).assert_outcomes(passed=2)
+
+    def test_another_adapter_is_an_error(self, project: pytest.Pytester) -> None:
+        write(project, self.RENDER)
+        result = run(project, "--bloom-adapter=software", "--bloom-expect-adapter=GeForce")
+        result.assert_outcomes(errors=2)
+        result.stdout.fnmatch_lines(["*--bloom-expect-adapter=GeForce: the adapter is llvmpipe*"])
+
+    def test_frames_of_another_adapter_are_an_error(self, project: pytest.Pytester) -> None:
+        write(
+            project,
+            PROJECT + "def test_frames(frame_regression):\n"
+            "    frame_regression.check(frames(), info={'adapter': 'Some GPU'})",
+        )
+        run(project, "--bloom-update")
+        run(project, "--bloom-expect-adapter=some gpu").assert_outcomes(passed=1)
+        result = run(project, "--bloom-expect-adapter=GeForce")
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines(["*--bloom-expect-adapter=GeForce: these frames come from*"])
+
+    def test_images_need_no_vulkan(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write(project, ONE)
+        monkeypatch.setenv("VK_DRIVER_FILES", "/dev/null")
+        monkeypatch.setenv("VK_ICD_FILENAMES", "/dev/null")
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        run(project).assert_outcomes(passed=1)
+
+    def test_no_adapter_is_an_error(self, project: pytest.Pytester) -> None:
+        write(project, self.RENDER)
+        result = run(project, "--bloom-adapter=no such device")
+        result.assert_outcomes(errors=2)
+        result.stdout.fnmatch_lines(["*AdapterNotFoundError*"])
+
+
+class TestReportOfWorkers:
+    MANY = PROJECT + (
+        "@pytest.mark.parametrize('n', range(6))\n"
+        "def test_frames(frame_regression, n):\n"
+        "    frame_regression.check(frames() if n % 2 else frames(0.0), f'name{n}')\n"
+    )
+
+    def test_is_one(self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+        write(project, self.MANY)
+        run(project, "--bloom-update").assert_outcomes(passed=6)
+        monkeypatch.setenv("SHIFT", "0.1")
+        alone = run(project, "--bloom-report=alone")
+        shared = run_workers(project, monkeypatch, "--bloom-report=shared")
+        outputs = []
+        for result, folder in ((alone, "alone"), (shared, "shared")):
+            result.assert_outcomes(passed=3, failed=3)
+            files = sorted(file.name for file in (project.path / folder).iterdir())
+            assert files == ["index.html", "report.json"]
+            outputs.append([(project.path / folder / name).read_bytes() for name in files])
+        assert outputs[0] == outputs[1]
+        checks = json.loads(outputs[0][1])["checks"]
+        assert [check["name"] for check in checks] == [f"name{n}" for n in range(6)]
+        assert [check["first_failure"] for check in checks] == [None, "bloom"] * 3
+
+    def test_figures(self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+        write(project, ONE)
+        run(project, "--bloom-update")
+        monkeypatch.setenv("SHIFT", "0.25")
+        run(project, "--bloom-report=report").assert_outcomes(failed=1)
+        (check,) = json.loads((project.path / "report" / "report.json").read_text())["checks"]
+        assert check["outcome"] == "failed"
+        glow, bloom, final = check["framebuffers"]
+        assert (glow["outcome"], bloom["outcome"], final["outcome"]) == (
+            "equal",
+            "failed",
+            "failed",
+        )
+        assert bloom["shape"] == [12, 16, 3]
+        assert bloom["dtype"] == "float16"
+        assert bloom["percent_over"] == 100.0
+        # Half floats near 0.5 are 2**-11 apart.
+        np.testing.assert_allclose(bloom["max_error"], 0.25, atol=2**-11)
+        there = bloom["actual_there"] - bloom["expected_there"]
+        np.testing.assert_allclose(there, bloom["max_error"])

@@ -1,0 +1,107 @@
+"""Large framebuffers, which the device writes to the arrays themselves: to the last byte, no other.
+
+Arrays that the device cannot have, and small ones, go through staging memory; both must agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vkbloom import Renderer, Scene, Separable
+
+OFF = Separable(bloom=False)
+DTYPES = ["uint8", "float16", "float32"]
+
+
+def picture(width: int, height: int, channels: int, dtype: str, seed: int) -> Any:
+    random = np.random.default_rng(seed).random((height, width, channels), dtype=np.float32)
+    return (random * 255).astype(np.uint8) if dtype == "uint8" else random.astype(dtype)
+
+
+def placed(shape: tuple[int, ...], dtype: str, start: int) -> tuple[Any, Any]:
+    """Return an array `start` bytes after a multiple of a page's size, and the bytes around it."""
+    page = 4096
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    around = np.full(size + 4 * page, 0xA5, np.uint8)
+    first = -around.ctypes.data % page + page + start
+    array = around[first : first + size].view(dtype).reshape(shape)
+    assert array.ctypes.data % page == start
+    return array, around
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("size", [(513, 512), (1001, 333), (1, 16000), (16000, 21)], ids=str)
+def test_large_images_come_back_to_the_byte(
+    renderer: Renderer, size: tuple[int, int], dtype: str, channels: int
+) -> None:
+    image = picture(*size, channels, dtype, 1)
+    final = renderer.apply(image, OFF)["final"]
+    np.testing.assert_array_equal(final, image)
+    assert type(final) is np.ndarray
+    assert final.flags.owndata
+    assert final.flags.c_contiguous
+    assert final.flags.writeable
+
+
+# Multiples of the largest pixel, as new arrays have them; of smaller pixels; of nothing.
+@pytest.mark.parametrize("start", [0, 16, 64, 4080, 8, 4, 12, 2, 1, 4095])
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_nothing_around_an_array_is_touched(
+    renderer: Renderer, dtype: str, channels: int, start: int
+) -> None:
+    # The last page is left half-used, too.
+    image = picture(701, 603, channels, dtype, 2)
+    out, around = placed(image.shape, dtype, start)
+    frames = renderer.apply(image, OFF, out={"final": out})
+    assert frames["final"] is out
+    np.testing.assert_array_equal(out, image)
+    out.view(np.uint8)[:] = 0xA5
+    assert (around == 0xA5).all()
+
+
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_every_framebuffer_both_ways(renderer: Renderer, scene: Scene, shading: Any) -> None:
+    settings, size = Separable(bloom_size=(600, 500)), (640, 480)
+    whole = renderer.render(scene, settings, size, shading=shading, time=0.1)
+    out = {name: placed(array.shape, array.dtype.name, 1)[0] for name, array in whole.items()}
+    # Without its alignment an array cannot be the device's.
+    apart = renderer.render(scene, settings, size, shading=shading, time=0.1, out=out)
+    assert apart.timings == {}
+    for name, array in whole.items():
+        np.testing.assert_array_equal(apart[name], array, err_msg=name)
+
+
+def test_large_frames_in_the_air(new_renderer: Callable[[], Renderer]) -> None:
+    image = picture(700, 500, 4, "float32", 3)
+    settings = [Separable(blur_strength=strength / 4) for strength in range(9)]
+    renderer = new_renderer()
+    expected = [renderer.apply(image, s) for s in settings]
+    frames = renderer.apply_many(image, settings)
+    for right in expected:
+        got = next(frames)
+        for name, array in got.items():
+            np.testing.assert_array_equal(array, right[name])
+            array[:] = 0
+    # Arrays that the device may still write to are waited for before they go.
+    for taken in range(4):
+        frames = renderer.apply_many(image, settings)
+        for _ in range(taken):
+            next(frames)
+        frames.close()  # type: ignore[attr-defined]
+    frames = renderer.apply_many(image, settings)
+    for _ in range(3):
+        next(frames)
+    renderer.close()
+
+
+def test_an_array_that_is_the_image_itself(renderer: Renderer) -> None:
+    image = picture(700, 500, 4, "float32", 4)
+    expected = renderer.apply(image.copy())["final"]
+    renderer.apply(image, out={"final": image})
+    np.testing.assert_array_equal(image, expected)
