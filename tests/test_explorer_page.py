@@ -6,29 +6,22 @@ What is shown is compared, to the pixel, with what the renderer gives: in the pa
 
 from __future__ import annotations
 
-import asyncio
 import base64
-import json
 import os
-import queue
 import re
-import secrets
 import shutil
-import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from explorer_hosts import jupyterlab, served
 from framebuffers import decode
 from numpy.typing import NDArray
 
-import vkbloom
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
 from vkbloom.explorer.session import Session
 
@@ -59,29 +52,8 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def serve() -> Iterator[Callable[[Callable[[], Session]], str]]:
     """Serves sessions from a thread, and returns where."""
-    from vkbloom.explorer.server import Server
-
-    running: list[tuple[asyncio.AbstractEventLoop, asyncio.Event, threading.Thread]] = []
-
-    def start(new_session: Callable[[], Session]) -> str:
-        started: queue.Queue[tuple[str, asyncio.AbstractEventLoop, asyncio.Event]] = queue.Queue()
-
-        async def main() -> None:
-            server, stopped = Server(new_session), asyncio.Event()
-            started.put((server.url, asyncio.get_running_loop(), stopped))
-            await stopped.wait()
-            await server.stop()
-
-        thread = threading.Thread(target=lambda: asyncio.run(main()))
-        thread.start()
-        url, loop, stopped = started.get(timeout=10)
-        running.append((loop, stopped, thread))
-        return url
-
-    yield start
-    for loop, stopped, thread in running:
-        loop.call_soon_threadsafe(stopped.set)
-        thread.join()
+    with ExitStack() as stack:
+        yield lambda new_session: stack.enter_context(served(new_session))
 
 
 @pytest.fixture(scope="module")
@@ -379,54 +351,9 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A JupyterLab with a notebook, and where it is."""
     pytest.importorskip("jupyterlab")
     folder = tmp_path_factory.mktemp("lab")
-    cell: dict[str, Any] = {
-        "cell_type": "code",
-        "id": "a",
-        "metadata": {},
-        "execution_count": None,
-        "outputs": [],
-        "source": NOTEBOOK,
-    }
-    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
-    notebook = {"cells": [cell], "metadata": {"kernelspec": kernel}, "nbformat": 4}
-    (folder / "a.ipynb").write_text(json.dumps(notebook | {"nbformat_minor": 5}))
-    settings = folder / "settings" / "@jupyterlab" / "apputils-extension"
-    settings.mkdir(parents=True)
-    (settings / "themes.jupyterlab-settings").write_text('{"adaptive-theme": true}')
-    (settings / "notification.jupyterlab-settings").write_text('{"fetchNews": "false"}')
-    token = secrets.token_hex()
-    environment = {
-        **os.environ,
-        "JUPYTER_CONFIG_DIR": str(folder / "config"),
-        "JUPYTER_DATA_DIR": str(folder / "data"),
-        "JUPYTER_RUNTIME_DIR": str(folder / "runtime"),
-        "JUPYTERLAB_SETTINGS_DIR": str(folder / "settings"),
-        "JUPYTERLAB_WORKSPACES_DIR": str(folder / "workspaces"),
-        "IPYTHONDIR": str(folder / "ipython"),
-        "JUPYTER_TOKEN": token,
-        # The kernel runs elsewhere, and has to find what is tested.
-        "PYTHONPATH": str(Path(vkbloom.__file__).parents[1]),
-        "VKBLOOM_ADAPTER": os.environ.get("VKBLOOM_TEST_ADAPTER", "software"),
-    }
-    options = ["--no-browser", "--allow-root", "--ip=127.0.0.1", "--port=0"]
-    with (folder / "log").open("w") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "jupyterlab", *options],
-            cwd=folder,
-            env=environment,
-            stdout=log,
-            stderr=log,
-        )
-    try:
-        deadline = time.monotonic() + 60
-        while not (found := re.search(r"http://127\.0\.0\.1:\d+/", (folder / "log").read_text())):
-            assert process.poll() is None, (folder / "log").read_text()
-            assert time.monotonic() < deadline, (folder / "log").read_text()
-            time.sleep(0.1)
-        yield f"{found[0]}lab/tree/a.ipynb?reset&token={token}"
-    finally:
-        process.terminate()
-        process.wait(30)
+    adapter = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
+    with jupyterlab(folder, [NOTEBOOK], {"VKBLOOM_ADAPTER": adapter}) as url:
+        yield url
 
 
 def run_cell(browser: Browser, lab: str, theme: Any) -> Page:

@@ -1,0 +1,112 @@
+"""What shows the explorer's page to a browser: its own server, and JupyterLab."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import queue
+import re
+import secrets
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import vkbloom
+from vkbloom.explorer.server import Server
+from vkbloom.explorer.session import Session
+
+_PATIENCE = 60.0  # seconds, for JupyterLab on a busy machine
+
+
+@contextmanager
+def served(new_session: Callable[[], Session]) -> Iterator[str]:
+    """Serve the page from a thread, and yield where."""
+    started: queue.Queue[tuple[str, asyncio.AbstractEventLoop, asyncio.Event]] = queue.Queue()
+
+    async def main() -> None:
+        server, stopped = Server(new_session), asyncio.Event()
+        started.put((server.url, asyncio.get_running_loop(), stopped))
+        await stopped.wait()
+        await server.stop()
+
+    thread = threading.Thread(target=lambda: asyncio.run(main()))
+    thread.start()
+    url, loop, stopped = started.get(timeout=10)
+    try:
+        yield url
+    finally:
+        loop.call_soon_threadsafe(stopped.set)
+        thread.join()
+
+
+@contextmanager
+def jupyterlab(folder: Path, cells: Sequence[str], environment: Mapping[str, str]) -> Iterator[str]:
+    """Run JupyterLab on a notebook of some cells, and yield where it is open.
+
+    Nothing of the user's is read or written; the theme is what the system, or the browser, asks
+    for.
+    """
+    notebook = {
+        "cells": [
+            {
+                "cell_type": "code",
+                "id": f"cell-{index}",
+                "metadata": {},
+                "execution_count": None,
+                "outputs": [],
+                "source": source,
+            }
+            for index, source in enumerate(cells)
+        ],
+        "metadata": {
+            "kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}
+        },
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    opened = folder / "notebooks"
+    opened.mkdir()
+    (opened / "bloom.ipynb").write_text(json.dumps(notebook))
+    settings = folder / "settings" / "@jupyterlab" / "apputils-extension"
+    settings.mkdir(parents=True)
+    (settings / "themes.jupyterlab-settings").write_text('{"adaptive-theme": true}')
+    (settings / "notification.jupyterlab-settings").write_text('{"fetchNews": "false"}')
+    token = secrets.token_hex()
+    variables = {
+        **os.environ,
+        "JUPYTER_CONFIG_DIR": str(folder / "config"),
+        "JUPYTER_DATA_DIR": str(folder / "data"),
+        "JUPYTER_RUNTIME_DIR": str(folder / "runtime"),
+        "JUPYTERLAB_SETTINGS_DIR": str(folder / "settings"),
+        "JUPYTERLAB_WORKSPACES_DIR": str(folder / "workspaces"),
+        "IPYTHONDIR": str(folder / "ipython"),
+        "JUPYTER_TOKEN": token,
+        # The kernel runs elsewhere, and has to find the package that runs here.
+        "PYTHONPATH": str(Path(vkbloom.__file__).parents[1]),
+        **environment,
+    }
+    options = ["--no-browser", "--allow-root", "--ip=127.0.0.1", "--port=0"]
+    log = folder / "log"
+    with log.open("w") as output:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "jupyterlab", *options],
+            cwd=opened,
+            env=variables,
+            stdout=output,
+            stderr=output,
+        )
+    try:
+        deadline = time.monotonic() + _PATIENCE
+        while not (found := re.search(r"http://127\.0\.0\.1:\d+/", log.read_text())):
+            assert process.poll() is None, log.read_text()
+            assert time.monotonic() < deadline, log.read_text()
+            time.sleep(0.1)
+        yield f"{found[0]}lab/tree/bloom.ipynb?reset&token={token}"
+    finally:
+        process.terminate()
+        process.wait(_PATIENCE)
