@@ -1,12 +1,13 @@
 # make demo: sets up what is missing, renders the built-in scene into out/.
 # make test: the same for the tests, and runs them. Both are quick the second time.
+# make docs: the documentation into build/docs; a warning is a failure.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 CORE := $(wildcard csrc/*.[ch]) $(wildcard shaders/*) setup.py pyproject.toml
 
-.PHONY: demo test bench lint format sanitize clean
+.PHONY: demo test docs bench lint format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -14,6 +15,10 @@ demo: build/stamp/core
 
 test: build/stamp/core build/stamp/test
 	$(PYTHON) -m pytest
+
+docs: build/stamp/core build/stamp/docs
+	rm -rf docs/api
+	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
 
 # BENCH: more options of vkbloom bench.
 bench: build/stamp/core build/stamp/peers
@@ -36,7 +41,7 @@ sanitize: build/stamp/core build/stamp/test
 	PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh
 
 clean:
-	rm -rf build out $(VENV) python/vkbloom/_core*.so
+	rm -rf build out docs/api $(VENV) python/vkbloom/_core*.so
 
 build/stamp/system:
 	tools/setup_system.sh build
@@ -61,6 +66,10 @@ build/stamp/peers: benchmarks/peers.txt | $(PYTHON)
 build/stamp/test: pyproject.toml | $(PYTHON)
 	tools/setup_system.sh test
 	$(PYTHON) tools/requirements.py test | $(PYTHON) -m pip install --quiet -r /dev/stdin
+	@mkdir -p $(@D) && touch $@
+
+build/stamp/docs: pyproject.toml | $(PYTHON)
+	$(PYTHON) tools/requirements.py docs | $(PYTHON) -m pip install --quiet -r /dev/stdin
 	@mkdir -p $(@D) && touch $@
 
 build/stamp/lint: pyproject.toml | $(PYTHON)

@@ -9,9 +9,10 @@ cd "$(dirname "$0")/.."
 # of many pixels take minutes here without another path through the core.
 if [ $# = 0 ]; then
     set -- -k "not 333x and not 1920 and not count_of_a_point"
-    for name in assets bench cli cli_apply cli_grid comparison doctor files frames gltf gltf_textures \
-        grid_cluster grid_order grid_reductions grid_store grid_views guide hdr_images images laws \
-        mutations pictures plugin reference report scene skybox; do
+    for name in assets bench cli cli_apply cli_grid comparison display docs doctor explorer \
+        explorer_page explorer_server files frames gltf gltf_textures grid_cluster grid_order \
+        grid_reductions grid_store grid_views guide hdr_images images laws mutations pictures \
+        plugin reference report scene skybox; do
         set -- "$@" "--ignore=tests/test_$name.py"
     done
 fi

@@ -332,7 +332,7 @@ class UnrealBloom(Settings):
     smoothstep(threshold, threshold + smooth_width, luminance). There are five levels, ``down_0`` of
     the same size and each next the rounded half of the one before; each is the one above it, the
     first one ``bright``, blurred along x, then along y, by taps one pixel of the level apart with
-    weights 0.39894 exp(-i^2 / (2 sigma^2)) / sigma, |i| < R, R = 6, 10, 14, 18, 22 and
+    weights 0.39894 exp(-i^2 / (2 sigma^2)) / sigma, -R < i < R, R = 6, 10, 14, 18, 22 and
     sigma = R / 3, not normalized. ``up_0`` is the sum of the levels, bilinear, times their
     factors, ``bloom`` one bilinear sample of it. In "rgba8unorm" up_0 is a third of that.
 
