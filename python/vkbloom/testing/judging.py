@@ -41,7 +41,8 @@ class Tolerances:
     ----------
     atol, rtol : float or None
         A pixel fails if a channel of it differs by more than atol + rtol * abs(reference):
-        `idiff`'s ``fail`` and ``failrelative``. None: `DEFAULTS` of the dtype if both are None, else 0.
+        `idiff`'s ``fail`` and ``failrelative``. None: `DEFAULTS` of the dtype if both are None,
+        else 0.
     fail_percent : float
         Percentage of pixels that may fail, 0 to 100: ``failpercent``.
     hard_fail : float or None
