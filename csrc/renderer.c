@@ -66,8 +66,9 @@ static void release_adrift(struct vkb_renderer *self)
 
     while (*link) {
         struct vkb_cargo *cargo = *link;
-        // A renderer that was closed has waited for it.
-        if (self->open && !vkb_frame_drop(&self->device, &self->frame, cargo->flight)) {
+        // Without a device all is over; one that was left behind at work keeps what it has.
+        if (self->device.handle
+            && !(self->open && vkb_frame_drop(&self->device, &self->frame, cargo->flight))) {
             link = &cargo->next;
             continue;
         }
@@ -223,10 +224,12 @@ static void dealloc(PyObject *object)
     self->device.interrupted = NULL;
     if (vkb_renderer_is_ours(self))
         destroy(self, &error);
-    // Where the device hangs, it may write to what is adrift.
     self->open = false;
-    if (!self->device.hung)
-        release_adrift(self);
+    // A device that hangs, or another process's, is left behind, and with it what the driver may
+    // still use: what is adrift, and this object, to which the messenger brings its messages.
+    if (self->device.handle)
+        return;
+    release_adrift(self);
     if (self->lock)
         PyThread_free_lock(self->lock);
     release(self);
@@ -265,7 +268,7 @@ static PyObject *close_renderer(PyObject *object, PyObject *unused)
     if (done)
         done = destroy(self, &error);
     vkb_renderer_leave(self);
-    if (!self->open && !self->device.hung)
+    if (!self->open && !self->device.handle)
         release_adrift(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
 }

@@ -98,10 +98,10 @@ def test_what_is_shipped_cannot_be_told_to_fail() -> None:
 
 
 def test_a_part_of_all_points(faulty: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
-    rows = walk(faulty, 24)
+    rows = walk(faulty, 40)
     show(rows, capsys)
     assert set(rows) == names()
-    assert sum(row["raised"] for row in rows.values()) > 100
+    assert sum(row["raised"] for row in rows.values()) > 60
 
 
 @pytest.mark.slow
