@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 
 from vkbloom import DeviceLostError, Renderer, Scene, Separable, gaussian_weights
 
+LEAVES_BEHIND = pytest.mark.skipif(
+    "VKBLOOM_SANITIZED" in os.environ, reason="leaves a device behind on purpose: a leak to LSan"
+)
 UNIX = pytest.mark.skipif(os.name == "nt", reason="signals and forks of Unix")
 
 # 65 x 65 taps a pixel, filtered by hand: a second on a few cores, so that there is a wait to leave.
@@ -178,6 +181,7 @@ def test_limits_that_are_none(monkeypatch: pytest.MonkeyPatch, text: str) -> Non
         Renderer("software")
 
 
+@LEAVES_BEHIND
 def test_a_device_that_takes_too_long(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
     monkeypatch.setenv("VKBLOOM_TIMEOUT", "0.1")
     renderer = Renderer("software", validation=True)
@@ -250,6 +254,7 @@ print("parent done")
 
 
 @UNIX
+@LEAVES_BEHIND
 @pytest.mark.parametrize("how", ["close", "collect", "exit", "leave"])
 def test_a_forked_process(how: str, tmp_path: Path) -> None:
     done = subprocess.run(
