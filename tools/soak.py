@@ -35,7 +35,8 @@ def counts() -> dict[str, int]:
 
 def frame(renderer: vkbloom.Renderer, scene: vkbloom.Scene, dice: random.Random) -> None:
     """Render one frame whose size, source and settings are by chance."""
-    size = (dice.randrange(1, 65), dice.randrange(1, 65))
+    # Some presets have levels of a fixed height, whose width follows the frame's shape.
+    size = (dice.randrange(4, 65), dice.randrange(4, 65))
     settings = dice.choice(
         [
             vkbloom.Separable(blur_strength=dice.random(), loops=dice.randrange(1, 4)),

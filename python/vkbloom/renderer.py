@@ -144,11 +144,18 @@ class Renderer:
         No adapter fits; says what was found, what is missing and what to install.
     Error
         The device cannot be set up, or the validation layer is not installed.
+    ValueError
+        VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range.
 
     Notes
     -----
     A context manager; usable from any thread. Calls release the GIL while the device works, and
     wait for each other. Framebuffers own their memory and outlive the renderer.
+
+    Ctrl-C, or whatever else a signal's handler raises, ends a call that waits, and the renderer can
+    be used again; closing waits for what the device is still at work on. A device that takes longer
+    than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
+    number. After a fork the child opens a renderer of its own: those of its parent raise ValueError.
     """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
