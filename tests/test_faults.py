@@ -6,6 +6,7 @@ fault_walk.py walks through all n.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import shutil
@@ -102,6 +103,24 @@ def test_a_part_of_all_points(faulty: dict[str, str], capsys: pytest.CaptureFixt
     show(rows, capsys)
     assert set(rows) == names()
     assert sum(row["raised"] for row in rows.values()) > 60
+
+
+def test_memory_that_python_does_not_get(
+    faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    if importlib.util.find_spec("_testcapi") is None:
+        pytest.skip("CPython's own tests, which can refuse it memory, are not here")
+    done = subprocess.run(
+        [sys.executable, str(WALK.with_name("memory_walk.py"))],
+        env=faulty,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    with capsys.disabled():
+        print(f"\n\nPython: {done.stdout.strip()}")
+    assert int(done.stdout.split()[4]) > 10
 
 
 @pytest.mark.slow

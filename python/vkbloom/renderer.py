@@ -155,7 +155,7 @@ class Renderer:
     Ctrl-C, or whatever else a signal's handler raises, ends a call that waits, and the renderer can
     be used again; closing waits for what the device is still at work on. A device that takes longer
     than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
-    number. After a fork the child opens a renderer of its own: those of its parent raise ValueError.
+    number. After a fork the child opens a renderer of its own; its parent's raise ValueError.
     """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
