@@ -2,12 +2,12 @@
 
 ``python tools/soak.py [FRAMES]`` (20,000): after every tenth of them memory, file descriptors and
 threads of the process; 1 where the second half has grown by more than a page a hundred frames, or
-has other descriptors or threads. With VKBLOOM_FORM and an adapter's name in VKBLOOM_ADAPTER as any
-use has them. Linux.
+has other descriptors or threads. Linux with glibc 2.33 or newer.
 """
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import random
@@ -22,12 +22,29 @@ import vkbloom
 STEPS = 10
 
 
+class _HeapInfo(ctypes.Structure):
+    """struct mallinfo2 of <malloc.h>."""
+
+    _fields_ = [
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena", "ordblks", "smblks", "hblks", "hblkhd",
+            "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost",
+        )
+    ]  # fmt: skip
+
+
 def counts() -> dict[str, int]:
     """Return what must not grow."""
     gc.collect()
+    libc = ctypes.CDLL(None)
+    libc.malloc_trim(0)
+    libc.mallinfo2.restype = _HeapInfo
+    heap = libc.mallinfo2()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
-        "kilobytes": pages * os.sysconf("SC_PAGESIZE") // 1024,
+        "kilobytes of heap in use": (heap.uordblks + heap.hblkhd) // 1024,
+        "kilobytes resident": pages * os.sysconf("SC_PAGESIZE") // 1024,
         "descriptors": len(os.listdir("/proc/self/fd")),
         "threads": len(os.listdir("/proc/self/task")),
     }
@@ -69,13 +86,18 @@ def main(total: int) -> int:
         for step in range(STEPS):
             for _ in range(total // STEPS):
                 frame(renderer, scene, dice)
+            # The same last frames, so that the same is held at each count.
+            for _ in range(4):
+                renderer.render(scene, None, (16, 16))
+            renderer.apply(np.zeros((8, 8, 3), np.float32))
             rows.append(counts())
             shown = ", ".join(f"{value} {name}" for name, value in rows[-1].items())
             print(f"{(step + 1) * (total // STEPS):>8} frames: {shown}", flush=True)
     print(f"{time.perf_counter() - begin:.0f} s")
     middle, last = rows[STEPS // 2 - 1], rows[-1]
-    grown = (last["kilobytes"] - middle["kilobytes"]) * 1024 / (total / 2)
-    print(f"{grown:.1f} bytes a frame in the second half")
+    name = "kilobytes of heap in use"
+    grown = (last[name] - middle[name]) * 1024 / (total / 2)
+    print(f"{grown:.1f} bytes of heap a frame in the second half")
     same = all(last[name] == middle[name] for name in ("descriptors", "threads"))
     return int(grown > 41 or not same)
 
