@@ -48,7 +48,7 @@ static bool open_loader(struct vkb_error *error)
 {
     lock_loader();
     if (!loader_open)
-        loader_open = volkInitialize() == VK_SUCCESS;
+        loader_open = VK_RESULT(volkInitialize()) == VK_SUCCESS;
     bool open = loader_open;
     unlock_loader();
     if (!open)
@@ -76,6 +76,9 @@ static VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlag
 
     (void)severity;
     (void)types;
+#ifdef VKBLOOM_FAULTS
+    vkb_fault_message();
+#endif
     if (instance->message_count++ == 0)
         snprintf(instance->first_message, sizeof instance->first_message, "%s", data->pMessage);
     return VK_FALSE;
@@ -85,7 +88,7 @@ static bool validation_available(void)
 {
     VkLayerProperties layers[128];
     uint32_t count = sizeof layers / sizeof layers[0];
-    VkResult result = vkEnumerateInstanceLayerProperties(&count, layers);
+    VkResult result = VK_RESULT(vkEnumerateInstanceLayerProperties(&count, layers));
 
     if (result != VK_SUCCESS && result != VK_INCOMPLETE)
         return false;
@@ -127,7 +130,7 @@ bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct 
             (VkValidationFeatureEnableEXT[]){
                 VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT},
     };
-    VkResult result = vkCreateInstance(
+    VkResult result = VK_RESULT(vkCreateInstance(
         &(VkInstanceCreateInfo){
             .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
             .pNext = validation ? &features : NULL,
@@ -142,7 +145,7 @@ bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct 
             .enabledExtensionCount = validation ? 1 : 0,
             .ppEnabledExtensionNames = (const char *[]){VK_EXT_DEBUG_UTILS_EXTENSION_NAME},
         },
-        NULL, &instance->handle);
+        NULL, &instance->handle));
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER) {
         vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
                  "no Vulkan adapter: the loader found no driver that works. %s", INSTALL_HINT);
@@ -156,10 +159,12 @@ bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct 
     if (!validation)
         return true;
 
-    PFN_vkCreateDebugUtilsMessengerEXT create_messenger =
+    // Taken per instance, as below, and named as errors are to name it.
+    PFN_vkCreateDebugUtilsMessengerEXT vkCreateDebugUtilsMessengerEXT =
         (PFN_vkCreateDebugUtilsMessengerEXT)vkGetInstanceProcAddr(instance->handle,
                                                                   "vkCreateDebugUtilsMessengerEXT");
-    if (VK(error, create_messenger(instance->handle, &messenger, NULL, &instance->messenger)))
+    if (VK(error, vkCreateDebugUtilsMessengerEXT(instance->handle, &messenger, NULL,
+                                                 &instance->messenger)))
         return true;
     vkb_instance_destroy(instance);
     return false;
@@ -245,7 +250,8 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
 {
     VkPhysicalDevice devices[VKB_MAX_ADAPTERS];
     uint32_t device_count = VKB_MAX_ADAPTERS;
-    VkResult result = vkEnumeratePhysicalDevices(instance->handle, &device_count, devices);
+    VkResult result =
+        VK_RESULT(vkEnumeratePhysicalDevices(instance->handle, &device_count, devices));
 
     *count = 0;
     // Some loaders answer so where they have no driver at all.

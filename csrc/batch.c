@@ -11,6 +11,14 @@ struct held_arrays {
     uint32_t view_count;
 };
 
+// What the device may still write to when nobody waits for it any more.
+struct batch_cargo {
+    struct vkb_cargo cargo;
+    struct vkb_point *points;
+    struct held_arrays *held;
+    size_t count;
+};
+
 struct batch {
     PyObject_HEAD
     struct vkb_renderer *renderer;
@@ -28,6 +36,7 @@ struct batch {
     size_t size;  // bytes of all arrays
     bool submitted;
     struct vkb_flight *flight;  // NULL: not in the air
+    struct batch_cargo *cargo;  // from the submission on
     struct vkb_specials specials;
 };
 
@@ -216,21 +225,36 @@ PyObject *vkb_batch_of_image(PyObject *renderer, PyObject *arguments)
     return (PyObject *)self;
 }
 
-// Waits for what nobody collected, so that the device writes to no array that is gone.
-static void drop_flight(struct batch *self)
+static void release_points(struct vkb_point *points, struct held_arrays *held, size_t count)
 {
-    struct vkb_renderer *renderer = self->renderer;
+    for (size_t i = 0; i < count; ++i)
+        release_point(&points[i], &held[i]);
+    vkb_free(points);
+    vkb_free(held);
+}
 
-    if (!self->flight)
-        return;
-    Py_BEGIN_ALLOW_THREADS
-    PyThread_acquire_lock(renderer->lock, WAIT_LOCK);
-    // A renderer that was closed has waited for it.
-    if (renderer->open)
-        vkb_frame_drop(&renderer->device, &renderer->frame, self->flight);
-    PyThread_release_lock(renderer->lock);
-    Py_END_ALLOW_THREADS
-    self->flight = NULL;
+static void release_cargo(struct vkb_cargo *cargo)
+{
+    struct batch_cargo *self = (struct batch_cargo *)cargo;
+
+    release_points(self->points, self->held, self->count);
+    vkb_free(self);
+}
+
+// Leaves the points to the renderer until the device, which may write to their arrays, is done.
+static void set_adrift(struct batch *self, struct vkb_flight *flight)
+{
+    *self->cargo = (struct batch_cargo){
+        .cargo = {.flight = flight, .release = release_cargo},
+        .points = self->points,
+        .held = self->held,
+        .count = self->count,
+    };
+    vkb_renderer_set_adrift(self->renderer, &self->cargo->cargo);
+    self->cargo = NULL;
+    self->points = NULL;
+    self->held = NULL;
+    self->count = 0;
 }
 
 static void dealloc(PyObject *object)
@@ -239,12 +263,12 @@ static void dealloc(PyObject *object)
     PyTypeObject *type = Py_TYPE(object);
     freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
 
-    drop_flight(self);
+    // A forked process has no device that could write.
+    if (self->flight && vkb_renderer_is_ours(self->renderer))
+        set_adrift(self, self->flight);
     release_source(self);
-    for (size_t i = 0; i < self->count; ++i)
-        release_point(&self->points[i], &self->held[i]);
-    vkb_free(self->points);
-    vkb_free(self->held);
+    release_points(self->points, self->held, self->count);
+    vkb_free(self->cargo);
     Py_XDECREF(self->shading_object);
     Py_XDECREF(self->names);
     Py_XDECREF((PyObject *)self->renderer);
@@ -327,8 +351,11 @@ static PyObject *submit(PyObject *object, PyObject *unused)
         return NULL;
     }
     self->submitted = true;
-    Py_BEGIN_ALLOW_THREADS
-    PyThread_acquire_lock(renderer->lock, WAIT_LOCK);
+    self->cargo = vkb_alloc(&error, 1, sizeof *self->cargo);
+    if (!self->cargo || !vkb_renderer_enter(renderer, &error)) {
+        release_source(self);
+        return vkb_raise(state_of(object), &error);
+    }
     done = vkb_require_open(renderer, &error)
         && vkb_frame_submit(&renderer->device, &renderer->frame, &source, self->points,
                             (uint32_t)self->count, &self->flight, &error);
@@ -337,8 +364,7 @@ static PyObject *submit(PyObject *object, PyObject *unused)
     // A validation message says more than what it led to.
     if (renderer->open)
         done = vkb_instance_check(&renderer->device.instance, &error) && done;
-    PyThread_release_lock(renderer->lock);
-    Py_END_ALLOW_THREADS
+    vkb_renderer_leave(renderer);
     release_source(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
 }
@@ -380,23 +406,27 @@ static PyObject *collect(PyObject *object, PyObject *unused)
     struct vkb_renderer *renderer = self->renderer;
     struct vkb_flight *flight = self->flight;
     struct vkb_error error = {0};
-    bool done;
+    bool done, over = true;
 
     (void)unused;
     if (!flight) {
         PyErr_SetString(PyExc_RuntimeError, "a batch is collected once, after its submission");
         return NULL;
     }
+    if (!vkb_renderer_enter(renderer, &error))
+        return vkb_raise(state_of(object), &error);
     self->flight = NULL;
-    Py_BEGIN_ALLOW_THREADS
-    PyThread_acquire_lock(renderer->lock, WAIT_LOCK);
     // A closed renderer has no flights.
-    done = renderer->open ? vkb_frame_collect(&renderer->device, &renderer->frame, flight, &error)
-                          : vkb_require_open(renderer, &error);
+    done = renderer->open
+             ? vkb_frame_collect(&renderer->device, &renderer->frame, flight, &over, &error)
+             : vkb_require_open(renderer, &error);
     if (renderer->open)
         done = vkb_instance_check(&renderer->device.instance, &error) && done;
-    PyThread_release_lock(renderer->lock);
-    Py_END_ALLOW_THREADS
+    vkb_renderer_leave(renderer);
+    if (!over) {
+        set_adrift(self, flight);
+        return vkb_raise(state_of(object), &error);
+    }
     for (size_t i = 0; i < self->count; ++i)
         release_views(&self->held[i]);
     return done ? results(self) : vkb_raise(state_of(object), &error);

@@ -60,8 +60,13 @@ bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *command
         && vkb_device_submit(device, commands->buffer, commands->fence, error);
 }
 
-bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands,
+bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
                        struct vkb_error *error)
 {
-    return vkb_device_wait(device, commands->fence, error);
+    return vkb_device_wait(device, commands->fence, frames, error);
+}
+
+bool vkb_commands_over(const struct vkb_device *device, const struct vkb_commands *commands)
+{
+    return device->vk.vkGetFenceStatus(device->handle, commands->fence) == VK_SUCCESS;
 }

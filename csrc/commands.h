@@ -21,8 +21,10 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
 // Ends the recording and hands it to the device, which runs it after all that it was handed before.
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
                          struct vkb_error *error);
-// Waits until the device has run what was submitted last.
-bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands,
+// Waits until the device has run what was submitted last, which has so many frames.
+bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
                        struct vkb_error *error);
+// Whether the device has run what was submitted last, without a wait.
+bool vkb_commands_over(const struct vkb_device *device, const struct vkb_commands *commands);
 
 #endif

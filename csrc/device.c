@@ -1,5 +1,6 @@
 #include "device.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static bool has_extension(VkPhysicalDevice physical, const char *name, bool *found,
@@ -150,9 +151,9 @@ bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
         return false;
     vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
     return (properties.linearTilingFeatures & features) == features
-        && vkGetPhysicalDeviceImageFormatProperties(device->adapter.physical, format,
-                                                    VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage,
-                                                    0, &limits)
+        && VK_RESULT(vkGetPhysicalDeviceImageFormatProperties(
+               device->adapter.physical, format, VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage, 0,
+               &limits))
                == VK_SUCCESS
         && width <= limits.maxExtent.width && height <= limits.maxExtent.height;
 }
@@ -177,11 +178,40 @@ bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFe
     return remember_loss(device, done, error);
 }
 
-bool vkb_device_wait(struct vkb_device *device, VkFence fence, struct vkb_error *error)
+static bool fail_hung(struct vkb_device *device, double seconds, struct vkb_error *error)
+{
+    vkb_fail(error, VKB_ERROR_DEVICE_LOST,
+             "the device has not finished within %g s; the renderer can only be closed "
+             "(VKBLOOM_TIMEOUT: seconds a frame)",
+             seconds);
+    error->result = VK_TIMEOUT;
+    snprintf(error->call, sizeof error->call, "vkWaitForFences");
+    device->hung = true;
+    return false;
+}
+
+bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
+                     struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
-    bool done = VK(error, vk->vkWaitForFences(device->handle, 1, &fence, VK_TRUE, UINT64_MAX))
-             && VK(error, vk->vkResetFences(device->handle, 1, &fence));
+    const double slice = 0.05, limit = device->frame_seconds * frames;
+    double waited = 0.0;
+    VkResult result;
+    bool done;
 
+    for (;;) {
+        result = VK_RESULT(
+            vk->vkWaitForFences(device->handle, 1, &fence, VK_TRUE, (uint64_t)(slice * 1e9)));
+        if (result != VK_TIMEOUT)
+            break;
+        waited += slice;
+        if (device->interrupted && device->interrupted(device->asked))
+            return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
+        if (waited >= limit)
+            break;
+    }
+    done = result == VK_TIMEOUT ? fail_hung(device, limit, error)
+                                : vkb_check(error, result, "vkWaitForFences")
+                                      && VK(error, vk->vkResetFences(device->handle, 1, &fence));
     return remember_loss(device, done, error);
 }

@@ -19,6 +19,11 @@ struct vkb_device {
     // Host memory that becomes a buffer starts and ends at multiples of it; 0: none can.
     VkDeviceSize import_alignment;
     bool lost;
+    bool hung;  // lost because a wait took too long: it may be at work still
+    // Asked between the slices of a long wait; true ends it. NULL: nobody is.
+    bool (*interrupted)(void *asked);
+    void *asked;
+    double frame_seconds;  // how long a wait may take for each frame that is waited for
 };
 
 // `device` must not move in memory while it lives, as the instance in it.
@@ -40,7 +45,9 @@ bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
 // them and all that was submitted before. A lost device is remembered.
 bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
                        struct vkb_error *error);
-// Waits for the fence and leaves it unsignalled. A lost device is remembered.
-bool vkb_device_wait(struct vkb_device *device, VkFence fence, struct vkb_error *error);
+// Waits for the fence and leaves it unsignalled. A device that takes longer than `frames` frames
+// may counts as lost; a lost device is remembered. On failure it may be at work still.
+bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
+                     struct vkb_error *error);
 
 #endif

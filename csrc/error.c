@@ -68,12 +68,12 @@ static enum vkb_error_kind result_kind(VkResult result)
     }
 }
 
+// "device->vk.vkCreateImage(device->handle, ...)" is shown as "vkCreateImage".
 bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text)
 {
     if (result == VK_SUCCESS)
         return true;
 
-    // "device->vk.vkCreateImage(device->handle, ...)" is shown as "vkCreateImage".
     int length = (int)strcspn(call_text, "(");
     const char *start = call_text + length;
     while (start > call_text && start[-1] != '.' && start[-1] != '>')
@@ -92,13 +92,23 @@ static bool fail_memory(struct vkb_error *error, size_t count, size_t size)
                     count, size);
 }
 
+// What a test build counts, and can refuse (faults.h).
+#ifdef VKBLOOM_FAULTS
+#define REFUSED()          vkb_fault("vkb_alloc")
+#define COUNT_BLOCKS(more) vkb_fault_blocks(more)
+#else
+#define REFUSED()          false
+#define COUNT_BLOCKS(more) ((void)(more))
+#endif
+
 void *vkb_alloc(struct vkb_error *error, size_t count, size_t size)
 {
     // calloc(0) may answer NULL, which is no failure here.
-    void *memory = calloc(count ? count : 1, size);
+    void *memory = REFUSED() ? NULL : calloc(count ? count : 1, size);
 
     if (!memory)
         fail_memory(error, count, size);
+    COUNT_BLOCKS(memory != NULL);
     return memory;
 }
 
@@ -110,9 +120,10 @@ bool vkb_grow(struct vkb_error *error, void **array, size_t *capacity, size_t ne
     size_t grown = *capacity ? *capacity : 8;
     while (grown < needed)
         grown *= 2;
-    void *memory = grown > SIZE_MAX / size ? NULL : realloc(*array, grown * size);
+    void *memory = grown > SIZE_MAX / size || REFUSED() ? NULL : realloc(*array, grown * size);
     if (!memory)
         return fail_memory(error, grown, size);
+    COUNT_BLOCKS(*array == NULL);
     *array = memory;
     *capacity = grown;
     return true;
@@ -120,5 +131,6 @@ bool vkb_grow(struct vkb_error *error, void **array, size_t *capacity, size_t ne
 
 void vkb_free(void *memory)
 {
+    COUNT_BLOCKS(-(memory != NULL));
     free(memory);
 }

@@ -15,6 +15,7 @@ enum vkb_error_kind {
     VKB_ERROR_VALIDATION,
     VKB_ERROR_SHADER,
     VKB_ERROR_VALUE,
+    VKB_ERROR_INTERRUPTED,  // by whoever was asked during a wait, and who knows the reason
 };
 
 struct vkb_error {
@@ -33,8 +34,15 @@ bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *for
 // True where `result` is VK_SUCCESS; else fills `error` from the result and the call's source text.
 bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text);
 
-// The only way in which the core calls a Vulkan function that can fail.
-#define VK(error, call) vkb_check((error), (call), #call)
+// The only ways in which the core calls a Vulkan function that can fail; the second gives the
+// result to the caller.
+#define VK(error, call) vkb_check((error), VK_RESULT(call), #call)
+#ifdef VKBLOOM_FAULTS
+#include "faults.h"
+#define VK_RESULT(call) (vkb_fault(#call) ? vkb_fault_result : (call))
+#else
+#define VK_RESULT(call) (call)
+#endif
 
 // Zeroed host memory for count objects of `size` bytes; NULL and a filled error where there is
 // none.

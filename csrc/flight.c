@@ -28,7 +28,7 @@ void vkb_flights_destroy(const struct vkb_device *device, struct vkb_flights *fl
 static struct vkb_flight *find_free(const struct vkb_flights *flights)
 {
     for (size_t i = 0; i < flights->count; ++i)
-        if (!flights->flights[i]->taken)
+        if (!flights->flights[i]->taken && !flights->flights[i]->airborne)
             return flights->flights[i];
     return NULL;
 }
@@ -66,8 +66,9 @@ void vkb_flights_give_back(const struct vkb_device *device, struct vkb_flights *
     size_t free_count = 0;
 
     flight->taken = false;
-    flight->airborne = false;
     flight->points = NULL;
+    if (flight->airborne)
+        return;
     flight->point_count = 0;
     vkb_readback_release(device, &flight->readback);
     for (size_t i = 0; i < flights->count; ++i)
@@ -87,9 +88,27 @@ bool vkb_flight_submit(struct vkb_device *device, struct vkb_flight *flight,
     return flight->airborne;
 }
 
-bool vkb_flight_wait(struct vkb_device *device, struct vkb_flight *flight, struct vkb_error *error)
+bool vkb_flight_over(const struct vkb_device *device, const struct vkb_flight *flight)
 {
-    if (flight->airborne && !vkb_commands_wait(device, &flight->commands, error))
+    return !flight->airborne || vkb_commands_over(device, &flight->commands);
+}
+
+// All that is in the air may come before the flight; one without points loads a scene.
+static uint32_t count_frames(const struct vkb_flights *flights)
+{
+    uint32_t count = 0;
+
+    for (size_t i = 0; i < flights->count; ++i)
+        if (flights->flights[i]->airborne)
+            count += flights->flights[i]->point_count ? flights->flights[i]->point_count : 1;
+    return count;
+}
+
+bool vkb_flight_wait(struct vkb_device *device, const struct vkb_flights *flights,
+                     struct vkb_flight *flight, struct vkb_error *error)
+{
+    if (flight->airborne
+        && !vkb_commands_wait(device, &flight->commands, count_frames(flights), error))
         return false;
     flight->airborne = false;
     return true;
@@ -99,7 +118,7 @@ bool vkb_flights_land(struct vkb_device *device, struct vkb_flights *flights,
                       struct vkb_error *error)
 {
     for (size_t i = 0; i < flights->count; ++i)
-        if (!vkb_flight_wait(device, flights->flights[i], error))
+        if (!vkb_flight_wait(device, flights, flights->flights[i], error))
             return false;
     return true;
 }

@@ -540,11 +540,19 @@ static bool resolve(struct run *run, uint32_t image, struct vkb_error *error)
 
 static bool load_scene(struct run *run, const struct vkb_scene_data *data, struct vkb_error *error)
 {
+    struct vkb_device *device = run->device;
+    struct vkb_flight *flight = run->flight;
     struct vkb_scene *scene = &run->frame->scene;
 
-    return scene->serial == data->serial
-        || (vkb_flights_land(run->device, &run->frame->flights, error)
-            && vkb_scene_load(run->device, &run->flight->commands, data, scene, error));
+    if (scene->serial == data->serial)
+        return true;
+    if (!vkb_flights_land(device, &run->frame->flights, error)
+        || !vkb_scene_begin(device, &flight->commands, data, scene, error)
+        || !vkb_flight_submit(device, flight, error)
+        || !vkb_flight_wait(device, &run->frame->flights, flight, error))
+        return false;
+    vkb_scene_end(device, data, scene);
+    return true;
 }
 
 // Stages the image and finds out whether the device has it already.
@@ -630,13 +638,26 @@ static bool submit(struct run *run, const struct vkb_frame_source *source, struc
         && record_and_submit(run, points, point_count, error);
 }
 
-// After a failure nothing is known of what the device did: images and commands are made anew.
-static void recover(const struct vkb_device *device, struct vkb_frame *frame,
-                    struct vkb_flight *flight)
+// After a failure nothing is known of what the device did: images and commands are made anew. The
+// images later, when nothing is in the air: a wait here could not be interrupted.
+static void fail_frame(struct vkb_device *device, struct vkb_frame *frame,
+                       struct vkb_flight *flight, const struct vkb_error *error)
 {
-    device->vk.vkDeviceWaitIdle(device->handle);
+    frame->stale = true;
+    device->lost = device->lost || error->kind == VKB_ERROR_DEVICE_LOST;
+    if (!flight->airborne)
+        vkb_commands_destroy(device, &flight->commands);
+}
+
+static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
+{
+    if (!frame->stale)
+        return true;
+    if (!vkb_flights_land(device, &frame->flights, error))
+        return false;
     vkb_slots_destroy(device, &frame->slots);
-    vkb_commands_destroy(device, &flight->commands);
+    frame->stale = false;
+    return true;
 }
 
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
@@ -651,7 +672,8 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     for (uint32_t i = 0; i < point_count; ++i)
         if (points[i].graph.pass_count > pass_count)
             pass_count = points[i].graph.pass_count;
-    if (!vkb_flights_take(device, &frame->flights, &run.flight, error))
+    if (!renew(device, frame, error)
+        || !vkb_flights_take(device, &frame->flights, &run.flight, error))
         return false;
     done = (run.slots = vkb_alloc(error, image_count, sizeof *run.slots))
         && (run.wanted = vkb_alloc(error, image_count, sizeof *run.wanted))
@@ -668,7 +690,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         run.flight->point_count = point_count;
         *flight = run.flight;
     } else {
-        recover(device, frame, run.flight);
+        fail_frame(device, frame, run.flight, error);
         vkb_flights_give_back(device, &frame->flights, run.flight);
     }
     return done;
@@ -706,25 +728,33 @@ static void fetch(const struct vkb_device *device, const struct vkb_flight *flig
 }
 
 bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
-                       struct vkb_flight *flight, struct vkb_error *error)
+                       struct vkb_flight *flight, bool *over, struct vkb_error *error)
 {
-    bool done = vkb_flight_wait(device, flight, error)
-             && vkb_readback_end(device, &flight->readback, error)
-             && vkb_timer_fetch(device, &flight->timer, error);
+    *over = vkb_flight_wait(device, &frame->flights, flight, error);
+    const bool done = *over && vkb_readback_end(device, &flight->readback, error)
+                   && vkb_timer_fetch(device, &flight->timer, error);
 
     if (done)
         fetch(device, flight);
-    else
-        recover(device, frame, flight);
-    vkb_flights_give_back(device, &frame->flights, flight);
+    else if (error->kind != VKB_ERROR_INTERRUPTED)
+        fail_frame(device, frame, flight, error);
+    if (*over)
+        vkb_flights_give_back(device, &frame->flights, flight);
     return done;
 }
 
-void vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight)
+bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight)
 {
     struct vkb_error error;
 
-    if (!vkb_flight_wait(device, flight, &error))
-        recover(device, frame, flight);
+    if (!vkb_flight_over(device, flight)
+        || !vkb_flight_wait(device, &frame->flights, flight, &error))
+        return false;
     vkb_flights_give_back(device, &frame->flights, flight);
+    return true;
+}
+
+bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
+{
+    return vkb_flights_land(device, &frame->flights, error);
 }

@@ -18,6 +18,7 @@ struct vkb_frame {
     struct vkb_scene scene;
     struct vkb_upload upload;
     struct vkb_slots slots;
+    bool stale;  // something failed: the images are made anew before anything is recorded
 };
 
 // What graphs start from; what they do not use is NULL.
@@ -55,11 +56,16 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
                       const struct vkb_frame_source *source, struct vkb_point *points,
                       uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error);
 
-// Waits for the flight and fills its points' outputs and timings. The flight is over in any case.
+// Waits for the flight and fills its points' outputs and timings. *over: whether the device is done
+// with it, which it need not be after a failure.
 bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
-                       struct vkb_flight *flight, struct vkb_error *error);
+                       struct vkb_flight *flight, bool *over, struct vkb_error *error);
 
-// Waits for a flight that nobody wants any more.
-void vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight);
+// Gives up a flight that nobody wants any more, without a wait; false where the device may still
+// be at work on it.
+bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight);
+
+// Waits for all flights.
+bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error);
 
 #endif

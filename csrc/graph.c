@@ -2,12 +2,6 @@
 
 #include <string.h>
 
-void vkb_graph_reset(struct vkb_graph *graph)
-{
-    graph->image_count = 0;
-    graph->pass_count = 0;
-}
-
 void vkb_graph_destroy(struct vkb_graph *graph)
 {
     vkb_free(graph->images);

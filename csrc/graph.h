@@ -78,7 +78,6 @@ struct vkb_graph {
     size_t image_capacity, pass_capacity;
 };
 
-void vkb_graph_reset(struct vkb_graph *graph);  // no rows, memory kept
 void vkb_graph_destroy(struct vkb_graph *graph);
 
 // Adds a copy of the row; *index (may be NULL) is where it lies.

@@ -61,7 +61,7 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
     VkMemoryRequirements requirements;
     VkMemoryPropertyFlags flags;
 
-    *buffer = (struct vkb_buffer){.size = size};
+    *buffer = (struct vkb_buffer){0};
     if (!VK(error, vk->vkCreateBuffer(device->handle,
                                       &(VkBufferCreateInfo){
                                           .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
@@ -79,6 +79,8 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
         vkb_buffer_destroy(device, buffer);
         return false;
     }
+    // Only one that is whole has a size: vkb_buffer_reserve goes by it.
+    buffer->size = size;
     buffer->coherent = flags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     return true;
 }
@@ -107,9 +109,9 @@ static uint32_t find_import_type(const struct vkb_device *device, void *memory, 
         .sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT,
     };
 
-    if (device->vk.vkGetMemoryHostPointerPropertiesEXT(
+    if (VK_RESULT(device->vk.vkGetMemoryHostPointerPropertiesEXT(
             device->handle, VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, memory,
-            &properties)
+            &properties))
         != VK_SUCCESS)
         return UINT32_MAX;
     for (uint32_t i = 0; i < device->memory.memoryTypeCount; ++i)

@@ -19,8 +19,10 @@ static bool set_steal(PyObject *object, const char *name, PyObject *value)
 
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error)
 {
+    // The exception of what interrupted is there already.
+    if (error->kind == VKB_ERROR_INTERRUPTED)
+        return NULL;
     PyObject *type = state->errors[error->kind];
-
     if (error->kind == VKB_ERROR_VALUE) {
         PyErr_SetString(type, error->message);
         return NULL;
@@ -80,6 +82,12 @@ static PyObject *adapters(PyObject *module, PyObject *unused)
 static PyMethodDef functions[] = {
     {"adapters", adapters, METH_NOARGS, "Describes the adapters that can run vkbloom."},
     {"describe", vkb_describe, METH_VARARGS, "The graph of a scene's frame as lists and dicts."},
+#ifdef VKBLOOM_FAULTS
+    {"arm_fault", vkb_fault_arm, METH_VARARGS,
+     "arm_fault(n, result, names): the n-th call of those names (\"\": of all) answers result."},
+    {"fault_state", vkb_fault_state, METH_NOARGS,
+     "(calls since then, the one that failed or \"\", blocks, validation messages)"},
+#endif
     {0},
 };
 

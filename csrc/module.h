@@ -27,17 +27,39 @@ PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
 extern PyType_Spec vkb_renderer_spec, vkb_batch_spec;
 
+// A batch's flight that nobody waits for any more, with what it writes to until it is over.
+struct vkb_cargo {
+    struct vkb_flight *flight;  // NULL: over
+    void (*release)(struct vkb_cargo *cargo);
+    struct vkb_cargo *next;
+};
+
 struct vkb_renderer {
     PyObject_HEAD
-    PyThread_type_lock lock;  // held, without the GIL, around all that touches the device
+    PyThread_type_lock lock;   // held, without the GIL, around all that touches the device
+    unsigned long holder;      // the thread that holds it, 0: none; read and written with the GIL
+    PyThreadState *thread;     // that thread's, while it has given the GIL back
+    struct vkb_cargo *adrift;  // touched with the GIL
+    long process;              // that opened it: the device is no other's, not even a forked one's
     bool open;
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
 };
 
-// Fails where the renderer is closed or its device lost.
+// Fails where the renderer is closed or another process's, or its device lost.
 bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *error);
+
+// Takes the renderer's lock and gives the GIL back, and the other way round. Waiting for the lock
+// can be interrupted by a signal; then, and where a signal's handler asks for what the thread that
+// it interrupted has, the first one fails, with the GIL. What is adrift and over is given up.
+bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
+void vkb_renderer_leave(struct vkb_renderer *renderer);
+
+// Whether this is the process that opened the renderer.
+bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
+// Takes the cargo over, whose flight may be in the air.
+void vkb_renderer_set_adrift(struct vkb_renderer *renderer, struct vkb_cargo *cargo);
 
 // Methods of the Renderer: a new Batch of points of one scene or of one image.
 PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments);
@@ -89,5 +111,10 @@ void vkb_release_image(struct vkb_held_image *image);
 
 // The graph of a scene's frame as Python data: describe(settings, size, has_sky, shading).
 PyObject *vkb_describe(PyObject *module, PyObject *arguments);
+
+#ifdef VKBLOOM_FAULTS
+PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);
+PyObject *vkb_fault_state(PyObject *module, PyObject *unused);
+#endif
 
 #endif

@@ -1,9 +1,116 @@
 // The Renderer type: a device and all that lives on it.
 #include "module.h"
 
+#ifndef _WIN32
+#include <unistd.h>
+#endif
+
 static struct vkb_module_state *state_of(PyObject *self)
 {
     return PyType_GetModuleState(Py_TYPE(self));
+}
+
+static long current_process(void)
+{
+#ifdef _WIN32
+    return 0;  // nothing forks there
+#else
+    return (long)getpid();
+#endif
+}
+
+bool vkb_renderer_is_ours(const struct vkb_renderer *self)
+{
+    return self->process == current_process();
+}
+
+static bool require_ours(const struct vkb_renderer *self, struct vkb_error *error)
+{
+    return vkb_renderer_is_ours(self)
+        || vkb_fail(error, VKB_ERROR_VALUE,
+                    "the renderer was opened in another process (%ld), from which this one (%ld) "
+                    "was forked; open one here",
+                    self->process, current_process());
+}
+
+// The device's question between the slices of a wait: whether a signal's handler raised.
+static bool interrupted(void *asked)
+{
+    struct vkb_renderer *self = asked;
+
+    PyEval_RestoreThread(self->thread);
+    const bool raised = PyErr_CheckSignals() < 0;
+    self->thread = PyEval_SaveThread();
+    return raised;
+}
+
+static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
+{
+    const long long slice = 50000;  // microseconds
+    PyLockStatus status = PyThread_acquire_lock_timed(self->lock, 0, 0);
+
+    while (status != PY_LOCK_ACQUIRED) {
+        Py_BEGIN_ALLOW_THREADS
+        status = PyThread_acquire_lock_timed(self->lock, slice, 0);
+        Py_END_ALLOW_THREADS
+        if (status != PY_LOCK_ACQUIRED && PyErr_CheckSignals() < 0)
+            return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
+    }
+    return true;
+}
+
+// With the lock and the GIL.
+static void release_adrift(struct vkb_renderer *self)
+{
+    struct vkb_cargo **link = &self->adrift, *over = NULL;
+
+    while (*link) {
+        struct vkb_cargo *cargo = *link;
+        // Without a device all is over; one that was left behind at work keeps what it has.
+        if (self->device.handle
+            && !(self->open && vkb_frame_drop(&self->device, &self->frame, cargo->flight))) {
+            link = &cargo->next;
+            continue;
+        }
+        *link = cargo->next;
+        cargo->next = over;
+        over = cargo;
+    }
+    // Releasing runs Python's code, which may set more adrift.
+    while (over) {
+        struct vkb_cargo *next = over->next;
+        over->release(over);
+        over = next;
+    }
+}
+
+void vkb_renderer_set_adrift(struct vkb_renderer *self, struct vkb_cargo *cargo)
+{
+    cargo->next = self->adrift;
+    self->adrift = cargo;
+}
+
+bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
+{
+    if (!require_ours(self, error))
+        return false;
+    if (self->holder == PyThread_get_thread_ident())
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "the renderer is at work in this thread, which a signal's handler or a "
+                        "finalizer has interrupted");
+    if (!acquire_lock(self, error))
+        return false;
+    self->holder = PyThread_get_thread_ident();
+    release_adrift(self);
+    self->thread = PyEval_SaveThread();
+    return true;
+}
+
+void vkb_renderer_leave(struct vkb_renderer *self)
+{
+    PyEval_RestoreThread(self->thread);
+    self->holder = 0;
+    PyThread_release_lock(self->lock);
 }
 
 // create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
@@ -50,6 +157,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
 {
     const char *adapter, *forms;
     int validation;
+    double frame_seconds;
     PyObject *read_cache;
     struct vkb_error error = {0};
 
@@ -57,30 +165,48 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(arguments, "spsO:Renderer", &adapter, &validation, &forms, &read_cache))
+    if (!PyArg_ParseTuple(arguments, "spsdO:Renderer", &adapter, &validation, &forms,
+                          &frame_seconds, &read_cache))
         return NULL;
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
     if (!self)
         return NULL;
+    self->process = current_process();
     self->lock = PyThread_allocate_lock();
     if (!self->lock)
         PyErr_NoMemory();
     else
         self->open = create(self, adapter, validation, forms, read_cache, &error);
-    if (self->open)
+    if (self->open) {
+        self->device.interrupted = interrupted;
+        self->device.asked = self;
+        self->device.frame_seconds = frame_seconds;
         return (PyObject *)self;
+    }
     if (error.kind != VKB_OK)
         vkb_raise(PyType_GetModuleState(type), &error);
     Py_DECREF(self);
     return NULL;
 }
 
-// With the validation layer, an object left behind is a message here.
+// With the validation layer, an object left behind is a message here. A device that hangs is left
+// as it is, with all that it may still use.
 static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
 {
+    struct vkb_error ignored;
+
     if (!self->open)
         return true;
+    if (self->device.hung) {
+        self->device.frame_seconds = 0.0;  // one slice
+        if (!vkb_frame_land(&self->device, &self->frame, &ignored)) {
+            self->open = false;
+            return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
+                            "the device is still at work; what it uses is kept until the process "
+                            "ends");
+        }
+    }
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
     // The instance stays readable after its end: the messages are the renderer's own memory.
@@ -95,7 +221,15 @@ static void dealloc(PyObject *object)
     freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
     struct vkb_error error = {0};
 
-    destroy(self, &error);
+    self->device.interrupted = NULL;
+    if (vkb_renderer_is_ours(self))
+        destroy(self, &error);
+    self->open = false;
+    // A device that hangs, or another process's, is left behind, and with it what the driver may
+    // still use: what is adrift, and this object, to which the messenger brings its messages.
+    if (self->device.handle)
+        return;
+    release_adrift(self);
     if (self->lock)
         PyThread_free_lock(self->lock);
     release(self);
@@ -106,6 +240,8 @@ bool vkb_require_open(const struct vkb_renderer *self, struct vkb_error *error)
 {
     if (!self->open)
         return vkb_fail(error, VKB_ERROR_VALUE, "the renderer is closed");
+    if (!require_ours(self, error))
+        return false;
     if (self->device.lost)
         return vkb_fail(error, VKB_ERROR_DEVICE_LOST, "the device was lost; close the renderer");
     return true;
@@ -115,14 +251,25 @@ static PyObject *close_renderer(PyObject *object, PyObject *unused)
 {
     struct vkb_renderer *self = (struct vkb_renderer *)object;
     struct vkb_error error = {0};
-    bool done;
+    bool done = true;
 
     (void)unused;
-    Py_BEGIN_ALLOW_THREADS
-    PyThread_acquire_lock(self->lock, WAIT_LOCK);
-    done = destroy(self, &error);
-    PyThread_release_lock(self->lock);
-    Py_END_ALLOW_THREADS
+    if (!vkb_renderer_is_ours(self)) {
+        // Forgotten here, and left as it is to the process that opened it.
+        self->open = false;
+        Py_RETURN_NONE;
+    }
+    if (!vkb_renderer_enter(self, &error))
+        return vkb_raise(state_of(object), &error);
+    // A wait that is interrupted leaves the renderer open; another failure changes nothing.
+    if (self->open && !self->device.hung)
+        done = vkb_frame_land(&self->device, &self->frame, &error)
+            || error.kind != VKB_ERROR_INTERRUPTED;
+    if (done)
+        done = destroy(self, &error);
+    vkb_renderer_leave(self);
+    if (!self->open && !self->device.handle)
+        release_adrift(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
 }
 
@@ -132,15 +279,14 @@ static PyObject *pipeline_cache(PyObject *object, PyObject *unused)
     struct vkb_error error = {0};
     void *data = NULL;
     size_t size = 0;
-    bool done;
 
     (void)unused;
-    Py_BEGIN_ALLOW_THREADS
-    PyThread_acquire_lock(self->lock, WAIT_LOCK);
-    done = vkb_require_open(self, &error)
+    if (!vkb_renderer_enter(self, &error))
+        return vkb_raise(state_of(object), &error);
+    const bool done =
+        vkb_require_open(self, &error)
         && vkb_pipelines_save(&self->device, &self->frame.pipelines, &data, &size, &error);
-    PyThread_release_lock(self->lock);
-    Py_END_ALLOW_THREADS
+    vkb_renderer_leave(self);
     PyObject *bytes = done ? PyBytes_FromStringAndSize(data, (Py_ssize_t)size)
                            : vkb_raise(state_of(object), &error);
     vkb_free(data);

@@ -130,37 +130,37 @@ static bool check_indices(const struct vkb_mesh_data *data, struct vkb_error *er
     return true;
 }
 
-bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
-                    const struct vkb_scene_data *data, struct vkb_scene *scene,
-                    struct vkb_error *error)
+bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *commands,
+                     const struct vkb_scene_data *data, struct vkb_scene *scene,
+                     struct vkb_error *error)
 {
-    struct vkb_staging staging = {0};
+    struct vkb_staging *staging = &scene->staging;
 
-    if (scene->serial == data->serial)
-        return true;
     if (!check_indices(&data->body, error) || !check_indices(&data->glow, error))
         return false;
     vkb_scene_destroy(device, scene);
     bool done = vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                                  scene_size(data), &staging.buffer, error)
+                                  scene_size(data), &staging->buffer, error)
              && vkb_commands_begin(device, commands, error)
-             && load_mesh(device, commands->buffer, &staging, &data->body, &scene->body, error)
-             && load_mesh(device, commands->buffer, &staging, &data->glow, &scene->glow, error)
-             && vkb_staging_load_picture(device, commands->buffer, &staging, "skybox", &data->sky,
+             && load_mesh(device, commands->buffer, staging, &data->body, &scene->body, error)
+             && load_mesh(device, commands->buffer, staging, &data->glow, &scene->glow, error)
+             && vkb_staging_load_picture(device, commands->buffer, staging, "skybox", &data->sky,
                                          &scene->sky, error)
-             && load_textures(device, commands->buffer, &staging, data, scene, error)
-             && vkb_buffer_flush(device, &staging.buffer, error);
-    if (done) {
-        vkb_barrier_record_upload(device, commands->buffer);
-        done = vkb_commands_submit(device, commands, error)
-            && vkb_commands_wait(device, commands, error);
-    }
-    vkb_buffer_destroy(device, &staging.buffer);
+             && load_textures(device, commands->buffer, staging, data, scene, error)
+             && vkb_buffer_flush(device, &staging->buffer, error);
     if (done)
-        scene->serial = data->serial;
+        vkb_barrier_record_upload(device, commands->buffer);
     else
         vkb_scene_destroy(device, scene);
     return done;
+}
+
+void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data *data,
+                   struct vkb_scene *scene)
+{
+    vkb_buffer_destroy(device, &scene->staging.buffer);
+    scene->staging.used = 0;
+    scene->serial = data->serial;
 }
 
 static void destroy_mesh(const struct vkb_device *device, struct vkb_mesh *mesh)
@@ -173,6 +173,7 @@ static void destroy_mesh(const struct vkb_device *device, struct vkb_mesh *mesh)
 
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
 {
+    vkb_buffer_destroy(device, &scene->staging.buffer);
     destroy_mesh(device, &scene->body);
     destroy_mesh(device, &scene->glow);
     vkb_image_destroy(device, &scene->sky);

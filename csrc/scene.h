@@ -56,7 +56,8 @@ struct vkb_mesh {
 };
 
 struct vkb_scene {
-    uint64_t serial;  // of the data that is on the device; 0: none
+    uint64_t serial;             // of the data that is on the device; 0: none
+    struct vkb_staging staging;  // while it comes there
     struct vkb_mesh body, glow;
     struct vkb_image sky;
     struct vkb_texture *textures;
@@ -70,11 +71,14 @@ struct vkb_camera {
     double near, far;
 };
 
-// Replaces what the scene holds, unless it holds that data already. On failure it holds nothing, or
-// what it held; an index without a vertex is one.
-bool vkb_scene_load(struct vkb_device *device, struct vkb_commands *commands,
-                    const struct vkb_scene_data *data, struct vkb_scene *scene,
-                    struct vkb_error *error);
+// Records what brings the data to the device, in place of what the scene holds and the device must
+// be done with. After it has run, vkb_scene_end says that it is there. On failure the scene holds
+// nothing, or what it held; an index without a vertex is one.
+bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *commands,
+                     const struct vkb_scene_data *data, struct vkb_scene *scene,
+                     struct vkb_error *error);
+void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data *data,
+                   struct vkb_scene *scene);
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene);
 
 // Projection, view and model of the frame at `time` turns, column by column.

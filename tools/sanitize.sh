@@ -10,9 +10,9 @@ cd "$(dirname "$0")/.."
 if [ $# = 0 ]; then
     set -- -k "not 333x and not 1920 and not count_of_a_point"
     for name in assets bench cli cli_apply cli_grid comparison display docs doctor explorer \
-        explorer_page explorer_server files frames gltf gltf_textures grid_cluster grid_order \
-        grid_reductions grid_store grid_views guide hdr_images images laws mutations pictures \
-        plugin reference report scene skybox; do
+        explorer_page explorer_server faults files forms frames fuzz gltf gltf_textures \
+        grid_cluster grid_order grid_reductions grid_store grid_views guide hdr_images images laws \
+        mutations pictures plugin reference report scene skybox; do
         set -- "$@" "--ignore=tests/test_$name.py"
     done
 fi

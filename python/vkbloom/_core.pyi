@@ -45,6 +45,7 @@ class Renderer:
         adapter: str,
         validation: bool,
         forms: str,
+        frame_seconds: float,
         read_cache: Callable[[bytes], bytes | None],
         /,
     ) -> Renderer: ...

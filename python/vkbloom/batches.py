@@ -167,5 +167,10 @@ def run(
     finally:
         # Whatever nobody takes is waited for here, not when the collector comes round.
         submitted.clear()
-    if points.failure is not None:
-        raise points.failure
+    failure, points.failure = points.failure, None
+    if failure is not None:
+        try:
+            raise failure
+        finally:
+            # Its traceback holds this frame, and so the batch, until the collector comes round.
+            del failure

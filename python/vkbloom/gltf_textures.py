@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
-from .image_reading import opened
+from .image_reading import check_plausible, opened
 from .srgb import decode_srgb
 from .textures import MAX_SIDE, AddressMode, Filter, Texture, mip_levels
 
@@ -166,6 +166,7 @@ class TextureReader:
                             f"{width} x {height} texels are too many: {MAX_SIDE} a side and "
                             f"{MAX_TEXELS} in all of a file are possible"
                         )
+                    check_plausible(spec, path)
                     kind = "uint16" if str(spec.format) == "uint16" else "uint8"
                     pixels = reader.read_image(0, 0, 0, channels, kind)
                     # A file that ends early gives what is there, and says so.

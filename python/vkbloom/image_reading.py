@@ -26,12 +26,16 @@ from vkbloom.srgb import decode_srgb
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["decode", "load", "opened"]
+__all__ = ["check_plausible", "decode", "load", "opened"]
 
 _LARGEST_SIDE: Final = 65536
 # What the largest texture of 16384 x 16384 holds; keeps a damaged header from being taken at
 # its word.
 _LARGEST_AREA: Final = 1 << 28
+# So many bytes of pixels need a file that could hold them. Deflate, which PNG, TIFF and OpenEXR
+# have, makes 1032 bytes of one at the most (RFC 1951: 258 of two bits).
+_LARGE: Final = 1 << 28
+_LARGEST_RATIO: Final = 4096
 
 
 @contextmanager
@@ -77,6 +81,16 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
         # An error that nobody asked for would be printed when the reader is gone.
         reader.geterror()
         reader.close()
+
+
+def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -> None:
+    """Raise ValueError where a file is far too short for the pixels that its header promises."""
+    size = spec.image_bytes()
+    if size > max(_LARGE, _LARGEST_RATIO * os.path.getsize(path)):
+        raise ValueError(
+            f"{os.fspath(path)}: damaged: {os.path.getsize(path)} bytes cannot hold "
+            f"{spec.width} x {spec.height} pixels"
+        )
 
 
 def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
@@ -128,6 +142,7 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
     height = max(spec.y + spec.height, display[1] + display[3]) - top
     if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
         raise ValueError(f"{name}: {width} x {height} pixels are too many")
+    check_plausible(spec, name)
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)

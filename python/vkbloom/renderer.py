@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from collections import abc
@@ -35,6 +36,18 @@ def _version() -> str:
     from vkbloom import __version__  # noqa: PLC0415  the package imports this module
 
     return __version__
+
+
+def _frame_seconds() -> float:
+    """Return how long the device may take for a frame before it counts as lost."""
+    text = os.environ.get("VKBLOOM_TIMEOUT") or "300"
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0:
+        raise ValueError(f"VKBLOOM_TIMEOUT: {text!r} is not a number of seconds above 0")
+    return seconds
 
 
 def _check_settings(settings: Settings | None) -> Settings:
@@ -132,11 +145,18 @@ class Renderer:
         No adapter fits; says what was found, what is missing and what to install.
     Error
         The device cannot be set up, or the validation layer is not installed.
+    ValueError
+        VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range.
 
     Notes
     -----
     A context manager; usable from any thread. Calls release the GIL while the device works, and
     wait for each other. Framebuffers own their memory and outlive the renderer.
+
+    Ctrl-C, or whatever else a signal's handler raises, ends a call that waits, and the renderer can
+    be used again; closing waits for what the device is still at work on. A device that takes longer
+    than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
+    number. After a fork the child opens a renderer of its own; its parent's raise ValueError.
     """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
@@ -145,7 +165,9 @@ class Renderer:
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
-        self._core = _core.Renderer(adapter, bool(validation), forms, pipeline_cache.read)
+        self._core = _core.Renderer(
+            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+        )
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._made_by = {
@@ -493,8 +515,10 @@ class Renderer:
         """Keep the driver's pipeline cache on disk when new pipelines came into it."""
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
-            self._saved_pipelines = count
-            pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
+            # Without the cache the next start is slower: no reason to lose a frame that is there.
+            with contextlib.suppress(_core.Error):
+                pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
+                self._saved_pipelines = count
 
 
 def _surveyed(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import ktx
-from .image_reading import opened
+from .image_reading import check_plausible, opened
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
@@ -423,6 +423,7 @@ def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
             raise ValueError(f"{name}: has {spec.nchannels} channels; flat RGB or RGBA is needed")
         if max(spec.width, spec.height) > 4 * MAX_SIDE:
             raise ValueError(f"{name}: {spec.width} x {spec.height} is too large for a sky")
+        check_plausible(spec, name)
         kind = str(spec.format) if str(spec.format) in ("uint8", "half") else "float"
         pixels = image.read_image(0, 0, 0, spec.nchannels, kind)
         # A file that ends early gives what is there, and says so.

@@ -1,0 +1,269 @@
+"""Make every call of workloads fail once, and print what came of each as one line of JSON.
+
+Runs over a core built with VKBLOOM_FAULTS: ``python fault_walk.py STRIDE [WORKLOAD ...]``. Point n
+is the n-th Vulkan call or allocation; the walk ends where the workload passes without reaching it.
+Of STRIDE points one is walked (1: all of them); without workloads, all of them are.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from screens import CAMERA, panel
+
+import vkbloom
+from vkbloom import Renderer, Scene, _core
+from vkbloom.textures import Texture
+
+OUT_OF_DEVICE_MEMORY = -2
+DEVICE_LOST = -4
+#: The calls that find out that a device is lost.
+CAN_LOSE = "vkQueueSubmit vkWaitForFences vkGetQueryPoolResults"
+SIZE = (24, 16)
+
+Arrays = Mapping[str, NDArray[Any]]
+Work = Callable[[Renderer], Arrays]
+core: Any = _core  # arm_fault and fault_state are in test builds only
+
+
+def textured() -> Scene:
+    """Return a scene with textures of two meshes, of which one emits."""
+    colours = np.random.default_rng(1).random((5, 7, 4)).astype(np.float16)
+    body = panel(SIZE, Texture((colours,)), Texture((colours[:3, :3],)), radiance=(1.0, 2.0, 1.0))
+    glow = panel(SIZE, Texture((colours[:, :2],)), across=(0.2, 0.5))
+    return Scene(body=body, glow=glow, camera=CAMERA)
+
+
+def picture(size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
+    values = np.random.default_rng(2).random((size[1], size[0], 4)) ** 8
+    return (values * 255).astype(dtype) if dtype == np.uint8 else values.astype(dtype)
+
+
+def method(settings: vkbloom.Settings) -> Work:
+    return lambda renderer: renderer.apply(picture(SIZE), settings)
+
+
+def batch(renderer: Renderer) -> Arrays:
+    settings = [vkbloom.Separable(exposure=step / 4, loops=1 + step // 5) for step in range(8)]
+    frames = renderer.apply_many(picture(SIZE), settings)
+    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+
+
+def grid(renderer: Renderer) -> Arrays:
+    settings = [vkbloom.Pyramid(levels=2, radius=step / 2) for step in range(5)]
+    frames = renderer.render_many(UFO, settings, SIZE, attachments=("final", "bloom"))
+    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+
+
+def readback(renderer: Renderer) -> Arrays:
+    """Large enough for the device to write into the arrays themselves."""
+    out = {"final": np.zeros((512, 512, 4), np.uint8)}
+    return renderer.apply(picture((512, 512), np.uint8), attachments="final", out=out)
+
+
+UFO = Scene.ufo()
+WORK: dict[str, Work] = {
+    "render forward": lambda renderer: renderer.render(UFO, size=SIZE),
+    "render deferred": lambda renderer: renderer.render(textured(), size=SIZE, shading="deferred"),
+    "batch": batch,
+    "grid": grid,
+    "readback": readback,
+    **{
+        f"apply {preset} {form}": method(settings)
+        for preset, settings in vkbloom.presets.items()
+        for form in ("fragment", "cpu", "gpu")
+    },
+}
+
+
+def state() -> dict[str, int]:
+    """Return what must be as before when all renderers are closed."""
+    _, _, blocks, messages = core.fault_state()
+    count = {"blocks": blocks, "messages": messages}
+    if Path("/proc/self/fd").is_dir():
+        count["descriptors"] = len(os.listdir("/proc/self/fd"))
+    return count
+
+
+def open_renderer() -> Renderer:
+    return Renderer("software", validation=True)
+
+
+def check_error(error: BaseException, failed: str, result: int) -> None:
+    """The exception says what failed, and is of the class that fits."""
+    if failed == "vkb_alloc":
+        assert isinstance(error, MemoryError), error
+        return
+    assert isinstance(error, vkbloom.Error), error
+    if failed == "vkEnumerateInstanceLayerProperties":
+        assert "validation was asked for" in str(error), error
+        return
+    if failed == "volkInitialize":
+        assert isinstance(error, vkbloom.AdapterNotFoundError), error
+        return
+    expected = vkbloom.OutOfMemoryError if result != DEVICE_LOST else vkbloom.DeviceLostError
+    assert type(error) is expected, error
+    assert (error.vk_call, error.vk_result) == (failed, result)
+    assert failed in str(error)
+
+
+def same(arrays: Arrays, right: Arrays) -> None:
+    assert list(arrays) == list(right)
+    for name, array in right.items():
+        np.testing.assert_array_equal(arrays[name], array, err_msg=name)
+
+
+class Walk:
+    """One workload, point after point.
+
+    Attributes
+    ----------
+    walked, raised, survived : int
+        Points; those that raised; those that the workload did without.
+    calls : dict
+        How often each call was the one to fail.
+    """
+
+    def __init__(self, name: str, work: Work | None) -> None:
+        self.name, self.work = name, work
+        self.walked = self.raised = self.survived = self.points = 0
+        self.calls: dict[str, int] = {}
+
+    def _fail(self, error: BaseException | None, failed: str, result: int) -> None:
+        self.walked += 1
+        self.calls[failed] = self.calls.get(failed, 0) + 1
+        self.raised += error is not None
+        self.survived += error is None
+        if error is not None:
+            check_error(error, failed, result)
+
+    def renderer_at(self, n: int, result: int) -> bool:
+        """Opening a renderer with a fault at its n-th point; False: there are fewer."""
+        error: BaseException | None = None
+        core.arm_fault(n, result, "")
+        try:
+            renderer = open_renderer()
+        except Exception as raised:
+            # Without its frames, which hold the batch and this variable.
+            error = raised.with_traceback(None)
+        passed, failed, *_ = core.fault_state()
+        core.arm_fault(0, 0, "")
+        if failed:
+            self._fail(error, failed, result)
+        elif error:
+            raise error
+        if error is None:
+            renderer.close()
+        with open_renderer() as again:
+            assert not again.closed
+        self.points = max(self.points, passed)
+        return bool(failed)
+
+    def close_at(self, n: int, result: int, names: str) -> bool:
+        """Closing a renderer while the device is at work for it."""
+        error: BaseException | None = None
+        renderer = open_renderer()
+        frames = renderer.apply_many(picture((64, 64)), [vkbloom.Separable()] * 9)
+        next(frames)
+        next(frames)
+        core.arm_fault(n, result, names)
+        try:
+            renderer.close()
+        except Exception as raised:
+            error = raised.with_traceback(None)
+        passed, failed, *_ = core.fault_state()
+        core.arm_fault(0, 0, "")
+        if failed:
+            self._fail(error, failed, result)
+        assert renderer.closed
+        self.points = max(self.points, passed)
+        return bool(failed)
+
+    def work_at(self, n: int, right: Arrays, result: int, names: str) -> bool:
+        """A workload in a new renderer; afterwards the same without a fault, if that can be."""
+        assert self.work is not None
+        error: BaseException | None = None
+        renderer = open_renderer()
+        core.arm_fault(n, result, names)
+        try:
+            arrays = self.work(renderer)
+        except Exception as raised:
+            error = raised.with_traceback(None)
+        passed, failed, *_ = core.fault_state()
+        core.arm_fault(0, 0, "")
+        if failed:
+            self._fail(error, failed, result)
+        elif error:
+            raise error
+        if error is None:
+            same(arrays, right)
+        if isinstance(error, vkbloom.DeviceLostError):
+            for _ in range(2):
+                try:
+                    self.work(renderer)
+                except vkbloom.DeviceLostError:
+                    pass
+                else:
+                    raise AssertionError("a lost device worked")
+        else:
+            same(self.work(renderer), right)
+        renderer.close()
+        self.points = max(self.points, passed)
+        return bool(failed)
+
+
+def walk(point: Callable[[int], bool], first: int, stride: int, before: dict[str, int]) -> None:
+    n = first
+    while True:
+        try:
+            there = point(n)
+            assert state() == before, (state(), before)
+        except BaseException as error:
+            error.add_note(f"at point {n}: {core.fault_state()}")
+            raise
+        if not there:
+            return
+        n += stride
+
+
+def walk_one(name: str, stride: int) -> None:
+    os.environ["VKBLOOM_FORM"] = name.rsplit(" ", 1)[1] if name.startswith("apply ") else "auto"
+    one = Walk(name, WORK.get(name))
+    before = state()
+    # Strides start elsewhere for each workload, so that they do not leave out the same calls.
+    start = 1 + zlib.crc32(name.encode()) % stride
+    if name == "create":
+        walk(lambda n: one.renderer_at(n, OUT_OF_DEVICE_MEMORY), start, stride, before)
+    elif name == "close":
+        walk(lambda n: one.close_at(n, OUT_OF_DEVICE_MEMORY, ""), 1, 1, before)
+        walk(lambda n: one.close_at(n, DEVICE_LOST, CAN_LOSE), 1, 1, before)
+    else:
+        assert one.work is not None
+        with open_renderer() as renderer:
+            right = {key: array.copy() for key, array in one.work(renderer).items()}
+        assert state() == before
+        walk(lambda n: one.work_at(n, right, OUT_OF_DEVICE_MEMORY, ""), start, stride, before)
+        walk(lambda n: one.work_at(n, right, DEVICE_LOST, CAN_LOSE), 1 + start % 4, stride, before)
+    columns = ("points", "walked", "raised", "survived", "calls")
+    figures = {column: getattr(one, column) for column in columns}
+    print(json.dumps({"workload": name, **figures}), flush=True)
+
+
+def main(stride: int, names: list[str]) -> None:
+    # What is made once in a process is there before anything is counted.
+    with open_renderer() as renderer:
+        WORK["render forward"](renderer)
+    for name in names or ["create", "close", *WORK]:
+        walk_one(name, stride)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2:])

@@ -1,0 +1,269 @@
+"""Signals, limits of time and forks: whoever waits is answered, and the renderer goes on."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vkbloom import DeviceLostError, Renderer, Scene, Separable, gaussian_weights
+
+LEAVES_BEHIND = pytest.mark.skipif(
+    "VKBLOOM_SANITIZED" in os.environ, reason="leaves a device behind on purpose: a leak to LSan"
+)
+UNIX = pytest.mark.skipif(os.name == "nt", reason="signals and forks of Unix")
+
+# 65 x 65 taps a pixel, filtered by hand: a second on a few cores, so that there is a wait to leave.
+LONG = Separable(
+    weights=gaussian_weights(10.0, 32), blur_scale=0.5, direct=True, format="rgba32float"
+)
+SHORT = Separable(blur_strength=0.5)
+RIGHT_SIZE = (24, 16)
+
+
+class Alarm(Exception):
+    """What the signal's handler raises."""
+
+
+@pytest.fixture
+def alarm() -> Iterator[Callable[[float], None]]:
+    """A signal in so many seconds, whose handler raises Alarm in the main thread."""
+
+    def handler(number: int, frame: object) -> None:
+        raise Alarm
+
+    before = signal.signal(signal.SIGALRM, handler)
+    yield lambda seconds: signal.setitimer(signal.ITIMER_REAL, seconds) and None
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def noise(side: int) -> NDArray[np.float32]:
+    return np.random.default_rng(side).random((side, side, 4), dtype=np.float32)
+
+
+def long_work(renderer: Renderer, side: int = 256) -> None:
+    renderer.apply(noise(side), LONG)
+
+
+def check(renderer: Renderer, scene: Scene) -> None:
+    """The renderer gives the exact pictures of a new one."""
+    with Renderer("software") as new:
+        for settings in (SHORT, Separable(bloom_size=(7, 5))):
+            expected = new.render(scene, settings, RIGHT_SIZE)
+            frames = renderer.render(scene, settings, RIGHT_SIZE)
+            for name, array in expected.items():
+                np.testing.assert_array_equal(frames[name], array)
+        np.testing.assert_array_equal(
+            renderer.apply(noise(9), SHORT)["final"], new.apply(noise(9), SHORT)["final"]
+        )
+
+
+# Signals
+
+
+@UNIX
+def test_a_long_frame_is_interrupted(
+    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+) -> None:
+    renderer = new_renderer()
+    renderer.apply(noise(8), LONG)
+    for _ in range(2):
+        alarm(0.1)
+        with pytest.raises(Alarm):
+            long_work(renderer)
+    check(renderer, scene)
+
+
+@UNIX
+def test_an_interrupted_frame_keeps_its_arrays(
+    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None]
+) -> None:
+    # Large enough for the device to write into the array itself, after nobody else has it.
+    renderer = new_renderer()
+    image = noise(256)  # 1 MiB
+    expected = renderer.apply(image, LONG, attachments="final")["final"]
+    renderer.apply(image[:8, :8], LONG)
+    alarm(0.1)
+    with pytest.raises(Alarm):
+        renderer.apply(image, LONG, attachments="final", out={"final": np.zeros_like(image)})
+    gc.collect()
+    others = [np.zeros_like(image) for _ in range(4)]
+    again = renderer.apply(image, LONG, attachments="final")["final"]
+    np.testing.assert_array_equal(again, expected)
+    assert not any(other.any() for other in others)
+
+
+@UNIX
+def test_a_sequence_is_interrupted(
+    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+) -> None:
+    renderer = new_renderer()
+    settings = [LONG.replace(exposure=step / 8, blur_strength=1 + step / 8) for step in range(3)]
+    alarm(0.3)
+    with pytest.raises(Alarm):
+        for _ in renderer.apply_many(noise(200), settings):
+            pass
+    check(renderer, scene)
+
+
+@UNIX
+def test_an_interrupted_close_leaves_the_renderer_open(
+    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+) -> None:
+    renderer = new_renderer()
+    alarm(0.1)
+    with pytest.raises(Alarm):
+        long_work(renderer)
+    alarm(0.1)
+    with pytest.raises(Alarm):
+        renderer.close()
+    assert not renderer.closed
+    check(renderer, scene)
+    renderer.close()
+    assert renderer.closed
+
+
+@UNIX
+def test_waiting_for_another_thread_is_interrupted(
+    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+) -> None:
+    renderer = new_renderer()
+    thread = threading.Thread(target=long_work, args=(renderer,))
+    thread.start()
+    time.sleep(0.05)
+    alarm(0.1)
+    with pytest.raises(Alarm):
+        list(map(renderer.apply, [noise(8)] * 1000))
+    thread.join()
+    check(renderer, scene)
+
+
+@UNIX
+def test_a_handler_that_uses_the_renderer_gets_an_error(
+    new_renderer: Callable[[], Renderer], scene: Scene
+) -> None:
+    renderer = new_renderer()
+    caught: list[str] = []
+
+    def handler(number: int, frame: object) -> None:
+        # Between two waits it may be used; a later signal comes in one.
+        try:
+            renderer.render(scene, SHORT, RIGHT_SIZE)
+        except Exception as error:
+            caught.append(str(error))
+            signal.setitimer(signal.ITIMER_REAL, 0)
+
+    before = signal.signal(signal.SIGALRM, handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
+    while not caught:
+        long_work(renderer)
+    signal.signal(signal.SIGALRM, before)
+    assert len(caught) == 1
+    assert "at work in this thread" in caught[0]
+    check(renderer, scene)
+
+
+# Limits of time
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "soon", "nan"])
+def test_limits_that_are_none(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv("VKBLOOM_TIMEOUT", text)
+    with pytest.raises(ValueError, match=f"VKBLOOM_TIMEOUT: '{text}' is not"):
+        Renderer("software")
+
+
+@LEAVES_BEHIND
+def test_a_device_that_takes_too_long(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
+    monkeypatch.setenv("VKBLOOM_TIMEOUT", "0.1")
+    renderer = Renderer("software", validation=True)
+    with pytest.raises(
+        DeviceLostError, match=r"not finished within 0.1 s.*VKBLOOM_TIMEOUT"
+    ) as hung:
+        long_work(renderer)
+    assert hung.value.vk_call == "vkWaitForFences"
+    assert hung.value.vk_result == 2  # VK_TIMEOUT
+    with pytest.raises(DeviceLostError):
+        renderer.render(scene, SHORT, RIGHT_SIZE)
+    # What the device is at work on cannot be destroyed, and nobody waits for it.
+    with pytest.raises(DeviceLostError, match="still at work"):
+        renderer.close()
+    assert renderer.closed
+    renderer.close()
+
+
+# Forks
+
+CHILD = """
+import os, sys, gc
+import numpy as np
+import vkbloom
+
+image = np.random.default_rng(3).random((16, 24, 3), dtype=np.float32)
+renderer = vkbloom.Renderer("software", validation=True)
+right = renderer.apply(image)["final"]
+batches = renderer.apply_many(image, [vkbloom.Separable()] * 9)
+next(batches); next(batches)
+child = os.fork()
+if child == 0:
+    try:
+        for use in (
+            lambda: renderer.apply(image),
+            lambda: renderer.render(vkbloom.Scene.ufo(), size=(8, 8)),
+            lambda: renderer._core.pipeline_cache(),
+            lambda: list(batches),
+        ):
+            try:
+                use()
+            except ValueError as error:
+                assert "opened in another process" in str(error), error
+            else:
+                raise AssertionError("the child used its parent's device")
+        assert not renderer.closed
+        with vkbloom.Renderer("software", validation=True) as own:
+            np.testing.assert_array_equal(own.apply(image)["final"], right)
+        if sys.argv[1] == "close":
+            renderer.close()
+            assert renderer.closed
+        elif sys.argv[1] == "collect":
+            del renderer, batches, use
+            gc.collect()
+        print("child done", flush=True)
+    except BaseException:
+        import traceback
+        traceback.print_exc()
+        os._exit(1)
+    if sys.argv[1] == "leave":
+        os._exit(0)
+    sys.exit(0)
+_, status = os.waitpid(child, 0)
+assert status == 0, status
+np.testing.assert_array_equal(list(batches)[-1]["final"], right)
+np.testing.assert_array_equal(renderer.apply(image)["final"], right)
+renderer.close()
+print("parent done")
+"""
+
+
+@UNIX
+@LEAVES_BEHIND
+@pytest.mark.parametrize("how", ["close", "collect", "exit", "leave"])
+def test_a_forked_process(how: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, how], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout.split("\n")) == (
+        0,
+        ["child done", "parent done", ""],
+    ), done.stdout + done.stderr

@@ -1,0 +1,89 @@
+"""Eight threads and one renderer: rendering, reading, closing, in random order, exact pictures."""
+
+from __future__ import annotations
+
+import random
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings
+
+THREADS = 8
+ROUNDS = 3
+CALLS = 12  # of each thread in each round
+SIZES = ((24, 16), (17, 31))
+SETTINGS: tuple[Settings, ...] = (
+    Separable(),
+    Separable(blur_strength=0.4, bloom_size=(9, 5)),
+    Pyramid(levels=3, exposure=0.5),
+    DualKawase(levels=2),
+)
+
+
+def image(size: tuple[int, int]) -> NDArray[np.float32]:
+    return np.random.default_rng(size).random((size[1], size[0], 4), dtype=np.float32)
+
+
+def one(renderer: Renderer, scene: Scene, kind: str, which: int, size: tuple[int, int]) -> Any:
+    """Return what a call of that kind gives: arrays in the order of the call."""
+    settings = SETTINGS[which]
+    if kind == "render":
+        return list(renderer.render(scene, settings, size).values())
+    if kind == "apply":
+        return list(renderer.apply(image(size), settings).values())
+    if kind == "out":
+        out = np.zeros((size[1], size[0], 4), np.float32)
+        renderer.apply(image(size), settings, attachments="final", out={"final": out})
+        return [out]
+    if kind == "left":
+        # A sequence that is left half taken: its flights are still in the air.
+        return [next(iter(renderer.apply_many(image(size), [settings] * 5)))["final"]]
+    return [
+        frames["final"]
+        for frames in renderer.apply_many(image(size), [settings, *SETTINGS], attachments="final")
+    ]
+
+
+KINDS = ("render", "apply", "out", "left", "many")
+
+
+@pytest.mark.parametrize("seed", range(ROUNDS))
+def test_eight_threads_in_random_order(scene: Scene, seed: int) -> None:
+    with Renderer("software") as single:
+        right = {
+            (kind, which, size): one(single, scene, kind, which, size)
+            for kind in KINDS
+            for which in range(len(SETTINGS))
+            for size in SIZES
+        }
+    renderer = Renderer("software", validation=True)
+    start = threading.Barrier(THREADS)
+
+    def work(thread: int) -> int:
+        dice = random.Random(seed * THREADS + thread)
+        start.wait()
+        for done in range(CALLS):
+            key = (dice.choice(KINDS), dice.randrange(len(SETTINGS)), dice.choice(SIZES))
+            # In one round one thread closes what the others are using.
+            if seed == ROUNDS - 1 and thread == 0 and done == CALLS // 2:
+                renderer.close()
+            try:
+                arrays = one(renderer, scene, *key)
+            except ValueError:
+                if not renderer.closed:
+                    raise
+                return done
+            for array, expected in zip(arrays, right[key], strict=True):
+                np.testing.assert_array_equal(array, expected)
+        return CALLS
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        calls = list(pool.map(work, range(THREADS)))
+    renderer.close()
+    if seed < ROUNDS - 1:
+        assert calls == [CALLS] * THREADS

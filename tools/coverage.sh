@@ -1,0 +1,36 @@
+#!/bin/sh
+# Line and branch coverage of csrc by the tests that touch the core and by the walk over its faults.
+# PYTHON: an interpreter with the test requirements installed. STRIDE: of so many fault points one
+# (8). Arguments go to pytest. Prints a table of the files; build/coverage/uncovered.txt has the
+# lines that nothing reached.
+set -eu
+
+cd "$(dirname "$0")/.."
+PYTHON=${PYTHON:-python3}
+if [ $# = 0 ]; then
+    for name in apply apply_input batches deferred deferred_passes errors forms graph interruption \
+        lifetime out_of_date pipeline_cache presets readback render scene separable settings \
+        skybox textures; do
+        set -- "$@" "tests/test_$name.py"
+    done
+fi
+folder=$PWD/build/coverage
+rm -rf "$folder"
+mkdir -p "$folder/tree"
+cp -r csrc shaders python setup.py pyproject.toml README.md tests tools "$folder/tree/"
+rm -f "$folder"/tree/python/vkbloom/_core*.so
+test -d ../shared && ln -sfn "$(cd .. && pwd)/shared" "$folder/shared"
+cd "$folder/tree"
+CFLAGS=-O0 VKBLOOM_CFLAGS="-DVKBLOOM_FAULTS --coverage" VKBLOOM_LDFLAGS="--coverage" \
+    "$PYTHON" setup.py --quiet build_ext --inplace
+
+export PYTHONPATH="$PWD/python"
+set +e
+VKBLOOM_CACHE_DIR="" "$PYTHON" tests/fault_walk.py "${STRIDE:-8}" >"$folder/walk.txt"
+walked=$?
+"$PYTHON" -m pytest -q -p no:cacheprovider -m "not slow" \
+    --deselect tests/test_faults.py::test_what_is_shipped_cannot_be_told_to_fail "$@"
+tested=$?
+set -e
+"$PYTHON" tools/coverage_report.py . "$folder/uncovered.txt"
+exit $((walked + tested))

@@ -1,0 +1,56 @@
+"""Changed copies of whole files, the same for the same seed; for where atheris is missing."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+
+#: What lengths, counts and offsets go wrong with.
+NUMBERS = (0, 1, 3, 127, 255, 256, 32767, 65535, 2**24, 2**31 - 1, 2**31, 2**32 - 1)
+WORDS = (b"-1", b"1e400", b"null", b"[]", b"{}", b'"../x"', b"true", b"99999999999", b"NaN", b"")
+
+
+def mutated(data: bytes, dice: random.Random) -> bytes:
+    """Return the bytes with a few changes."""
+    changed = bytearray(data)
+    for _ in range(dice.choice((1, 1, 2, 4))):
+        place = dice.randrange(len(changed) + 1)
+        match dice.randrange(7):
+            case 0 if place < len(changed):
+                changed[place] ^= 1 << dice.randrange(8)
+            case 1:
+                width = dice.choice((1, 2, 4))
+                number = dice.choice(NUMBERS) % 256**width
+                changed[place : place + width] = number.to_bytes(
+                    width, dice.choice(("little", "big"))
+                )
+            case 2:
+                del changed[place:]
+            case 3:
+                del changed[place : place + dice.randrange(1, 9)]
+            case 4:
+                changed[place:place] = bytes(
+                    dice.randrange(256) for _ in range(dice.randrange(1, 9))
+                )
+            case 5:
+                # A number or word of a text.
+                end = place
+                while end < len(changed) and chr(changed[end]).isalnum():
+                    end += 1
+                changed[place:end] = dice.choice(WORDS)
+            case _:
+                start = dice.randrange(len(changed) + 1)
+                changed[place:place] = changed[start : start + dice.randrange(1, 33)]
+    return bytes(changed)
+
+
+def inputs(seeds: list[bytes], number: int) -> Iterator[bytes]:
+    """Yield the seeds, then changed copies of them and of those copies, without an end."""
+    dice = random.Random(number)
+    pool = list(seeds)
+    yield from seeds
+    while True:
+        data = mutated(dice.choice(pool), dice)
+        if len(data) < 1 << 16 and dice.random() < 0.05:
+            pool[len(seeds) :] = [*pool[len(seeds) :], data][-64:]
+        yield data

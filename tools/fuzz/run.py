@@ -1,0 +1,83 @@
+"""Fuzz a reader: ``python tools/fuzz/run.py TARGET [--seconds N] [--memory MIB] [--seed N]``.
+
+With atheris the inputs are guided by the coverage of the package's Python code; without it (or with
+--plain) they are mutations of whole files. What a reader does not promise to raise ends the run, as
+does an input for which the process would need more than MIB over what it had at the start; the
+input lies in the folder then, as ``finding-TARGET``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import time
+from pathlib import Path
+
+
+def limit_memory(more: int) -> None:
+    """Let the address space grow by so many bytes at most."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    limit = pages * resource.getpagesize() + more
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+
+
+def main() -> int:
+    """Run one target; 1 where something was found."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("target")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--memory", type=int, default=1024)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--plain", action="store_true")
+    options = parser.parse_args()
+    if not options.plain:
+        try:
+            import atheris
+        except ImportError:
+            options.plain = True
+    if not options.plain:
+        with atheris.instrument_imports(include=["vkbloom"]):
+            import targets
+    else:
+        import targets
+    import mutate
+
+    target = targets.TARGETS[options.target]
+    seeds = target.seeds()
+    # Readers load libraries with the first file.
+    for seed in seeds:
+        target.run(seed)
+    limit_memory(options.memory << 20)
+    end = time.monotonic() + options.seconds
+    count = 0
+
+    def one(data: bytes) -> None:
+        nonlocal count
+        count += 1
+        try:
+            targets.run(target, data)
+        except BaseException:
+            Path(f"finding-{options.target}").write_bytes(data)
+            raise
+
+    if options.plain:
+        for data in mutate.inputs(seeds, options.seed):
+            one(data)
+            if time.monotonic() > end:
+                break
+        print(f"{options.target}: {count} executions in {options.seconds:.0f} s, nothing found")
+        return 0
+    corpus = targets.FOLDER / "corpus"
+    corpus.mkdir()
+    for number, seed in enumerate(seeds):
+        (corpus / str(number)).write_bytes(seed)
+    arguments = [f"-max_total_time={options.seconds:.0f}", f"-seed={options.seed}"]
+    arguments += ["-rss_limit_mb=0", "-max_len=65536", str(corpus)]
+    atheris.Setup([sys.argv[0], *arguments], one)
+    atheris.Fuzz()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,184 @@
+"""What the package reads from outside, as functions of bytes; each may raise what it promises.
+
+A target writes the bytes where its reader looks for them and calls it. OSError and ValueError are
+what the contract has for files that do not load; anything else is a finding.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import struct
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import OpenImageIO
+
+from vkbloom import ktx, pipeline_cache, skybox
+from vkbloom.gltf import load_mesh
+
+FOLDER = Path(tempfile.mkdtemp(prefix="vkbloom-fuzz-"))
+PROMISED = (OSError, ValueError)
+DRIVER = bytes(range(16))
+
+
+class Target(NamedTuple):
+    """A reader: what is done with bytes, and whole files to start from."""
+
+    run: Callable[[bytes], None]
+    seeds: Callable[[], list[bytes]]
+
+
+def _file(name: str, data: bytes) -> Path:
+    path = FOLDER / name
+    path.write_bytes(data)
+    return path
+
+
+def _gltf(data: bytes) -> None:
+    load_mesh(_file("input.glb" if data[:4] == b"glTF" else "input.gltf", data))
+
+
+def _gltf_seeds() -> list[bytes]:
+    image = _image(".png", np.full((2, 3, 3), 200, np.uint8))
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+    blob = points.tobytes() + points[:, :2].tobytes() + np.arange(3, dtype="<u2").tobytes()
+    views = [(0, 36), (36, 24), (60, 6)]
+    kinds = [(5126, "VEC3"), (5126, "VEC2"), (5123, "SCALAR")]
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "rotation": [0, 0, 0, 1], "children": [1]}, {"scale": [1, 2, 1]}],
+        "meshes": [
+            {
+                "primitives": [
+                    {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}
+                ]
+            }
+        ],
+        "materials": [
+            {
+                "emissiveFactor": [1, 0.5, 0],
+                "emissiveTexture": {"index": 0},
+                "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
+                "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 2}},
+            }
+        ],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"wrapS": 33071, "minFilter": 9987}],
+        "images": [{"uri": "data:image/png;base64," + base64.b64encode(image).decode()}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": start, "byteLength": size} for start, size in views
+        ],
+        "accessors": [
+            {"bufferView": index, "componentType": component, "type": shape, "count": 3}
+            for index, (component, shape) in enumerate(kinds)
+        ],
+        "buffers": [{"byteLength": len(blob)}],
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    padded = blob + bytes(-len(blob) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(padded), b"BIN\0") + padded
+    glb = struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+    uri = "data:application/octet-stream;base64," + base64.b64encode(blob).decode()
+    document["buffers"] = [{"byteLength": len(blob), "uri": uri}]
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": 2, "componentType": 5123},
+        "values": {"bufferView": 0},
+    }
+    plain = json.dumps(document).encode()
+    document["accessors"][0]["sparse"] = sparse  # type: ignore[index]
+    return [glb, plain, json.dumps(document).encode()]
+
+
+def _ktx(data: bytes) -> None:
+    ktx.read(_file("input.ktx", data))
+
+
+def _ktx_seeds() -> list[bytes]:
+    seeds = []
+    for order in "<>":
+        for internal, layout, kind, size in (
+            (0x8058, 0x1908, 0x1401, 4),
+            (0x881B, 0x1907, 0x140B, 6),
+            (0x8814, 0x1908, 0x1406, 16),
+        ):
+            header = (0x04030201, kind, 1, layout, internal, layout, 2, 2, 0, 0, 6, 2, 8)
+            data = ktx.IDENTIFIER + struct.pack(f"{order}13I", *header) + b"keyvalue"
+            for side in (2, 1):
+                face = ((side * size + 3) & ~3) * side
+                data += struct.pack(f"{order}I", face) + bytes(6 * face)
+            seeds.append(data)
+    return seeds
+
+
+def _image(suffix: str, pixels: np.ndarray[tuple[int, ...], np.dtype[np.generic]]) -> bytes:
+    path = FOLDER / f"seed{suffix}"
+    height, width, channels = pixels.shape
+    output = OpenImageIO.ImageOutput.create(str(path))
+    kind = {"float16": "half", "float32": "float"}.get(pixels.dtype.name, pixels.dtype.name)
+    assert output.open(str(path), OpenImageIO.ImageSpec(width, height, channels, kind))
+    assert output.write_image(pixels)
+    output.close()
+    return path.read_bytes()
+
+
+def _suffix(data: bytes) -> str:
+    kinds = {b"\x89PNG": ".png", b"\xff\xd8": ".jpg", b"v/1\x01": ".exr", b"#?": ".hdr"}
+    return next((suffix for start, suffix in kinds.items() if data.startswith(start)), ".tif")
+
+
+def _faces(data: bytes) -> None:
+    path = _file(f"face{_suffix(data)}", data)
+    skybox.from_faces([path] * 6)
+
+
+def _equirectangular(data: bytes) -> None:
+    skybox.from_equirectangular(_file(f"panorama{_suffix(data)}", data))
+
+
+def _image_seeds(shape: tuple[int, int, int]) -> list[bytes]:
+    values = np.random.default_rng(5).random(shape)
+    return [
+        _image(".png", (values * 255).astype(np.uint8)),
+        _image(".exr", values.astype(np.float16)),
+        _image(".tif", values.astype(np.float32)),
+    ]
+
+
+def _pipelines(data: bytes) -> None:
+    path = FOLDER / "cache" / f"pipelines-{DRIVER.hex()}.bin"
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(data)
+    found = pipeline_cache._unwrap(path.read_bytes(), DRIVER)
+    # Only what was written as a whole is taken for what the driver wrote.
+    header = pipeline_cache.MAGIC + pipeline_cache._digest(DRIVER, found or b"")
+    assert found is None or data == header + found
+
+
+def _pipeline_seeds() -> list[bytes]:
+    kept = struct.pack("<IIII", 32, 1, 0x10005, 0) + bytes(16) + b"pipelines"
+    return [pipeline_cache.MAGIC + pipeline_cache._digest(DRIVER, kept) + kept]
+
+
+TARGETS = {
+    "gltf": Target(_gltf, _gltf_seeds),
+    "ktx": Target(_ktx, _ktx_seeds),
+    "faces": Target(_faces, lambda: _image_seeds((4, 4, 3))),
+    "equirectangular": Target(_equirectangular, lambda: _image_seeds((4, 8, 3))),
+    "pipelines": Target(_pipelines, _pipeline_seeds),
+}
+
+
+def run(target: Target, data: bytes) -> None:
+    """Give the bytes to the reader; what it does not promise to raise comes out."""
+    with contextlib.suppress(PROMISED):
+        target.run(data)

@@ -1,0 +1,106 @@
+"""Render many frames of changing size and settings, and see whether anything grows.
+
+``python tools/soak.py [FRAMES]`` (20,000): after every tenth of them memory, file descriptors and
+threads of the process; 1 where the second half has grown by more than a page a hundred frames, or
+has other descriptors or threads. Linux with glibc 2.33 or newer.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import random
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import vkbloom
+
+STEPS = 10
+
+
+class _HeapInfo(ctypes.Structure):
+    """struct mallinfo2 of <malloc.h>."""
+
+    _fields_ = [
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena", "ordblks", "smblks", "hblks", "hblkhd",
+            "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost",
+        )
+    ]  # fmt: skip
+
+
+def counts() -> dict[str, int]:
+    """Return what must not grow."""
+    gc.collect()
+    libc = ctypes.CDLL(None)
+    libc.malloc_trim(0)
+    libc.mallinfo2.restype = _HeapInfo
+    heap = libc.mallinfo2()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return {
+        "kilobytes of heap in use": (heap.uordblks + heap.hblkhd) // 1024,
+        "kilobytes resident": pages * os.sysconf("SC_PAGESIZE") // 1024,
+        "descriptors": len(os.listdir("/proc/self/fd")),
+        "threads": len(os.listdir("/proc/self/task")),
+    }
+
+
+def frame(renderer: vkbloom.Renderer, scene: vkbloom.Scene, dice: random.Random) -> None:
+    """Render one frame whose size, source and settings are by chance."""
+    # Some presets have levels of a fixed height, whose width follows the frame's shape.
+    size = (dice.randrange(4, 65), dice.randrange(4, 65))
+    settings = dice.choice(
+        [
+            vkbloom.Separable(blur_strength=dice.random(), loops=dice.randrange(1, 4)),
+            vkbloom.Separable(bloom_size=(dice.randrange(1, 40), dice.randrange(1, 40))),
+            vkbloom.Pyramid(levels=dice.randrange(1, 7), exposure=dice.random()),
+            vkbloom.DualKawase(levels=dice.randrange(1, 5)),
+            *vkbloom.presets.values(),
+        ]
+    )
+    if dice.random() < 0.3:
+        shading = dice.choice(("forward", "deferred"))
+        renderer.render(scene, settings, size, shading=shading, time=dice.random())
+        return
+    dtype = dice.choice((np.uint8, np.float16, np.float32))
+    pixels = np.full((size[1], size[0], dice.choice((3, 4))), dice.randrange(1, 200), dtype)
+    if dice.random() < 0.1:
+        # Left half taken.
+        next(iter(renderer.apply_many(pixels, [settings] * 4)))
+    else:
+        renderer.apply(pixels, settings, attachments=dice.choice(("all", "final")))
+
+
+def main(total: int) -> int:
+    """Print a row for each tenth; 1 where something grows."""
+    dice = random.Random(9)
+    scene = vkbloom.Scene.ufo()
+    rows: list[dict[str, int]] = []
+    begin = time.perf_counter()
+    with vkbloom.Renderer("software") as renderer:
+        for step in range(STEPS):
+            for _ in range(total // STEPS):
+                frame(renderer, scene, dice)
+            # The same last frames, so that the same is held at each count.
+            for _ in range(4):
+                renderer.render(scene, None, (16, 16))
+            renderer.apply(np.zeros((8, 8, 3), np.float32))
+            rows.append(counts())
+            shown = ", ".join(f"{value} {name}" for name, value in rows[-1].items())
+            print(f"{(step + 1) * (total // STEPS):>8} frames: {shown}", flush=True)
+    print(f"{time.perf_counter() - begin:.0f} s")
+    middle, last = rows[STEPS // 2 - 1], rows[-1]
+    name = "kilobytes of heap in use"
+    grown = (last[name] - middle[name]) * 1024 / (total / 2)
+    print(f"{grown:.1f} bytes of heap a frame in the second half")
+    same = all(last[name] == middle[name] for name in ("descriptors", "threads"))
+    return int(grown > 41 or not same)
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 20_000))
