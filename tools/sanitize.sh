@@ -9,7 +9,8 @@ cd "$(dirname "$0")/.."
 # of many pixels take minutes here without another path through the core.
 if [ $# = 0 ]; then
     set -- -k "not 333x and not 1920"
-    for name in assets bench cli cli_apply comparison doctor faults files frames fuzz gltf gltf_textures guide \
+    for name in assets bench cli cli_apply comparison doctor faults files frames fuzz gltf \
+        gltf_textures guide \
         hdr_images images laws mutations pictures plugin reference report scene skybox; do
         set -- "$@" "--ignore=tests/test_$name.py"
     done
