@@ -198,6 +198,31 @@ static bool add_line(const struct choice *choice, const struct vkb_pass_row *pas
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
+// A blur with taps between the texels of a source of the target's size, as one with taps on them:
+// fewer texels to fetch, and no filter.
+static bool add_whole_taps(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
+                           struct vkb_error *error)
+{
+    struct kernel kernel;
+    struct vkb_pass_row row;
+    struct vkb_blur_params *params = &row.params.blur;
+
+    *fits = is_blur(pass) && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+         && is_written_once(&choice->plain, pass->targets[0])
+         && floor(tap_step(pass)) != tap_step(pass) && find_kernel(pass, LINE_RADIUS, &kernel);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    params->blur_scale = params->layer_scale = params->blur_strength = params->layer_strength =
+        1.0f;
+    memcpy(params->weights, kernel.weights, sizeof params->weights);
+    row.constants[1] = kernel.radius;
+    row.constants[2] = 1;
+    row.constants[3] = TEXEL_OWN;
+    row.constants[4] = SAMPLING_WHOLE;
+    return add_fullscreen(choice->forms, choice->graph, &row, error);
+}
+
 // A horizontal blur into a target of another size, its taps whole texels apart: such a blur
 // commutes with the filter between the sizes, so it runs in the source's size, and every pixel of
 // the target takes one sample of it instead of one a tap.
@@ -527,7 +552,7 @@ static bool add_doubled_final(const struct choice *choice, const struct vkb_pass
     params->noise_seed = pass->params.composite.noise_seed;
     params->limit = vkb_formats[plain->images[pass->targets[0]].format].limit;
     find_up_taps(radius, params->taps[0]);
-    return vkb_graph_add_pass(choice->graph, pass, error)
+    return add_fullscreen(choice->forms, choice->graph, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -535,8 +560,10 @@ static const struct form forms_table[] = {
     {VKB_FORMS_CPU, add_line},          {VKB_FORMS_CPU, add_enlarged},
     {VKB_FORMS_CPU, add_strips},        {VKB_FORMS_CPU, add_from_lines},
     {VKB_FORMS_CPU, add_halved},        {VKB_FORMS_CPU, add_doubled},
-    {VKB_FORMS_CPU, add_doubled_final}, {VKB_FORMS_GPU, add_enlarged},
-    {VKB_FORMS_GPU, add_from_lines},    {VKB_FORMS_GPU, add_tiles},
+    {VKB_FORMS_CPU, add_doubled_final}, {VKB_FORMS_GPU, add_whole_taps},
+    {VKB_FORMS_GPU, add_enlarged},      {VKB_FORMS_GPU, add_from_lines},
+    {VKB_FORMS_GPU, add_tiles},         {VKB_FORMS_GPU, add_halved},
+    {VKB_FORMS_GPU, add_doubled},       {VKB_FORMS_GPU, add_doubled_final},
     {VKB_FORMS_GPU, add_pixels},
 };
 

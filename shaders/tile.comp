@@ -12,8 +12,37 @@ layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
 layout(set = 0, binding = 1) uniform sampler2D image;
 layout(set = 0, binding = 2) uniform writeonly image2D target;
 
-// A plane a channel, so that neighbours lie in neighbouring banks.
-shared float sums[3][TILE_ROWS][TILE_LOADED];
+// The vertical sums, packed as their image would hold them, in planes of words so that neighbours
+// lie in neighbouring banks.
+const int WORDS = FORMAT == STORED_SINGLE ? 3 : FORMAT == STORED_HALF ? 2 : 1;
+shared uint sums[WORDS][TILE_ROWS][TILE_LOADED];
+
+void keep_sum(int row, int column, vec3 sum)
+{
+    vec3 kept = as_stored(sum, FORMAT);
+    if (FORMAT == STORED_UNORM8) {
+        sums[0][row][column] = packUnorm4x8(vec4(kept, 0.0));
+    } else if (FORMAT == STORED_HALF) {
+        sums[0][row][column] = packHalf2x16(kept.rg);
+        sums[WORDS - 1][row][column] = packHalf2x16(kept.bb);
+    } else {
+        for (int channel = 0; channel < WORDS; ++channel)
+            sums[channel][row][column] = floatBitsToUint(kept[channel]);
+    }
+}
+
+vec3 kept_sum(int row, int column)
+{
+    if (FORMAT == STORED_UNORM8)
+        return unpackUnorm4x8(sums[0][row][column]).rgb;
+    if (FORMAT == STORED_HALF)
+        return vec3(unpackHalf2x16(sums[0][row][column]),
+                    unpackHalf2x16(sums[WORDS - 1][row][column]).x);
+    vec3 sum;
+    for (int channel = 0; channel < WORDS; ++channel)
+        sum[channel] = uintBitsToFloat(sums[channel][row][column]);
+    return sum;
+}
 
 // A run of vertical sums in one column, each texel loaded once.
 void sum_down(ivec2 place, ivec2 last, int top, int column)
@@ -27,20 +56,15 @@ void sum_down(ivec2 place, ivec2 last, int top, int column)
             if (abs(at - i) <= RADIUS)
                 run[i] += down(at - i) * value;
     }
-    for (int i = 0; i < RUN; ++i) {
-        vec3 kept = as_stored(run[i], FORMAT);
-        for (int channel = 0; channel < 3; ++channel)
-            sums[channel][top + i][column] = kept[channel];
-    }
+    for (int i = 0; i < RUN; ++i)
+        keep_sum(top + i, column, run[i]);
 }
 
 vec3 sum_across(int row, int column)
 {
     vec3 sum = vec3(0.0);
-    for (int tap = -RADIUS; tap <= RADIUS; ++tap) {
-        int at = column + RADIUS + tap;
-        sum += across(tap) * vec3(sums[0][row][at], sums[1][row][at], sums[2][row][at]);
-    }
+    for (int tap = -RADIUS; tap <= RADIUS; ++tap)
+        sum += across(tap) * kept_sum(row, column + RADIUS + tap);
     return as_stored(sum, FORMAT);
 }
 

@@ -11,10 +11,13 @@ UNIFORM_BLOCK(WHOLE_BLOCK);
 layout(constant_id = 4) const int THRESHOLD_MODE = 0;
 layout(constant_id = 5) const int FORMAT = STORED_SINGLE;
 
+// Whole or not at all, a texel needs no rounding: the image has the format that it would be stored
+// in.
 vec3 bright(vec3 texel)
 {
     vec3 value = finite_or_zero(texel);
-    return as_stored(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee), FORMAT);
+    vec3 kept = apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee);
+    return THRESHOLD_MODE == THRESHOLD_KNEE ? as_stored(kept, FORMAT) : kept;
 }
 
 float down(int tap)

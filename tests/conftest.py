@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from vkbloom import Renderer, Scene, Settings
@@ -16,6 +17,9 @@ ADAPTER = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A slow machine is no failure.
+    hypothesis.settings.register_profile("untimed", deadline=None)
+    hypothesis.settings.load_profile("untimed")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
 
 

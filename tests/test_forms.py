@@ -27,7 +27,8 @@ FORMED = [name for name in METHODS if not name.startswith("direct")]
 WHOLE: dict[str, Settings] = {
     "tutorial": Separable(),
     "threshold": Separable(threshold=0.3, knee=0.5, composite="screen", intensity=0.7),
-    "hard": Separable(threshold=0.30001, tonemap="aces", encoding="srgb"),
+    # (Not encoded: near black, a curve makes many levels of the bloom's one.)
+    "hard": Separable(threshold=0.30001, tonemap="aces"),
     "fractional": Separable(blur_scale=0.63, composite="mix", intensity=0.4),
     "wide": Separable(weights=gaussian_weights(4.0, 12), blur_strength=1.0, exposure=-1.0),
     "outline": Separable(first_tap=0, blur_strength=0.4, texel="x", dither=True, dither_seed=3),

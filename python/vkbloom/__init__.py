@@ -6,7 +6,9 @@ framebuffer as a NumPy array.
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
 from vkbloom import reference
 from vkbloom._core import (
@@ -25,7 +27,23 @@ from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Scene
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
 
+if TYPE_CHECKING:
+    from vkbloom.grid import reductions
+    from vkbloom.grid.checking import GridReport, check_grid
+    from vkbloom.grid.curves import response_curves
+    from vkbloom.grid.sheet import contact_sheet
+    from vkbloom.grid.zarr_grid import grid_to_zarr
+
 __version__ = version("vkbloom")
+
+# Imported when they are asked for: who renders one frame shall not wait for grids.
+_LATE = {
+    "GridReport": "vkbloom.grid.checking",
+    "check_grid": "vkbloom.grid.checking",
+    "contact_sheet": "vkbloom.grid.sheet",
+    "grid_to_zarr": "vkbloom.grid.zarr_grid",
+    "response_curves": "vkbloom.grid.curves",
+}
 
 __all__ = [
     "TUTORIAL",
@@ -38,6 +56,7 @@ __all__ = [
     "Error",
     "FilamentBloom",
     "Frames",
+    "GridReport",
     "HdrpBloom",
     "KinoBloom",
     "OutOfMemoryError",
@@ -51,7 +70,24 @@ __all__ = [
     "UrpBloom",
     "ValidationError",
     "adapters",
+    "check_grid",
+    "contact_sheet",
     "gaussian_weights",
+    "grid_to_zarr",
     "presets",
+    "reductions",
     "reference",
+    "response_curves",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "reductions":
+        return import_module("vkbloom.grid.reductions")
+    if name in _LATE:
+        return getattr(import_module(_LATE[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

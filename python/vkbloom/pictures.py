@@ -22,7 +22,16 @@ from vkbloom.srgb import encode_srgb
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
 
-__all__ = ["contact_sheet_html", "contact_sheet_png", "leading_png", "picture", "png"]
+__all__ = [
+    "contact_sheet_html",
+    "contact_sheet_png",
+    "in_range",
+    "labelled",
+    "leading_png",
+    "picture",
+    "png",
+    "scaled",
+]
 
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
 
@@ -72,7 +81,7 @@ def contact_sheet_html(frames: Frames) -> str:
     for name, array in frames.items():
         height, width = array.shape[:2]
         shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
-        picture = _picture(frames, name, _scaled(width, height, shrink))[:, :, :3]
+        picture = _picture(frames, name, scaled(width, height, shrink))[:, :, :3]
         data = base64.b64encode(png(picture)).decode("ascii")
         # An enlarged level of a pyramid shall show its pixels.
         rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
@@ -146,8 +155,8 @@ def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> byt
     ValueError
         If `columns` or `width` is out of range, or `frames` is empty.
     """
-    columns = _in_range("columns", columns, 1, 32)
-    width = _in_range("width", width, 128, 4096)
+    columns = in_range("columns", columns, 1, 32)
+    width = in_range("width", width, 128, 4096)
     if not frames:
         raise ValueError("frames: a contact sheet needs one framebuffer at least")
     columns = min(columns, len(frames))
@@ -171,20 +180,28 @@ def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> byt
         left = gap + column * (width + gap)
         top = gap + 2 * text + row * (height + caption + gap)
         fit = min(width / array.shape[1], height / array.shape[0])
-        picture = _picture(frames, name, _scaled(array.shape[1], array.shape[0], fit))[:, :, :3]
+        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))[:, :, :3]
         y = top + (height - picture.shape[0]) // 2
         x = left + (width - picture.shape[1]) // 2
         sheet[top : top + height, left : left + width] = 40
         sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
         baseline = top + height + text + text // 4
         labels += [(left, baseline, name), (left, baseline + text + 2, _described(array))]
-    return png(_labelled(sheet, labels, text))
+    return png(labelled(sheet, labels, text))
 
 
-def _labelled(
+def labelled(
     sheet: NDArray[np.uint8], labels: Iterable[tuple[int, int, str]], size: int
 ) -> NDArray[np.uint8]:
-    """Draw texts at (x, baseline y), in light grey; without a font, leave them out."""
+    """Draw texts at (x, baseline y), in light grey; without a font, leave them out.
+
+    Parameters
+    ----------
+    sheet : ndarray, shape (H, W, 3)
+    labels : iterable of (int, int, str)
+    size : int
+        Of the letters, in pixels.
+    """
     try:
         oiio = import_extra("OpenImageIO", "images", "A labelled contact sheet")
     except ModuleNotFoundError as error:
@@ -267,7 +284,8 @@ def _described(array: NDArray[Any]) -> str:
     return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}"
 
 
-def _in_range(field: str, value: int, low: int, high: int) -> int:
+def in_range(field: str, value: int, low: int, high: int) -> int:
+    """Return a whole number, else raise TypeError or ValueError that names the field."""
     try:
         index = operator.index(value)
     except TypeError:
@@ -293,7 +311,8 @@ def _stretched(values: NDArray[np.float32], ranged: NDArray[np.float32]) -> NDAr
     return _clipped((np.clip(values, low, high) - low) / span)
 
 
-def _scaled(width: int, height: int, factor: float) -> tuple[int, int]:
+def scaled(width: int, height: int, factor: float) -> tuple[int, int]:
+    """Return a size times a factor, of at least one pixel a side."""
     return max(1, round(width * factor)), max(1, round(height * factor))
 
 

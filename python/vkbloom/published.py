@@ -90,7 +90,7 @@ class BevyBloom(Settings):
     low_frequency_boost: float = _number("low_frequency_boost")
     low_frequency_boost_curvature: float = _number("low_frequency_boost_curvature")
     high_pass_frequency: float = _number("high_pass_frequency")
-    max_mip_dimension: int = _number("max_mip_dimension")
+    max_mip_dimension: int = _number("max_mip_dimension", unit="pixel")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -189,7 +189,7 @@ class FilamentBloom(Settings):
     intensity: float = _number("intensity", default=0.1)
     format: BloomFormat | None = "rgba16float"
     levels: int = _number("levels")
-    resolution: int = _number("resolution")
+    resolution: int = _number("resolution", unit="pixel")
     highlight: float = _number("highlight")
 
     def __post_init__(self) -> None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from types import TracebackType
 
+    import xarray
     from numpy.typing import NDArray
 
     from vkbloom.scene import Mesh, Scene
@@ -386,6 +387,98 @@ class Renderer:
         arguments = _render_arguments(scene, size, shading, time, attachments)
         yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
 
+    def grid(
+        self,
+        source: Scene | NDArray[Any] | Sequence[NDArray[Any]] | Mapping[str, NDArray[Any]],
+        settings: Settings | None = None,
+        axes: Mapping[str, Iterable[Any]] | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        shading: Shading = "forward",
+        time: float = 0.0,
+        attachments: Literal["all"] | str | Sequence[str] = ("final",),
+        reduce: Mapping[str, Callable[[Frames], Any]] | None = None,
+        progress: bool | None = None,
+    ) -> xarray.Dataset:
+        """Render every combination of some values.
+
+        Parameters
+        ----------
+        source : Scene, ndarray, or list or mapping of ndarray
+            Several images add the dimension "image" before all others; a mapping's keys label
+            them. They must have one shape and dtype.
+        settings : Settings, optional
+            What the axes vary; by default ``Separable()``.
+        axes : mapping of str to sequence
+            Values by settings field, or by "time" for a scene.
+        size : (int, int), optional
+            Width and height of a scene's frames, by default (1280, 720).
+        shading, time
+            Of a scene, as for `render`.
+        attachments : "all" or sequence of str
+            The framebuffers to keep. Their shape and dtype must be the same at all points.
+        reduce : mapping of str to callable, optional
+            Figures to keep, by name: each is called with the `Frames` of a point, and returns a
+            number or a small array. `vkbloom.reductions` has ready ones. With ``attachments=()``
+            no framebuffers are kept beside them. A callable gets the framebuffers that its
+            attribute ``attachments`` names, or all where it has none.
+        progress : bool, optional
+            True: a progress bar in a terminal or a notebook, silent elsewhere. None: the same
+            where tqdm is installed. False: silent.
+
+        Returns
+        -------
+        xarray.Dataset
+            One dimension an axis, in the order given, then "y", "x" and "channel"; one variable a
+            framebuffer and a reduction. The attributes hold the remaining settings (as JSON), the
+            adapter, the driver and the version, and how many passes ran ("passes_run") and how
+            many more all points have, each pass of each by itself ("passes_saved").
+
+        Raises
+        ------
+        ValueError
+            An argument is out of range; or, before anything is rendered, a framebuffer has
+            different shapes along an axis.
+        TypeError
+            An argument has the wrong type.
+        ModuleNotFoundError
+            xarray is missing.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed.
+
+        Notes
+        -----
+        Points are visited in the order that runs the fewest passes, whatever the order of the
+        axes. For grids that outgrow memory see `vkbloom.grid_to_zarr`.
+        """
+        from vkbloom.grid.memory import in_memory  # noqa: PLC0415  it imports this module
+        from vkbloom.grid.plan import ask  # noqa: PLC0415
+
+        asked = ask(
+            source,
+            settings,
+            axes,
+            size=size,
+            shading=shading,
+            time=time,
+            attachments=attachments,
+            reduce=reduce,
+        )
+        return in_memory(asked, self, progress)
+
+    def _survey_apply(
+        self, image: NDArray[Any], settings: Settings
+    ) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """Return shape and dtype of all framebuffers that `apply` would give, without rendering."""
+        return _surveyed(self._core.apply(image, None), settings)
+
+    def _survey_render(
+        self, scene: Scene, settings: Settings, size: tuple[int, int], shading: Shading
+    ) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """Return shape and dtype of all framebuffers that `render` would give, likewise."""
+        arguments = _render_arguments(scene, size, shading, 0.0, "all")
+        return _surveyed(self._core.render(*arguments), settings)
+
     def _run_one(
         self,
         batch: _core.Batch,
@@ -419,6 +512,21 @@ class Renderer:
             with contextlib.suppress(_core.Error):
                 pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
                 self._saved_pipelines = count
+
+
+def _surveyed(
+    batch: _core.Batch, settings: Settings
+) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Return what a batch asks arrays for; it is not submitted, so that the device does nothing."""
+    found: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
+
+    def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+        found[name] = (shape, np.dtype(dtype))
+        # Memory that nobody touches costs nothing.
+        return np.empty(shape, dtype)
+
+    batch.add(settings, allocate)
+    return found
 
 
 def _render_arguments(

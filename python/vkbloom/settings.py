@@ -27,10 +27,12 @@ BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
 
 
-def _number(name: str, default: float | None = None) -> Any:
+def _number(name: str, default: float | None = None, unit: str = "1") -> Any:
     """Declare a field that is a number in the core's table, which gives its default and range."""
     initial, _, _ = _core.VALUES[name]
-    return dataclasses.field(default=initial if default is None else default)
+    return dataclasses.field(
+        default=initial if default is None else default, metadata={"unit": unit}
+    )
 
 
 def _flag(name: str) -> Any:
@@ -128,11 +130,11 @@ class Settings:
     composite: Composite = _choice("composite")
     intensity: float = _number("intensity")
     tonemap: ToneMap = _choice("tonemap")
-    exposure: float = _number("exposure")
+    exposure: float = _number("exposure", unit="stop")
     encoding: Encoding = _choice("encoding")
     dither: bool = _flag("dither")
     dither_seed: int = _number("dither_seed")
-    bloom_size: tuple[int, int] | None = None
+    bloom_size: tuple[int, int] | None = dataclasses.field(default=None, metadata={"unit": "pixel"})
     bloom_scale: float = _number("bloom_scale")
     format: BloomFormat | None = None
 
@@ -225,7 +227,7 @@ class Separable(Settings):
 
     method: ClassVar[str] = "separable"
 
-    blur_scale: float = _number("blur_scale")
+    blur_scale: float = _number("blur_scale", unit="texel")
     blur_strength: float = _number("blur_strength")
     weights: tuple[float, ...] = TUTORIAL
     loops: int = _number("loops")
@@ -290,7 +292,7 @@ class Pyramid(Settings):
     method: ClassVar[str] = "pyramid"
 
     levels: int = _number("levels")
-    radius: float = _number("radius")
+    radius: float = _number("radius", unit="texel")
     firefly_filter: bool = _flag("firefly_filter")
 
 

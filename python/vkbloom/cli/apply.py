@@ -5,22 +5,19 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import click
-import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom import image_reading, image_writing
+from vkbloom import image_writing
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.image_files import note, read, subimage_option
+from vkbloom.cli.image_files import COLOURS, note, read_picture, subimage_option
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.images import Colour, Picture
 from vkbloom.settings import Encoding
-
-_COLOURS: Final = ("linear", "srgb")
 
 
 @click.command()
@@ -36,13 +33,13 @@ _COLOURS: Final = ("linear", "srgb")
 )
 @click.option(
     "--input-colour",
-    type=click.Choice(_COLOURS),
+    type=click.Choice(COLOURS),
     help="What the colours in IN are [default linear for floats; for integers srgb, unless the "
     "file says linear]",
 )
 @click.option(
     "--output-colour",
-    type=click.Choice(_COLOURS),
+    type=click.Choice(COLOURS),
     help="What the colours in OUT shall be [default linear for floats, srgb for integers]",
 )
 @click.option(
@@ -101,7 +98,7 @@ def command(
         )
     with blaming_the_call():
         image_writing.check_writable(target)
-    picture = _picture(source, subimage, input_colour, raw)
+    picture = read_picture(source, subimage, input_colour, raw=raw)
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
         click.echo(f"Rendering on {renderer.info.summary}")
         names = [name for name in attachments.split(",") if name != "final"]
@@ -125,28 +122,6 @@ def command(
         note(text)
     for path in (target, *written):
         click.echo(f"wrote {path}")
-
-
-def _picture(source: str, subimage: int, colour: Colour | None, raw: bool) -> Picture:
-    stored = read(source, subimage)
-    if raw and stored.pixels.dtype != np.uint8:
-        raise click.UsageError(
-            f"--raw is for files of 8-bit integers; {source} holds {stored.numbers[0]}"
-        )
-    try:
-        picture = image_reading.decode(stored, colour, raw=raw)
-    except ValueError as error:
-        raise ValueError(f"{source}: {error}") from error
-    nan = int(np.isnan(picture.values).sum())
-    infinite = int(np.isinf(picture.values).sum())
-    if nan or infinite:
-        note(
-            f"{source} holds NaN {nan} times and infinity {infinite} times: 0 in the bloom, kept "
-            "at their own pixels"
-        )
-    for text in picture.notes:
-        note(f"{source}: {text}")
-    return picture
 
 
 def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import inspect
-import itertools
-import re
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -15,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol
 import click
 
 from vkbloom.cli.program import given
+from vkbloom.descriptions import described_parameters
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Any]
@@ -70,7 +68,7 @@ _FORMS: Final[Mapping[object, _ParamType]] = {
 }
 
 
-def _form(annotation: object) -> _ParamType:
+def form_of(annotation: object) -> _ParamType:
     """Return the type of option that an annotation asks for.
 
     Raises
@@ -80,7 +78,7 @@ def _form(annotation: object) -> _ParamType:
     """
     if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
         (inner,) = (part for part in typing.get_args(annotation) if part is not types.NoneType)
-        return _or_none(_form(inner))
+        return _or_none(form_of(inner))
     if typing.get_origin(annotation) is Literal:
         return click.Choice(typing.get_args(annotation))
     if annotation not in _FORMS:
@@ -94,28 +92,6 @@ def _or_none(form: _ParamType) -> _Word:
 
     choices = form.choices if isinstance(form, click.Choice) else [form.name]
     return _Word("|".join([*choices, "none"]), read)
-
-
-def _described_parameters(kind: type) -> dict[str, str]:
-    """Return the first sentence on each parameter from a class's numpydoc docstring."""
-    # There is none where Python runs with -OO.
-    lines = inspect.cleandoc(kind.__doc__ or "").splitlines()
-    texts: dict[str, list[str]] = {}
-    names: list[str] = []
-    start = lines.index("Parameters") + 2 if "Parameters" in lines else len(lines)
-    for line, following in itertools.pairwise([*lines[start:], ""]):
-        if following.startswith("---"):
-            break
-        if line.startswith(" "):
-            for name in names:
-                texts[name].append(line.strip())
-        elif line:
-            names = line.partition(" : ")[0].split(", ")
-            texts.update({name: [] for name in names})
-    return {
-        name: re.split(r"\.(?:\s|$)", " ".join(text))[0].replace("`", "")
-        for name, text in texts.items()
-    }
 
 
 def _spelled(value: object, separator: str = ",") -> str:
@@ -151,7 +127,7 @@ def _collect(
     found: dict[str, _Field] = {}
     for label, kind in kinds.items():
         annotations = typing.get_type_hints(kind)
-        texts = _described_parameters(kind)
+        texts = described_parameters(kind)
         for declaration in dataclasses.fields(kind):
             name = declaration.name
             if name in inherited:
@@ -208,7 +184,7 @@ def options(
                 f"--{option}/--no-{option}" if is_flag else f"--{option}",
                 parameters[name],
                 default=None,
-                type=None if is_flag else _form(field.annotation),
+                type=None if is_flag else form_of(field.annotation),
                 help=" ".join(field.helps),
             )(run)
         return run

@@ -6,12 +6,16 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 import click
+import numpy as np
 
 from vkbloom import image_reading
-from vkbloom.images import StoredImage
+from vkbloom.images import Colour, Picture, StoredImage
+
+#: What the colours in a file can be said to be.
+COLOURS: Final = ("linear", "srgb")
 
 _STANDARD_ERROR = 2
 
@@ -37,6 +41,39 @@ def read(path: str, subimage: int) -> StoredImage:
 def note(text: str) -> None:
     """Tell the user something that is no failure, on standard error."""
     click.echo(f"vkbloom: note: {text}", err=True)
+
+
+def read_picture(
+    source: str, subimage: int, colour: Colour | None, *, raw: bool = False
+) -> Picture:
+    """Read an image file as what a renderer takes, and tell what the user may want to know.
+
+    Raises
+    ------
+    click.UsageError
+        `raw` is for 8-bit files, and this is none.
+    OSError, ValueError
+        The file cannot be read, or not be given bloom.
+    """
+    stored = read(source, subimage)
+    if raw and stored.pixels.dtype != np.uint8:
+        raise click.UsageError(
+            f"--raw is for files of 8-bit integers; {source} holds {stored.numbers[0]}"
+        )
+    try:
+        picture = image_reading.decode(stored, colour, raw=raw)
+    except ValueError as error:
+        raise ValueError(f"{source}: {error}") from error
+    nan = int(np.isnan(picture.values).sum())
+    infinite = int(np.isinf(picture.values).sum())
+    if nan or infinite:
+        note(
+            f"{source} holds NaN {nan} times and infinity {infinite} times: 0 in the bloom, kept "
+            "at their own pixels"
+        )
+    for text in picture.notes:
+        note(f"{source}: {text}")
+    return picture
 
 
 @contextmanager

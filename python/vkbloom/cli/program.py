@@ -14,7 +14,7 @@ from click.core import ParameterSource
 import vkbloom
 
 #: Each is a module of this package with a click command called `command`.
-COMMANDS: Final = ("render", "apply", "compare", "adapters", "doctor", "bench")
+COMMANDS: Final = ("render", "apply", "grid", "compare", "adapters", "doctor", "bench")
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 

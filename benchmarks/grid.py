@@ -1,0 +1,273 @@
+"""Grids measured: what shared passes, stores, kills and workers cost or save.
+
+Each part prints its figures; a part's name as the argument runs that part alone.
+
+    python benchmarks/grid.py [points|kills|tiny|workers] ...
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import distributed
+import numpy as np
+import psutil
+
+import vkbloom
+
+ADAPTER = os.environ.get("VKBLOOM_ADAPTER", "software")
+SIDE = int(os.environ.get("GRID_SIDE", "256"))
+#: blur_scale x blur_strength x intensity
+COUNTS = tuple(int(n) for n in os.environ.get("GRID_COUNTS", "20,20,25").split(","))
+TINY = int(os.environ.get("GRID_TINY", "100000"))
+SINGLES = int(os.environ.get("GRID_SINGLES", "500"))
+
+
+def picture(side: int = SIDE) -> np.ndarray[Any, Any]:
+    """Return noise with a few lights, as 8-bit values."""
+    generator = np.random.default_rng(0)
+    image = generator.integers(0, 60, (side, side, 3), dtype=np.uint8)
+    for y, x in generator.integers(0, side, (side // 16 + 1, 2)):
+        image[y : y + 3, x : x + 3] = 255
+    return image
+
+
+def axes() -> dict[str, Any]:
+    """Return the axes of the issue's grid, the fastest in the middle."""
+    scale, strength, intensity = COUNTS
+    return {
+        "blur_scale": np.linspace(0.1, 4, scale),
+        "intensity": np.linspace(0, 2, intensity),
+        "blur_strength": np.linspace(0.5, 2, strength),
+    }
+
+
+@contextmanager
+def folder() -> Iterator[Path]:
+    """Give a folder on the disk that holds the working tree's temporary files."""
+    path = Path(tempfile.mkdtemp(prefix="vkbloom-grid-"))
+    try:
+        yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+@contextmanager
+def memory(process: psutil.Process | None = None) -> Iterator[list[float]]:
+    """Collect the resident memory of a process, in MiB, five times a second."""
+    samples: list[float] = []
+    watched = process or psutil.Process()
+    end = threading.Event()
+
+    def watch() -> None:
+        while not end.wait(0.2):
+            samples.append(watched.memory_info().rss / 2**20)
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        yield samples
+    finally:
+        end.set()
+        thread.join()
+
+
+def spread(samples: list[float]) -> str:
+    """Return how memory went: at a tenth, the half, and the end of the time, and the most."""
+    if not samples:
+        return "not measured"
+    at = [samples[int(share * (len(samples) - 1))] for share in (0.1, 0.5, 1.0)]
+    return f"{at[0]:.0f}, {at[1]:.0f}, {at[2]:.0f} MiB at 10, 50, 100 %; most {max(samples):.0f}"
+
+
+def points() -> None:
+    """10,000 points of 256 x 256, against single calls, spot-checked."""
+    image, values = picture(), axes()
+    total = int(np.prod([len(value) for value in values.values()]))
+    with folder() as path, memory() as samples:
+        start = time.perf_counter()
+        made = vkbloom.grid_to_zarr(image, None, values, path / "a.zarr", adapter=ADAPTER)
+        seconds = time.perf_counter() - start
+        size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+        print(f"{total} points of {SIDE} x {SIDE} into Zarr: {seconds:.1f} s, "
+              f"{total / seconds:.0f} points/s, {size / 2**20:.0f} MiB")  # fmt: skip
+        print(f"  passes run {made.attrs['passes_run']}, saved {made.attrs['passes_saved']}")
+        print(f"  memory: {spread(samples)}")
+        with vkbloom.Renderer(ADAPTER) as renderer:
+            spots = random.Random(1).sample(list(np.ndindex(*made["done"].shape)), 50)
+            for spot in spots:
+                chosen = {n: float(v[i]) for (n, v), i in zip(values.items(), spot, strict=True)}
+                alone = renderer.apply(image, vkbloom.Separable(**chosen), attachments="final")
+                assert np.array_equal(made["final"][spot].values, alone["final"]), spot
+            print(f"  {len(spots)} points equal to single renders")
+            start = time.perf_counter()
+            dataset = renderer.grid(image, None, values, attachments=(),
+                                    reduce={"mean": vkbloom.reductions.Mean()})  # fmt: skip
+            seconds_reduced = time.perf_counter() - start
+            del dataset
+            print(f"  only the mean of each, in memory: {total / seconds_reduced:.0f} points/s")
+    singles(image, values, total / seconds)
+
+
+def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) -> None:
+    """Single calls: nested loops in the order of the axes, and with every pass of every point."""
+    names = list(values)
+    every = [dict(zip(names, map(float, point), strict=True))
+             for point in itertools.product(*values.values())]  # fmt: skip
+    with vkbloom.Renderer(ADAPTER) as renderer:
+        start = time.perf_counter()
+        for changes in every:
+            renderer.apply(image, vkbloom.Separable(**changes), attachments="final")
+        kept = len(every) / (time.perf_counter() - start)
+        other = image[::-1].copy()
+        chosen = random.Random(2).sample(every, min(SINGLES, len(every)))
+        start = time.perf_counter()
+        for changes in chosen:
+            # Another image in between: every pass of every point runs.
+            renderer.apply(image, vkbloom.Separable(**changes), attachments="final")
+            renderer.apply(other, vkbloom.Separable(**changes), attachments="final")
+        alone = 2 * len(chosen) / (time.perf_counter() - start)
+    print(f"  {len(every)} single calls in nested loops: {kept:.0f} points/s, grid is "
+          f"{rate / kept:.2f} times that")  # fmt: skip
+    print(f"  {2 * len(chosen)} single calls that run every pass: {alone:.0f} points/s, grid is "
+          f"{rate / alone:.2f} times that")  # fmt: skip
+
+
+def kills() -> None:
+    """Kill -9 ten times at random moments of the work, then finish: equal to the undisturbed."""
+    script = Path(__file__).parents[1] / "tests" / "grid_to_kill.py"
+    generator = random.Random(time.time_ns())
+    with folder() as path:
+        command = [sys.executable, str(script)]
+        subprocess.run([*command, str(path / "whole.zarr"), "100"], check=True)
+        killed, chunks = 0, path / "a.zarr" / "final"
+        for number in range(10):
+            before = len(list(chunks.glob("c.*")))
+            with subprocess.Popen([*command, str(path / "a.zarr"), "100"]) as process:
+                while len(list(chunks.glob("c.*"))) == before and process.poll() is None:
+                    time.sleep(0.002)
+                time.sleep(generator.uniform(0, 0.4))
+                killed += process.poll() is None
+                process.kill()
+            report = str(vkbloom.check_grid(path / "a.zarr")).splitlines()
+            print(f"  after kill {number + 1}: {report[0]}, problems {len(report) - 1}")
+        subprocess.run([*command, str(path / "a.zarr"), "100"], check=True)
+        found, expected = contents(path / "a.zarr"), contents(path / "whole.zarr")
+        print(f"{killed} of 10 runs killed at work; bit-equal to the undisturbed: "
+              f"{found == expected}, {len(found)} files")  # fmt: skip
+
+
+def contents(store: Path) -> dict[str, bytes]:
+    """Return all files of a store."""
+    return {
+        str(file.relative_to(store)): file.read_bytes()
+        for file in store.rglob("*")
+        if file.is_file()
+    }
+
+
+def tiny() -> None:
+    """Many points of tiny images over two workers: the scheduler's load and memory."""
+    values = {
+        "blur_scale": np.linspace(0.1, 4, 100),
+        "intensity": np.linspace(0, 2, TINY // 1000),
+        "exposure": np.linspace(-2, 2, 10),
+    }
+    with (
+        folder() as path,
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, protocol="tcp"
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        most, tasks, workers = [0], [0], list(client.run(os.getpid).values())
+        before = set(client.run_on_scheduler(lambda dask_scheduler: set(dask_scheduler.tasks)))
+
+        def watch(dask_scheduler: Any = None) -> int:
+            return len(dask_scheduler.tasks)
+
+        submit = client.submit
+
+        def counting(*rest: Any, **more: Any) -> Any:
+            made = submit(*rest, **more)
+            tasks[0] += 1
+            most[0] = max(most[0], client.run_on_scheduler(watch) - len(before))
+            return made
+
+        client.submit = counting
+        times = psutil.Process().cpu_times()
+        memories = [psutil.Process(pid).memory_info().rss / 2**20 for pid in workers]
+        with memory() as samples:
+            start = time.perf_counter()
+            made = vkbloom.grid_to_zarr(
+                picture(16), None, values, path / "a.zarr", client=client, adapter=ADAPTER
+            )
+            seconds = time.perf_counter() - start
+        used = psutil.Process().cpu_times()
+        count = int(made["done"].size)
+        after = [psutil.Process(pid).memory_info().rss / 2**20 for pid in workers]
+        assert bool(made["done"].values.all())
+        print(f"{count} points of 16 x 16, two workers: {seconds:.1f} s, "
+              f"{count / seconds:.0f} points/s")  # fmt: skip
+        print(f"  passes run {made.attrs['passes_run']}, saved {made.attrs['passes_saved']}")
+        print(f"  {tasks[0]} tasks in all, at most {most[0]} on the scheduler at a time")
+        print(f"  scheduler and client: {used.user + used.system - times.user - times.system:.1f} "
+              f"s of processor time; memory {spread(samples)}")  # fmt: skip
+        grown = zip(memories, after, strict=True)
+        print(f"  workers: {', '.join(f'{b:.0f} -> {a:.0f} MiB' for b, a in grown)}")
+
+
+def workers() -> None:
+    """Two workers against one, and against this process."""
+    image, values = picture(), axes()
+    values = {name: value[:: max(1, len(value) // 8)] for name, value in values.items()}
+    total = int(np.prod([len(value) for value in values.values()]))
+    rates = {}
+    for threads in ("all", "1"):
+        environment = {} if threads == "all" else {"LP_NUM_THREADS": threads}
+        os.environ.update(environment)
+        for count in (1, 2):
+            with (
+                folder() as path,
+                distributed.LocalCluster(
+                    n_workers=count, threads_per_worker=1, dashboard_address=None
+                ) as cluster,
+                distributed.Client(cluster) as client,
+            ):
+                warm = {name: value[:2] for name, value in values.items()}
+                vkbloom.grid_to_zarr(image, None, warm, path / "w.zarr", client=client,
+                                     adapter=ADAPTER)  # fmt: skip
+                start = time.perf_counter()
+                made = vkbloom.grid_to_zarr(image, None, values, path / "a.zarr", client=client,
+                                            adapter=ADAPTER)  # fmt: skip
+                rates[count] = total / (time.perf_counter() - start)
+                print(f"{count} workers, threads of lavapipe a worker: {threads}: "
+                      f"{rates[count]:.0f} points/s of {total}; passes run "
+                      f"{made.attrs['passes_run']}")  # fmt: skip
+        print(f"  two by one: {rates[2] / rates[1]:.2f}")
+    os.environ.pop("LP_NUM_THREADS", None)
+
+
+PARTS: dict[str, Callable[[], None]] = {
+    "points": points,
+    "kills": kills,
+    "tiny": tiny,
+    "workers": workers,
+}
+
+if __name__ == "__main__":
+    for part in sys.argv[1:] or PARTS:
+        print(f"== {part}: {PARTS[part].__doc__}")
+        PARTS[part]()

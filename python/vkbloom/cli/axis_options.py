@@ -1,0 +1,148 @@
+"""The axes of a grid and its reductions in words, as the command line and files have them."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import click
+import numpy as np
+
+import vkbloom
+from vkbloom import reductions
+from vkbloom.cli import fields
+from vkbloom.cli.image_files import read
+from vkbloom.cli.program import blaming_the_call
+
+__all__ = ["REDUCTIONS", "axis_values", "chunk_counts", "named_reductions"]
+
+REDUCTIONS: Final[Mapping[str, type[reductions.Reduction]]] = {
+    "mean": reductions.Mean,
+    "max": reductions.Max,
+    "encircled_energy": reductions.EncircledEnergy,
+    "ssim": reductions.SSIM,
+    "psnr": reductions.PSNR,
+    "flip": reductions.FLIP,
+}
+
+_RANGE_PARTS: Final = (3, 4)
+_MOST_VALUES: Final = 10_000_000
+
+
+def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, Sequence[Any]]:
+    """Return the values of each ``NAME=VALUES``.
+
+    Parameters
+    ----------
+    words : sequence of str
+        ``NAME=FIRST:LAST:COUNT`` (evenly spaced, both ends included), the same with ``:log``
+        (evenly spaced ratios), or ``NAME=VALUE,VALUE,...``; with a semicolon between values that
+        hold commas.
+    settings : Settings
+        Whose fields are varied.
+
+    Raises
+    ------
+    click.UsageError
+        A word is none of this.
+    """
+    types = {**typing.get_type_hints(type(settings)), "time": float}
+    found: dict[str, Sequence[Any]] = {}
+    for word in words:
+        name, sign, text = word.partition("=")
+        name = name.strip().replace("-", "_")
+        if not sign or not text:
+            raise click.UsageError(
+                f"--axis {word}: NAME=FIRST:LAST:COUNT or NAME=A,B,... is needed"
+            )
+        if name not in types:
+            raise click.UsageError(f"--axis {name}: the method {settings.method} has no such field")
+        found[name] = _values(word, text, types[name])
+    return found
+
+
+def _values(word: str, text: str, annotation: object) -> Sequence[Any]:
+    parts = text.split(":")
+    if len(parts) in _RANGE_PARTS and "," not in text and ";" not in text:
+        return _range(word, parts)
+    values = [part for part in text.split(";" if ";" in text else ",") if part]
+    # The forms of options, one a value, so that a value is written as its option is.
+    kind = click.BOOL if annotation is bool else fields.form_of(annotation)
+    try:
+        return [kind.convert(part.strip(), None, None) for part in values]
+    except click.BadParameter as error:
+        raise click.UsageError(f"--axis {word}: {error.message}") from error
+
+
+def _range(word: str, parts: Sequence[str]) -> Sequence[float]:
+    try:
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+        is_log = len(parts) > 3
+        if is_log and parts[3] != "log":
+            raise ValueError
+    except ValueError:
+        raise click.UsageError(
+            f"--axis {word}: not FIRST:LAST:COUNT or FIRST:LAST:COUNT:log"
+        ) from None
+    if not 1 <= count <= _MOST_VALUES:
+        raise click.UsageError(f"--axis {word}: {count} values are out of range, from 1 on")
+    if is_log and not (first > 0 and last > 0):
+        raise click.UsageError(f"--axis {word}: the ends of ratios must be above 0")
+    spread = np.geomspace if is_log else np.linspace
+    return [float(value) for value in spread(first, last, count)]
+
+
+def chunk_counts(words: Sequence[str]) -> dict[str, int] | None:
+    """Return the points in a chunk by axis of each ``NAME=COUNT``, None without any."""
+    found = {}
+    for word in words:
+        name, _, count = word.partition("=")
+        if not count.isdecimal():
+            raise click.UsageError(f"--chunk {word}: NAME=COUNT is needed")
+        found[name.replace("-", "_")] = int(count)
+    return found or None
+
+
+def named_reductions(
+    words: Sequence[str], settings: vkbloom.Settings
+) -> dict[str, reductions.Reduction]:
+    """Return the reduction of each ``[NAME=]KIND[:FRAMEBUFFER][@REFERENCE]``.
+
+    Parameters
+    ----------
+    words : sequence of str
+        REFERENCE is an image file, or a point as ``AXIS=VALUE,...``.
+    settings : Settings
+        Whose fields the axes vary.
+
+    Raises
+    ------
+    click.UsageError
+        A word is none of this.
+    OSError, ValueError
+        An image file cannot be read.
+    """
+    found: dict[str, reductions.Reduction] = {}
+    for word in words:
+        head, _, reference = word.partition("@")
+        name, sign, described = head.partition("=")
+        described = described if sign else name
+        kind, _, attachment = described.partition(":")
+        if kind not in REDUCTIONS:
+            raise click.UsageError(
+                f"--reduce {word}: {kind!r} is not one of {', '.join(REDUCTIONS)}"
+            )
+        arguments: dict[str, Any] = {"attachment": attachment} if attachment else {}
+        is_comparing = issubclass(REDUCTIONS[kind], reductions.Comparing)
+        if is_comparing != bool(reference):
+            needed = "needs @REFERENCE" if is_comparing else "has no @REFERENCE"
+            raise click.UsageError(f"--reduce {word}: {kind} {needed}")
+        if "=" in reference:
+            values = axis_values(reference.split(","), settings)
+            arguments["against"] = {axis: value[0] for axis, value in values.items()}
+        elif reference:
+            arguments["against"] = read(reference, 0).pixels
+        with blaming_the_call():
+            found[name if sign else kind] = REDUCTIONS[kind](**arguments)
+    return found

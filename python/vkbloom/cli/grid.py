@@ -1,0 +1,249 @@
+"""``vkbloom grid``: every combination of some values, into a Zarr store or image files."""
+
+from __future__ import annotations
+
+import logging
+import math
+import typing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+import vkbloom
+from vkbloom.cli import axis_options
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import SIZE
+from vkbloom.cli.image_files import COLOURS, note, read_picture, subimage_option
+from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
+from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.scene_options import scene_options
+from vkbloom.cli.settings_options import settings_options
+from vkbloom.extras import import_extra
+from vkbloom.grid.image_files import FileForm, GridFiles
+from vkbloom.grid.plan import Layout, ask
+from vkbloom.grid.rendering import render_grid
+from vkbloom.images import Colour, Picture
+from vkbloom.renderer import Shading
+
+_SHADINGS: Final = typing.get_args(Shading)
+_STORE: Final = ".zarr"
+
+
+@click.command(cls=CommandWithFile)
+@click.argument("images", metavar="[IMAGE]...", nargs=-1, type=click.Path())
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(),
+    help="NAME.zarr: a Zarr store, as is an URL that fsspec knows. Else a folder of image files.",
+)
+@click.option(
+    "--axis",
+    "axis_words",
+    metavar="NAME=VALUES",
+    multiple=True,
+    help="A settings field or time, and its values: FIRST:LAST:COUNT, FIRST:LAST:COUNT:log, or "
+    "A,B,... (A;B;... where values hold commas). Several make a grid, dimensions in this order.",
+)
+@click.option(
+    FILE_OPTION,
+    "options_file",
+    metavar="FILE",
+    help="A TOML or YAML file with options: their long names; tables settings, camera, axes, "
+    "reduce and chunks; the list images. Options given here come on top of it.",
+)
+@click.option("--size", type=SIZE, help="Of a scene's frames, in pixels [default 1280x720]")
+@click.option("--time", default=0.0, show_default=True, help="Of a scene's animation, in turns.")
+@click.option("--shading", type=click.Choice(_SHADINGS), default=_SHADINGS[0], show_default=True)
+@click.option(
+    "--attachments",
+    metavar="all|none|NAME,...",
+    default="final",
+    show_default=True,
+    help="The framebuffers to keep.",
+)
+@click.option(
+    "--reduce",
+    "reduce_words",
+    metavar="[NAME=]KIND[:FRAMEBUFFER][@REFERENCE]",
+    multiple=True,
+    help=f"A figure to keep: {', '.join(axis_options.REDUCTIONS)}. REFERENCE of the last three is "
+    "an image file or a point of the grid, AXIS=VALUE,...",
+)
+@click.option(
+    "--chunk",
+    "chunk_words",
+    metavar="AXIS=COUNT",
+    multiple=True,
+    help="Points in a chunk of the store [default about 1 MiB along the fastest axes]",
+)
+@click.option(
+    "--image-format",
+    "suffix",
+    metavar="EXTENSION",
+    default="png",
+    show_default=True,
+    help="Of image files: png, exr, tif, ...",
+)
+@click.option("--resume", is_flag=True, help="Go on with what is there, and mend what is damaged.")
+@click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Render in that many processes, through Dask.",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Render on the cluster of a Dask scheduler.")
+@click.option("--sheet", metavar="FILE", type=click.Path(), help="Write a contact sheet (PNG) too.")
+@click.option(
+    "--curves",
+    metavar="FILE",
+    type=click.Path(),
+    help="Draw the figures along the axes too: a PNG, SVG or PDF.",
+)
+@click.option(
+    "--input-colour",
+    type=click.Choice(COLOURS),
+    help="What the colours in IMAGE are, as for vkbloom apply.",
+)
+@click.option("--raw", is_flag=True, help="Take the values of 8-bit files as they are.")
+@subimage_option
+@device_options
+@scene_options
+@settings_options
+def command(
+    *,
+    images: tuple[str, ...],
+    out: str,
+    axis_words: tuple[str, ...],
+    options_file: str | None,
+    size: tuple[int, int] | None,
+    time: float,
+    shading: Shading,
+    attachments: str,
+    reduce_words: tuple[str, ...],
+    chunk_words: tuple[str, ...],
+    suffix: str,
+    resume: bool,
+    workers: int | None,
+    scheduler: str | None,
+    sheet: str | None,
+    curves: str | None,
+    input_colour: Colour | None,
+    raw: bool,
+    subimage: int,
+    adapter: str,
+    validation: bool,
+    scene: Callable[[], vkbloom.Scene],
+    settings: vkbloom.Settings,
+) -> None:
+    """Render every combination of some values.
+
+    The source is a scene, or each IMAGE, which are read as vkbloom apply reads them. Points are
+    rendered in the order that runs the fewest passes. A store can be opened while it is written;
+    what is killed goes on with --resume, and ends the same.
+    """
+    is_store = out.endswith(_STORE) or "://" in out
+    _check_combination(workers, scheduler, is_store, bool(reduce_words or chunk_words))
+    if not is_store and (sheet or curves):
+        raise click.UsageError(f"--sheet and --curves are for a store, NAME{_STORE}")
+    axes = axis_options.axis_values(axis_words, settings)
+    reduce = axis_options.named_reductions(reduce_words, settings)
+    pictures = [read_picture(image, subimage, input_colour, raw=raw) for image in images]
+    source = _source(images, pictures, scene)
+    shared: dict[str, Any] = {
+        "size": size,
+        "shading": shading,
+        "time": time,
+        "attachments": _names(attachments),
+        "reduce": reduce,
+    }
+    with blaming_the_call():
+        grid = ask(source, settings, axes, **shared)
+    with _client(workers, scheduler) as client:
+        device = {"client": client, "adapter": adapter, "validation": validation}
+        if is_store:
+            dataset = vkbloom.grid_to_zarr(
+                source,
+                settings,
+                axes,
+                out,
+                chunks=axis_options.chunk_counts(chunk_words),
+                resume=resume,
+                on_mended=note,
+                progress=True,
+                **shared,
+                **device,
+            )
+            ran, saved = dataset.attrs["passes_run"], dataset.attrs["passes_saved"]
+        else:
+            forms = [FileForm(one.encoding, one.numbers, one.grey) for one in pictures]
+
+            def prepared(layout: Layout) -> GridFiles:
+                files = GridFiles(Path(out), f".{suffix.lstrip('.')}", grid, layout, forms)
+                files.prepare(resume=resume)
+                return files
+
+            tally = render_grid(grid, prepared, progress=True, **device)
+            ran, saved = tally.ran, tally.saved
+    click.echo(f"wrote {out}, {math.prod(grid.shape)} points; passes run {ran}, saved {saved}")
+    if sheet:
+        Path(sheet).write_bytes(vkbloom.contact_sheet(dataset))
+        click.echo(f"wrote {sheet}")
+    if curves:
+        vkbloom.response_curves(dataset).savefig(curves)
+        click.echo(f"wrote {curves}")
+
+
+def _check_combination(
+    workers: int | None, scheduler: str | None, is_store: bool, needs_store: bool
+) -> None:
+    """Raise click.UsageError for options that do not go together."""
+    if workers and scheduler:
+        raise click.UsageError("--workers makes a cluster, --scheduler names one; give one of them")
+    if needs_store and not is_store:
+        raise click.UsageError(f"--reduce and --chunk are for a store, NAME{_STORE}")
+
+
+def _source(
+    images: Sequence[str], pictures: Sequence[Picture], scene: Callable[[], vkbloom.Scene]
+) -> Any:
+    if not images:
+        return scene()
+    if len(images) == 1:
+        return pictures[0].pixels
+    # By their files' names, or by number where a file is given twice.
+    labels = images if len(set(images)) == len(images) else map(str, range(len(images)))
+    return {label: picture.pixels for label, picture in zip(labels, pictures, strict=True)}
+
+
+def _names(attachments: str) -> str | tuple[str, ...]:
+    if attachments == "all":
+        return attachments
+    return () if attachments == "none" else tuple(attachments.split(","))
+
+
+@contextmanager
+def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
+    """Give a client of the cluster that was asked for, None without one."""
+    if not workers and not scheduler:
+        yield None
+        return
+    distributed = import_extra("distributed", "grid", "--workers and --scheduler")
+    if scheduler:
+        with distributed.Client(scheduler) as client:
+            yield client
+        return
+    with (
+        distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=None,
+            silence_logs=logging.ERROR,
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client

@@ -1,0 +1,248 @@
+"""Blocks of points rendered by the workers of a Dask cluster.
+
+Workers write what they render; only counts come back. Tasks are runs of neighbouring blocks, so
+that a run's points share passes, and no more of them are handed to the scheduler at a time than
+keep all workers at work.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import math
+import pickle
+import threading
+import warnings
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+from vkbloom._core import DeviceLostError, Error
+from vkbloom.extras import import_extra
+from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.order import Block
+from vkbloom.grid.plan import Grid, Layout, lay_out
+from vkbloom.grid.progress import Progress
+from vkbloom.grid.running import Sink, Writer, written_behind
+from vkbloom.renderer import Renderer
+
+# Dask's own types are incomplete.
+Client: TypeAlias = Any
+
+__all__ = ["check_client", "lay_out_there", "run_there"]
+
+_PURPOSE: Final = "A grid on a Dask cluster"
+_PLUGIN: Final = "vkbloom-renderers"
+# Runs under way for each worker: one at work, one waiting.
+_AHEAD: Final = 2
+# A run is short enough to share the work out and to lose, and long enough to be worth a task.
+_RUN_POINTS: Final = 4096
+_RUN_BYTES: Final = 64 << 20
+_RUNS_A_WORKER: Final = 8
+_RETRIES: Final = 2
+
+# A renderer a process and choice of adapter, with the lock of whoever uses it.
+_held: dict[tuple[str, bool], tuple[Renderer, threading.Lock]] = {}
+_held_lock = threading.Lock()
+
+
+def _renderer(adapter: str, validation: bool) -> tuple[Renderer, threading.Lock]:
+    with _held_lock:
+        key = (adapter, validation)
+        if key not in _held or _held[key][0].closed:
+            _held[key] = (Renderer(adapter, validation=validation), threading.Lock())
+        return _held[key]
+
+
+def close_renderers() -> None:
+    """Close the renderers of this process, each when its run is at its end."""
+    with _held_lock:
+        for renderer, lock in _held.values():
+            with lock:
+                renderer.close()
+        _held.clear()
+
+
+def _plugin() -> Any:
+    distributed = import_extra("distributed", "grid", _PURPOSE)
+
+    class Renderers(distributed.WorkerPlugin):  # type: ignore[misc, name-defined]
+        """Closes a worker's renderers when the grid or the worker is at its end."""
+
+        name = _PLUGIN
+
+        async def teardown(self, worker: Any) -> None:
+            # A run may still be at work, and the worker has to stay reachable.
+            await asyncio.to_thread(close_renderers)
+
+    return Renderers()
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What a task needs beside the grid."""
+
+    layout: Layout
+    writer: Writer
+    blocks: tuple[Block, ...]
+    adapter: str
+    validation: bool
+
+
+def _same(pickled: bytes) -> Grid:
+    grid: Grid = pickle.loads(pickled)
+    return grid
+
+
+def _lay_out(grid: Grid, adapter: str, validation: bool) -> Layout:
+    renderer, lock = _renderer(adapter, validation)
+    with lock:
+        return lay_out(grid, renderer)
+
+
+def _render(grid: Grid, run: _Run) -> Tally:
+    """Render and write a run's blocks; in a worker."""
+    renderer, lock = _renderer(run.adapter, run.validation)
+    with lock:
+        if renderer.info.name != run.layout.adapter:
+            raise ValueError(
+                f"adapter: this worker has {renderer.info.name}, the grid was begun on "
+                f"{run.layout.adapter}; their pictures would differ"
+            )
+        total = Tally()
+        try:
+            filler = Filler(grid, run.layout, renderer)
+            blocks = written_behind(filler, run.writer, run.blocks, run.layout, total.add)
+            run.writer.flush(list(blocks))
+        except DeviceLostError:
+            # The next try gets a new device.
+            renderer.close()
+            raise
+        return total
+
+
+def check_client(client: Any) -> None:
+    """Raise TypeError unless a client can be used from here."""
+    distributed = import_extra("distributed", "grid", _PURPOSE)
+    if not isinstance(client, distributed.Client):
+        raise TypeError(f"client: a dask.distributed.Client is needed, not {client!r}")
+    if client.asynchronous:
+        raise TypeError("client: one that waits is needed, not an asynchronous one")
+
+
+class _Shared:
+    """A grid's source, held by the cluster as the result of a task.
+
+    Other than scattered data, it is made again when the worker that held it dies.
+    """
+
+    def __init__(self, client: Client, grid: Grid) -> None:
+        cloudpickle = import_extra("cloudpickle", "grid", _PURPOSE)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Sending large graph", category=UserWarning)
+            self.future = client.submit(
+                _same, cloudpickle.dumps(grid), pure=False, retries=_RETRIES
+            )
+
+
+def lay_out_there(client: Client, grid: Grid, adapter: str, validation: bool) -> Layout:
+    """Ask a worker's renderer for a grid's layout; the client's machine may have none."""
+    shared = _Shared(client, grid)
+    layout: Layout = client.submit(
+        _lay_out, shared.future, adapter, validation, pure=False, retries=_RETRIES
+    ).result()
+    return layout
+
+
+def _runs(todo: Iterable[Block], layout: Layout, points: int) -> Iterator[tuple[Block, ...]]:
+    """Yield neighbouring blocks, together about as many points as asked for."""
+    most = max(1, min(points, _RUN_POINTS, _RUN_BYTES // max(layout.point_size, 1)))
+    found: list[Block] = []
+    for block in todo:
+        found.append(block)
+        if sum(one.count for one in found) >= most:
+            yield tuple(found)
+            found = []
+    if found:
+        yield tuple(found)
+
+
+def run_there(
+    client: Client,
+    grid: Grid,
+    layout: Layout,
+    sink: Sink,
+    todo: Iterable[Block],
+    *,
+    progress: Progress,
+    missing: int,
+    adapter: str,
+    validation: bool,
+) -> None:
+    """Render blocks on the workers of a cluster.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    grid : Grid
+    layout : Layout
+    sink : Sink
+        Its writer goes to the workers, its marks are made here.
+    todo : iterable of Block
+    progress : Progress
+    missing : int
+        Points of these blocks.
+    adapter, validation
+        Of the workers' renderers.
+
+    Raises
+    ------
+    Error
+        Every worker that took a run died.
+    Exception
+        What a run failed with after some more tries; other runs that were done are kept.
+    """
+    distributed = import_extra("distributed", "grid", _PURPOSE)
+    workers = max(1, len(client.nthreads()))
+    runs = _runs(todo, layout, math.ceil(missing / (workers * _RUNS_A_WORKER)))
+    shared = _Shared(client, grid)
+    under_way: dict[Any, tuple[Block, ...]] = {}
+    finished = distributed.as_completed()
+
+    def submit(count: int) -> None:
+        for blocks in itertools.islice(runs, max(0, count)):
+            run = _Run(layout, sink.writer, blocks, adapter, validation)
+            future = client.submit(_render, shared.future, run, pure=False, retries=_RETRIES)
+            under_way[future] = blocks
+            finished.add(future)
+
+    def take(future: Any) -> None:
+        blocks = under_way.pop(future)
+        progress.add(future.result())
+        sink.mark(blocks)
+
+    client.register_plugin(_plugin(), name=_PLUGIN)
+    try:
+        submit(_AHEAD * workers)
+        for future in finished:
+            take(future)
+            # Workers may come and go.
+            submit(_AHEAD * max(1, len(client.nthreads())) - len(under_way))
+    except BaseException as error:
+        _stop(client, under_way, take)
+        if isinstance(error, distributed.KilledWorker):
+            raise Error(f"too many workers died: {error}") from error
+        raise
+    finally:
+        client.unregister_worker_plugin(_PLUGIN)
+
+
+def _stop(client: Client, under_way: dict[Any, tuple[Block, ...]], take: Any) -> None:
+    """Keep the runs that are done, and call the others off."""
+    # What has stopped the grid, such as a full disk, may keep these from being marked, too.
+    with contextlib.suppress(OSError):
+        for future in list(under_way):
+            if future.status == "finished":
+                take(future)
+    client.cancel(list(under_way), force=True)

@@ -1,0 +1,156 @@
+"""Curves of a grid: how figures change along one axis, a line for each value of another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vkbloom.extras import import_extra
+from vkbloom.grid import views
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+__all__ = ["response_curves"]
+
+_WIDTH, _HEIGHT = 6.4, 3.2  # inches of one diagram
+
+
+def response_curves(
+    dataset: xarray.Dataset,
+    axis: str | None = None,
+    lines: str | None = None,
+    *,
+    variables: Sequence[str] | None = None,
+    at: Mapping[str, Any] | None = None,
+    most: int = 8,
+) -> Figure:
+    """Draw how figures change along an axis.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        From `vkbloom.Renderer.grid`, `vkbloom.grid_to_zarr`, or the latter's store opened by
+        xarray; also a part of it.
+    axis : str, optional
+        Goes across. By default the axis of numbers with the most values.
+    lines : str, optional
+        Has a line for each of its values. By default the next axis with more than one value, or
+        for a figure that is an array, such as an encircled energy, its own dimension.
+    variables : sequence of str, optional
+        A diagram each. By default all figures that are no framebuffers; where there are none, the
+        mean of red, green and blue of every framebuffer.
+    at : mapping of str to object, optional
+        Where to stand along the other axes (the nearest number, or that text); by default at their
+        first value.
+    most : int
+        Lines of a diagram; of more values as many are shown, evenly spread.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Has ``savefig``, and shows itself in a notebook. Points that are not done are left out.
+
+    Raises
+    ------
+    TypeError, ValueError
+        The Dataset is no grid, or an argument is wrong.
+    ModuleNotFoundError
+        matplotlib is missing.
+    """
+    figure_module = import_extra("matplotlib.figure", "grid", "response_curves")
+    axes = views.axes_of(dataset)
+    for field, chosen in (("axis", axis), ("lines", lines)):
+        if chosen is not None and chosen not in axes:
+            raise ValueError(f"{field}: {chosen!r} is not an axis of the grid: {', '.join(axes)}")
+    if axis is None:
+        long = [name for name in axes if name != lines and dataset.sizes[name] > 1]
+        if not long:
+            raise ValueError("dataset: no axis of the grid has more than one value")
+        # The numbers first; among them the longest.
+        axis = max(long, key=lambda name: (_is_number(dataset, name), dataset.sizes[name]))
+    if axis == lines:
+        raise ValueError(f"lines: {lines!r} goes across already")
+    figures = _figures(dataset, variables, axes)
+    figure: Figure = figure_module.Figure(
+        figsize=(_WIDTH, _HEIGHT * len(figures)), layout="constrained"
+    )
+    diagrams = figure.subplots(len(figures), 1, squeeze=False)[:, 0]
+    for diagram, (name, values) in zip(diagrams, figures.items(), strict=True):
+        _draw(diagram, dataset, values.rename(name), (axis, lines), (at, most))
+    return figure
+
+
+def _is_number(dataset: xarray.Dataset, name: str) -> bool:
+    return dataset[name].dtype.kind in "iuf"
+
+
+def _figures(
+    dataset: xarray.Dataset, variables: Sequence[str] | None, axes: Sequence[str]
+) -> dict[str, xarray.DataArray]:
+    """Return the figures to draw, by what they are called."""
+    frames = list(views.framebuffers_of(dataset))
+    others = [str(name) for name in dataset.data_vars if name not in (*frames, "done")]
+    chosen = list(others or frames) if variables is None else list(variables)
+    found = {}
+    for name in chosen:
+        if name not in (*frames, *others):
+            raise ValueError(f"variables: {name!r} is not one of {', '.join((*others, *frames))}")
+        array = dataset[name]
+        if name in frames:
+            channel = [dim for dim in array.dims if str(dim).endswith("channel")]
+            scale = 255 if array.dtype == np.uint8 else 1
+            colours = array.isel({dim: slice(0, 3) for dim in channel})
+            kept = [dim for dim in array.dims if dim not in axes]
+            array = colours.mean(kept, dtype=np.float64) / scale
+            name = f"mean of {name}"  # noqa: PLW2901  what it is from here on
+        if "done" in dataset:
+            array = array.where(dataset["done"])
+        array.attrs = dict(dataset[name].attrs) if name in others else {}
+        found[name] = array
+    return found
+
+
+def _draw(
+    diagram: Any,
+    dataset: xarray.Dataset,
+    values: xarray.DataArray,
+    named: tuple[str, str | None],
+    chosen: tuple[Mapping[str, Any] | None, int],
+) -> None:
+    axis, lines = named
+    at, most = chosen
+    own = [str(dim) for dim in values.dims if dim not in views.axes_of(dataset)]
+    if len(own) > 1:
+        raise ValueError(f"variables: {values.name} has {len(own)} dimensions of its own")
+    if lines is None and not own:
+        free = [d for d in views.axes_of(dataset) if d not in (axis, *(at or {}))]
+        lines = next((name for name in reversed(free) if dataset.sizes[name] > 1), None)
+    across = own[0] if lines is None and own else lines
+    # As a Dataset, which keeps where it stands along the other axes.
+    table = dataset.drop_vars(list(dataset.data_vars)).assign(value=values)
+    shown = [name for name in (axis, lines) if name is not None]
+    part = views.select(table, at, shown)
+    if own and across != own[0]:
+        part = part.isel({own[0]: 0})
+    part = views.thinned(part, across, most)
+    coordinate = part[axis].values
+    x: Any = (
+        coordinate if _is_number(dataset, axis) else [views.label(value) for value in coordinate]
+    )
+    for place in range(part.sizes[across] if across else 1):
+        line = part["value"].isel({across: place}) if across else part["value"]
+        label = f"{across}={views.label(part[across].values[place])}" if across else None
+        diagram.plot(x, line.transpose(axis).values, marker=".", label=label)
+    unit = dataset[axis].attrs.get("units", "1")
+    diagram.set_xlabel(axis if unit in ("1", "") else f"{axis} ({unit})")
+    unit = values.attrs.get("units", "1")
+    diagram.set_ylabel(str(values.name) if unit == "1" else f"{values.name} ({unit})")
+    diagram.set_title(views.caption(part), fontsize="small")
+    diagram.grid(alpha=0.3)
+    if across:
+        # Beside the diagram, where no line is hidden.
+        diagram.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1, 1))

@@ -1,0 +1,156 @@
+"""Blocks of points, rendered and reduced into arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.frames import Frames
+from vkbloom.grid.order import Block, Index, points
+from vkbloom.grid.plan import Grid, Layout, PassCounter, checked_value
+from vkbloom.grid.reductions import Comparing
+from vkbloom.grid.sources import visit
+
+if TYPE_CHECKING:
+    from vkbloom.renderer import Renderer
+
+__all__ = ["Filler", "Tally"]
+
+
+@dataclass
+class Tally:
+    """Passes counted over some points.
+
+    Parameters
+    ----------
+    points : int
+    ran : int
+        Passes that ran, those for points to compare with included.
+    alone : int
+        Passes of the same points, each rendered alone and no form standing for several passes.
+    """
+
+    points: int = 0
+    ran: int = 0
+    alone: int = 0
+
+    @property
+    def saved(self) -> int:
+        """Passes that did not have to run."""
+        return self.alone - self.ran
+
+    def add(self, other: Tally) -> None:
+        """Count what another counted."""
+        self.points += other.points
+        self.ran += other.ran
+        self.alone += other.alone
+
+
+class Filler:
+    """Renders points of one grid on one renderer.
+
+    Parameters
+    ----------
+    grid : Grid
+    layout : Layout
+    renderer : Renderer
+    """
+
+    def __init__(self, grid: Grid, layout: Layout, renderer: Renderer) -> None:
+        self._grid = grid
+        self._layout = layout
+        self._renderer = renderer
+        self._counter = PassCounter(grid, layout, renderer)
+        self._references = grid.references()
+        self._held: dict[tuple[str, Index], NDArray[Any]] = {}
+
+    def fill(
+        self,
+        block: Block,
+        arrays: Mapping[str, NDArray[Any]],
+        on_point: Callable[[Tally], object] = lambda tally: None,
+    ) -> Tally:
+        """Render the points of a block.
+
+        Parameters
+        ----------
+        block : Block
+        arrays : mapping of str to ndarray
+            By variable, of the block's shape and then the variable's; they are filled.
+        on_point : callable
+            Called with the count of each point when it is there, and with that of the frames to
+            compare with.
+
+        Returns
+        -------
+        Tally
+
+        Raises
+        ------
+        ValueError
+            A point has another shape or dtype than the first; the message names it.
+        """
+        grid, total = self._grid, Tally()
+        order = list(points(block, self._layout.ranking))
+        if self._references:
+            total.add(Tally(ran=self._hold_references(order)))
+            on_point(total)
+        # Before the points, as a renderer may be at work on some ahead of those it has given.
+        alone = [self._counter.alone(index) for index in order]
+        path = (grid.point(index) for index in order)
+        found = visit(self._renderer, grid.source, path, grid.wanted)
+        for (index, frames), passes in zip(found, alone, strict=True):
+            place = tuple(i - start for i, start in zip(index, block.start, strict=True))
+            for name, array in arrays.items():
+                self._put(name, index, frames, array, place)
+            count = Tally(1, len(frames.timings), passes)
+            total.add(count)
+            on_point(count)
+        return total
+
+    def _put(
+        self, name: str, index: Index, frames: Frames, array: NDArray[Any], place: Index
+    ) -> None:
+        variable = self._layout.variables[name]
+        reduction = self._grid.reduce.get(name)
+        if reduction is None:
+            value = frames[name]
+        else:
+            if name in self._references and isinstance(reduction, Comparing):
+                reference = self._held[reduction.attachment, self._reference(name, index)]
+                reduction = dataclasses.replace(reduction, against=reference)
+            value = checked_value(name, reduction(frames))
+        if value.shape != variable.shape or not np.can_cast(
+            value.dtype, variable.dtype, "same_kind"
+        ):
+            raise ValueError(
+                f"{name}: {value.shape} {value.dtype} at {self._grid.named(index)}, but "
+                f"{variable.shape} {variable.dtype} at the grid's first point"
+            )
+        array[place] = value
+
+    def _reference(self, name: str, index: Index) -> Index:
+        """Return the point that a reduction compares the one at an index with."""
+        fixed = self._references[name]
+        return tuple(fixed.get(number, place) for number, place in enumerate(index))
+
+    def _hold_references(self, order: list[Index]) -> int:
+        """Render what the points are compared with, and return the passes that ran."""
+        needed: dict[tuple[str, Index], None] = {}
+        for name in self._references:
+            attachment = self._grid.reduce[name].attachment  # type: ignore[attr-defined]
+            needed.update({(attachment, self._reference(name, index)): None for index in order})
+        self._held = {key: array for key, array in self._held.items() if key in needed}
+        missing = [key for key in needed if key not in self._held]
+        names = sorted({attachment for attachment, _ in missing})
+        path = (self._grid.point(index) for index in dict.fromkeys(index for _, index in missing))
+        ran = 0
+        for index, frames in visit(self._renderer, self._grid.source, path, names):
+            self._held.update({(name, index): frames[name] for name in names})
+            ran += len(frames.timings)
+        return ran

@@ -1,0 +1,105 @@
+"""What makes a grid that is kept the same grid again, and what differs where it is not."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from vkbloom.grid.order import Index
+from vkbloom.grid.plan import Grid, Layout
+from vkbloom.grid.reductions import Reduction
+from vkbloom.grid.sources import digest
+
+__all__ = ["FORMAT", "differences", "identity"]
+
+#: Of the stores' own layout; another number cannot be read.
+FORMAT: Final = 1
+
+_LONGEST: Final = 60  # letters of a value in a message
+
+
+def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
+    """Return all that decides what a grid's arrays hold, as plain values.
+
+    Parameters
+    ----------
+    grid : Grid
+    layout : Layout
+    chunk : tuple of int
+
+    Returns
+    -------
+    dict
+    """
+    found = {
+        "format": FORMAT,
+        "version": layout.version,
+        "adapter": layout.adapter,
+        "driver": layout.driver,
+        "source": grid.source.description,
+        "settings": grid.remaining_settings,
+        "axes": {axis.name: axis.values for axis in grid.axes},
+        "order of axes": [axis.name for axis in grid.axes],
+        "variables": {
+            name: {"shape": variable.shape, "dtype": variable.dtype.name}
+            for name, variable in layout.variables.items()
+        },
+        "reduce": {name: _reduction(reduction) for name, reduction in grid.reduce.items()},
+        "chunk": chunk,
+    }
+    # As it comes back from the store: tuples are lists there.
+    plain: dict[str, Any] = json.loads(json.dumps(found))
+    return plain
+
+
+def _reduction(reduction: Any) -> str:
+    if not isinstance(reduction, Reduction):
+        kind = reduction if hasattr(reduction, "__qualname__") else type(reduction)
+        return f"{kind.__module__}.{kind.__qualname__}"
+    parts = []
+    for field in dataclasses.fields(reduction):
+        value = getattr(reduction, field.name)
+        text = f"sha256 {digest(value)}" if isinstance(value, np.ndarray) else repr(value)
+        parts.append(f"{field.name}={text}")
+    return f"{type(reduction).__name__}({', '.join(parts)})"
+
+
+def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
+    """Tell what differs between the grid in a store and the one asked for.
+
+    Parameters
+    ----------
+    stored, asked : mapping
+        From `identity`.
+
+    Returns
+    -------
+    list of str
+        One phrase each; empty where they are the same.
+    """
+    return list(_differences("", stored, asked))
+
+
+def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
+    if isinstance(stored, Mapping) and isinstance(asked, Mapping):
+        for key in dict.fromkeys((*stored, *asked)):
+            inner = f"{name}.{key}" if name else key
+            if key not in stored:
+                yield f"{inner}: not in the store, {_short(asked[key])} asked for"
+            elif key not in asked:
+                yield f"{inner}: {_short(stored[key])} in the store, not asked for"
+            else:
+                yield from _differences(inner, stored[key], asked[key])
+    elif stored != asked:
+        yield f"{name}: {_short(stored)} in the store, {_short(asked)} asked for"
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    if len(text) <= _LONGEST:
+        return text
+    return f"{text[: _LONGEST - 20]} ... {text[-12:]}"

@@ -1,0 +1,188 @@
+"""A grid as image files, one or several a point."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import image_writing
+from vkbloom.frames import Frames
+from vkbloom.grid.identity import differences, identity
+from vkbloom.grid.memory import chunk_of
+from vkbloom.grid.order import Block, Index, blocks, points
+from vkbloom.grid.plan import Grid, Layout
+from vkbloom.grid.running import Writer
+from vkbloom.grid.sources import ImageSource
+from vkbloom.images import Encoding, Picture
+
+__all__ = ["FileForm", "GridFiles"]
+
+_INDEX: Final = "grid.json"
+
+
+@dataclass(frozen=True)
+class FileForm:
+    """What the files of an image's `final` hold, as `vkbloom.images.Picture` has it."""
+
+    encoding: Encoding | None
+    numbers: str
+    grey: bool
+
+
+@dataclass(frozen=True)
+class _FileWriter:
+    """Writes the files of points, in whatever process renders them."""
+
+    folder: Path
+    suffix: str
+    grid: Grid
+    layout: Layout
+    forms: tuple[FileForm, ...]
+
+    def paths(self, index: Index) -> dict[str, Path]:
+        """Return a point's files by framebuffer."""
+        number = "_".join(
+            f"{place:0{max(3, len(str(count - 1)))}}"
+            for place, count in zip(index, self.grid.shape, strict=True)
+        )
+        names = list(self.layout.variables)
+        return {
+            name: self.folder / f"{'_'.join(filter(None, (number, name)))}{self.suffix}"
+            for name in names
+        }
+
+    def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write the files of a block's points, each when it is whole."""
+        for index in points(block, self.layout.ranking):
+            place = tuple(i - start for i, start in zip(index, block.start, strict=True))
+            for name, path in self.paths(index).items():
+                self._save(index, name, arrays[name][place], path)
+
+    def _save(self, index: Index, name: str, array: NDArray[Any], path: Path) -> None:
+        point = self.grid.point(index)
+        if name == "final" and self.forms:
+            form = self.forms[int(point.place)]
+            encoded = point.settings.encoding
+            picture = replace(
+                Picture.of_values(array, form.numbers),
+                encoding=form.encoding if encoded == "none" else encoded,
+                grey=form.grey,
+            )
+            facts = {"vkbloom:settings": json.dumps(point.settings.as_dict())}
+            image_writing.save(picture, path, None, facts)
+            return
+        info = {"adapter": self.layout.adapter, "driver": self.layout.driver}
+        frames = Frames({name: array}, timings={}, settings=point.settings, info=info)
+        for written in frames.save(path):
+            # What the format cannot hold becomes an OpenEXR file beside it.
+            if written != path:
+                written.replace(path.with_suffix(".exr"))
+
+    def is_there(self, index: Index) -> bool:
+        """Return whether all files of a point are there."""
+        return all(
+            path.exists() or path.with_suffix(".exr").exists()
+            for path in self.paths(index).values()
+        )
+
+    def flush(self, written: Iterable[Block]) -> None:
+        """Do nothing: a file has its name when it is whole."""
+
+
+class GridFiles:
+    """A folder of image files, ``<index along each axis>_<framebuffer>``, with ``grid.json``.
+
+    Parameters
+    ----------
+    folder : Path
+    suffix : str
+        Of the image files, such as ".png". A framebuffer that the format cannot hold as it is
+        becomes an ``.exr``.
+    grid : Grid
+        Without reductions.
+    layout : Layout
+    forms : sequence of FileForm
+        How `final` is written, by image; empty: as it is.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        suffix: str,
+        grid: Grid,
+        layout: Layout,
+        forms: Sequence[FileForm] = (),
+    ) -> None:
+        image_writing.check_writable(f"image{suffix}")
+        # Writers are sent with every task, and need not know the pixels.
+        light = replace(grid, source=ImageSource(()))
+        self._files = _FileWriter(folder.absolute(), suffix, light, layout, tuple(forms))
+        self._identity = {**identity(grid, layout, ()), "suffix": suffix}
+        self._chunk = chunk_of(grid, layout)
+        self.done = np.zeros(grid.shape, np.bool_)
+
+    @property
+    def writer(self) -> Writer:
+        """What writes files, in any process."""
+        return self._files
+
+    def _blocks(self) -> Iterable[Block]:
+        files = self._files
+        return blocks(files.grid.shape, self._chunk, files.layout.ranking)
+
+    def missing(self) -> Iterable[Block]:
+        """Return the blocks that are not done, in the order of visiting."""
+        return (block for block in self._blocks() if not self.done[block.slices].all())
+
+    def mark(self, written: Iterable[Block]) -> None:
+        """Count points as done."""
+        for block in written:
+            self.done[block.slices] = True
+
+    def prepare(self, *, resume: bool) -> None:
+        """Make the folder, or find out what is in it.
+
+        Parameters
+        ----------
+        resume : bool
+            Whether a folder with a grid may be gone on with.
+
+        Raises
+        ------
+        FileExistsError
+            There is a grid and `resume` is False.
+        ValueError
+            There is something else, or a grid that differs. Nothing was written.
+        """
+        files = self._files
+        index = files.folder / _INDEX
+        own = self._identity
+        if not files.folder.exists() or not any(files.folder.iterdir()):
+            files.folder.mkdir(parents=True, exist_ok=True)
+            temporary = index.with_suffix(".partial")
+            temporary.write_text(json.dumps(own, indent=1))
+            temporary.replace(index)
+            return
+        try:
+            stored = json.loads(index.read_text())
+        except FileNotFoundError:
+            raise ValueError(
+                f"{files.folder}: there is no grid in it, but something else"
+            ) from None
+        except ValueError as error:
+            raise ValueError(f"{index}: damaged, {error}") from error
+        if not resume:
+            raise FileExistsError(
+                f"{files.folder}: there is a grid already; resume it, or name another folder"
+            )
+        found = differences(stored, own)
+        if found:
+            raise ValueError(f"{files.folder}: another grid is there; {'; '.join(found)}")
+        for place in np.ndindex(files.grid.shape):
+            self.done[place] = files.is_there(place)

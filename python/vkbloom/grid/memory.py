@@ -1,0 +1,89 @@
+"""A grid in memory, as one Dataset."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vkbloom.extras import import_extra
+from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.order import blocks, default_chunk
+from vkbloom.grid.plan import Grid, Layout, attributes_of, lay_out
+from vkbloom.grid.progress import Progress
+
+if TYPE_CHECKING:
+    import xarray
+
+    from vkbloom.renderer import Renderer
+
+__all__ = ["BLOCK_BYTES", "BLOCK_POINTS", "chunk_of", "in_memory"]
+
+#: What a block may hold: enough for a file that is worth its name, little enough to lose.
+BLOCK_BYTES = 1 << 20
+BLOCK_POINTS = 1024
+# Frames to compare with may take more than what is stored of a point.
+_REFERENCE_BYTES = 64 << 20
+
+
+def chunk_of(grid: Grid, layout: Layout) -> tuple[int, ...]:
+    """Return the number of a block's points along each axis."""
+    stored = layout.point_size - layout.reference_size
+    most = min(
+        BLOCK_POINTS,
+        BLOCK_BYTES // max(stored, 1),
+        _REFERENCE_BYTES // max(layout.reference_size, 1),
+    )
+    return default_chunk(grid.shape, layout.ranking, max(most, 1))
+
+
+def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.Dataset:
+    """Render a grid into a Dataset.
+
+    Parameters
+    ----------
+    grid : Grid
+    renderer : Renderer
+    progress : bool or None
+        As for `vkbloom.Renderer.grid`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `vkbloom.Renderer.grid` describes it.
+    """
+    xr = import_extra("xarray", "grid", "Renderer.grid")
+    layout = lay_out(grid, renderer)
+    shape = grid.shape
+    arrays = {
+        name: np.empty((*shape, *variable.shape), variable.dtype)
+        for name, variable in layout.variables.items()
+    }
+    filler = Filler(grid, layout, renderer)
+    with Progress(math.prod(shape), shown=progress) as shown:
+        shown.add(Tally(ran=layout.ran))
+        for block in blocks(shape, chunk_of(grid, layout), layout.ranking):
+            views = {name: array[block.slices] for name, array in arrays.items()}
+            filler.fill(block, views, shown.add)
+    dims = tuple(axis.name for axis in grid.axes)
+    attributes: dict[str, Any] = {
+        **attributes_of(grid, layout),
+        "passes_run": shown.tally.ran,
+        "passes_saved": shown.tally.saved,
+    }
+    dataset: xarray.Dataset = xr.Dataset(
+        {
+            name: ((*dims, *variable.dims), arrays[name], dict(variable.attributes))
+            for name, variable in layout.variables.items()
+        },
+        coords={
+            **{axis.name: ((axis.name,), axis.coordinate, axis.attributes) for axis in grid.axes},
+            **{
+                name: ((name,), values, dict(attrs))
+                for name, (values, attrs) in layout.coordinates.items()
+            },
+        },
+        attrs=attributes,
+    )
+    return dataset

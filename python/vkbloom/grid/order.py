@@ -1,0 +1,147 @@
+"""The order in which the points of a grid are visited, and the blocks that they come in.
+
+One step changes one axis only, as in a reflected (Gray) counting: the last value of a fast axis is
+followed by the same value at the next value of a slower one, and the fast axis then runs backwards.
+A step so costs what its own axis puts out of date, nothing more.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+__all__ = ["Block", "Index", "blocks", "default_chunk", "points"]
+
+Index = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Neighbouring points of a grid: a box along its axes.
+
+    Parameters
+    ----------
+    start, stop : tuple of int
+        The box, by axis.
+    backwards : tuple of bool
+        By axis, whether it begins with the box's last value.
+    """
+
+    start: Index
+    stop: Index
+    backwards: tuple[bool, ...]
+
+    @property
+    def shape(self) -> Index:
+        """Number of values by axis."""
+        return tuple(stop - start for start, stop in zip(self.start, self.stop, strict=True))
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    @property
+    def slices(self) -> tuple[slice, ...]:
+        """Select the box from an array with one dimension an axis."""
+        return tuple(slice(*ends) for ends in zip(self.start, self.stop, strict=True))
+
+
+def _reflected(position: int, radices: Sequence[int]) -> Iterator[int]:
+    """Yield the digits of a position in reflected counting, the slowest first."""
+    for place in range(len(radices)):
+        sweeps, digit = divmod(position // math.prod(radices[place + 1 :]), radices[place])
+        yield radices[place] - 1 - digit if sweeps % 2 else digit
+
+
+def blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block]:
+    """Yield all blocks of a grid in the order in which they are visited.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of values by axis.
+    chunk : tuple of int
+        Number of a block's values by axis; the last block of an axis may have fewer.
+    ranking : sequence of int
+        The axes from the slowest to the fastest.
+
+    Yields
+    ------
+    Block
+        The last point of each and the first of the next differ along one axis.
+    """
+    counts = [-(-shape[axis] // chunk[axis]) for axis in ranking]
+    backwards = [False] * len(shape)
+    for position in range(math.prod(counts)):
+        start, stop = [0] * len(shape), [1] * len(shape)
+        for axis, number in zip(ranking, _reflected(position, counts), strict=True):
+            start[axis] = number * chunk[axis]
+            stop[axis] = min(start[axis] + chunk[axis], shape[axis])
+        block = Block(tuple(start), tuple(stop), tuple(backwards))
+        yield block
+        # Each axis has been swept once for every point of the slower ones within the block.
+        sweeps = 1
+        for axis in ranking:
+            backwards[axis] ^= bool(sweeps % 2)
+            sweeps *= block.shape[axis]
+
+
+def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
+    """Yield the points of a block in the order in which they are visited.
+
+    Parameters
+    ----------
+    block : Block
+    ranking : sequence of int
+        The axes from the slowest to the fastest.
+
+    Yields
+    ------
+    tuple of int
+        The place along each axis, in the grid's order of axes.
+    """
+    shape = block.shape
+    index = list(block.start)
+
+    def sweep(depth: int, backwards: list[bool]) -> Iterator[Index]:
+        if depth == len(ranking):
+            yield tuple(index)
+            return
+        axis = ranking[depth]
+        numbers = range(block.start[axis], block.stop[axis])
+        for number in reversed(numbers) if backwards[axis] else numbers:
+            index[axis] = number
+            yield from sweep(depth + 1, backwards)
+        backwards[axis] ^= True
+
+    # Along an axis of one value there is no direction to turn.
+    return itertools.islice(sweep(0, list(block.backwards)), math.prod(shape))
+
+
+def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
+    """Return a chunk of whole fast axes, as far as it stays within a number of points.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of values by axis.
+    ranking : sequence of int
+        The axes from the slowest to the fastest.
+    most : int
+        Points of a chunk, 1 or more.
+
+    Returns
+    -------
+    tuple of int
+        Visiting block by block is then visiting in the order of a grid without blocks.
+    """
+    chunk = [1] * len(shape)
+    for axis in reversed(ranking):
+        chunk[axis] = max(1, min(shape[axis], most))
+        most //= chunk[axis]
+        if chunk[axis] < shape[axis]:
+            break
+    return tuple(chunk)

@@ -1,0 +1,420 @@
+"""A grid as it was asked for, and what a renderer says of it before anything is rendered."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.dimensions import dimensions, leading
+from vkbloom.frames import Frames
+from vkbloom.grid import passes
+from vkbloom.grid.axes import Axis, image_axis, read_axes
+from vkbloom.grid.order import Index
+from vkbloom.grid.reductions import Comparing, Reduction
+from vkbloom.grid.sources import Framebuffers, Point, Source, read_source, visit
+from vkbloom.settings import Settings
+
+if TYPE_CHECKING:
+    from vkbloom.renderer import Renderer
+
+__all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out"]
+
+Reduce = Mapping[str, Callable[[Frames], Any]]
+
+_CHANNELS: Final = ("r", "g", "b", "a")
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A grid as it was asked for.
+
+    Parameters
+    ----------
+    source : Source
+    settings : Settings
+        What the axes vary.
+    axes : tuple of Axis
+        In the order of the result's dimensions.
+    attachments : "all" or tuple of str
+        The framebuffers to keep.
+    reduce : mapping of str to callable
+    """
+
+    source: Source
+    settings: Settings
+    axes: tuple[Axis, ...]
+    attachments: str | tuple[str, ...]
+    reduce: Reduce
+
+    @property
+    def shape(self) -> Index:
+        """Number of values by axis."""
+        return tuple(len(axis) for axis in self.axes)
+
+    @property
+    def wanted(self) -> str | tuple[str, ...]:
+        """The framebuffers to ask the renderer for."""
+        names = self.attachments
+        for reduction in self.reduce.values():
+            needed = getattr(reduction, "attachments", "all")
+            if "all" in (names, needed):
+                return "all"
+            names = tuple(dict.fromkeys((*names, *needed)))
+        return names
+
+    def point(self, index: Index) -> Point:
+        """Return the point at an index."""
+        return passes.point_at(self.source, self.settings, self.axes, index)
+
+    def named(self, index: Index) -> str:
+        """Return a point in words, for messages."""
+        values = (f"{axis.name}={axis.label(i)}" for axis, i in zip(self.axes, index, strict=True))
+        return ", ".join(values) or "the only point"
+
+    @property
+    def remaining_settings(self) -> dict[str, Any]:
+        """The settings that no axis varies, and the method."""
+        varied = {axis.name for axis in self.axes}
+        return {k: v for k, v in self.settings.as_dict().items() if k not in varied}
+
+    def references(self) -> dict[str, dict[int, int]]:
+        """Return the points that reductions compare with, as places by number of the axis."""
+        found: dict[str, dict[int, int]] = {}
+        for name, reduction in self.reduce.items():
+            against = getattr(reduction, "against", None)
+            if isinstance(reduction, Comparing) and isinstance(against, Mapping):
+                found[name] = {}
+                for key, value in against.items():
+                    numbers = [i for i, axis in enumerate(self.axes) if axis.name == key]
+                    if not numbers:
+                        raise ValueError(f"against: {key!r} is not an axis of the grid")
+                    found[name][numbers[0]] = self.axes[numbers[0]].find(value)
+        return found
+
+
+@dataclass(frozen=True)
+class Variable:
+    """What is kept of every point under one name."""
+
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    attributes: Mapping[str, str]
+
+    @property
+    def size(self) -> int:
+        """Bytes of one point."""
+        return int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a renderer says of a grid.
+
+    Parameters
+    ----------
+    ranking : tuple of int
+        The axes from the slowest to the fastest.
+    variables : mapping of str to Variable
+    coordinates : mapping of str to (array, attributes)
+        Of dimensions that are no axes.
+    reference_size : int
+        Bytes of the frames that one point is compared with.
+    structural : tuple of int
+        The axes that change the passes or the framebuffers that there are.
+    ran : int
+        Passes that ran to find out what the reductions return.
+    adapter, driver, version : str
+    """
+
+    ranking: tuple[int, ...]
+    variables: Mapping[str, Variable]
+    coordinates: Mapping[str, tuple[NDArray[Any], Mapping[str, str]]]
+    reference_size: int
+    structural: tuple[int, ...]
+    ran: int
+    adapter: str
+    driver: str
+    version: str
+
+    @property
+    def point_size(self) -> int:
+        """Bytes that a point takes in memory."""
+        return sum(variable.size for variable in self.variables.values()) + self.reference_size
+
+
+def ask(
+    source: object,
+    settings: Settings | None,
+    axes: Mapping[str, Any] | None,
+    *,
+    size: tuple[int, int] | None,
+    shading: str,
+    time: float,
+    attachments: str | Sequence[str],
+    reduce: Reduce | None,
+) -> Grid:
+    """Check the arguments that all grids share.
+
+    Parameters
+    ----------
+    source, settings, axes, size, shading, time, attachments, reduce
+        As for `vkbloom.Renderer.grid`.
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    TypeError, ValueError
+        One of them is wrong.
+    """
+    from vkbloom.renderer import _check_attachments, _check_settings  # noqa: PLC0415  it imports us
+
+    settings = _check_settings(settings)
+    checked = read_source(source, size, shading, time)
+    found = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
+    if checked.labels:
+        found = (image_axis(checked.labels), *found)
+    names = _check_attachments(attachments)
+    reductions = {} if reduce is None else dict(reduce)
+    taken = {"y", "x", "channel", "done", *(axis.name for axis in found), *(names or ())}
+    for name, reduction in reductions.items():
+        if not isinstance(name, str) or not name.isidentifier() or name in taken:
+            raise ValueError(f"reduce: {name!r} cannot name a variable of this grid")
+        if not callable(reduction):
+            raise TypeError(f"reduce: {name} must be callable, not {reduction!r}")
+    if names == () and not reductions:
+        raise ValueError("attachments: nothing is asked for, neither framebuffers nor reductions")
+    grid = Grid(checked, settings, found, "all" if names is None else names, reductions)
+    grid.references()
+    return grid
+
+
+def lay_out(grid: Grid, renderer: Renderer) -> Layout:
+    """Ask a renderer for all that has to be known of a grid before its points are rendered.
+
+    Parameters
+    ----------
+    grid : Grid
+    renderer : Renderer
+
+    Returns
+    -------
+    Layout
+
+    Raises
+    ------
+    ValueError
+        A framebuffer does not exist, or its shape or dtype is not the same at all points; nothing
+        was rendered.
+    """
+    framebuffers, structural = _survey(grid, renderer)
+    variables = _frame_variables(framebuffers)
+    coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
+    for variable in variables.values():
+        if len(variable.dims) == 3:
+            labels = np.array(_CHANNELS[: variable.shape[2]])
+            coordinates[variable.dims[2]] = (labels, {"long_name": "channel"})
+    reference_size = ran = 0
+    if grid.reduce:
+        sample = _sample(grid, renderer)
+        ran = len(sample.timings)
+        for name, reduction in grid.reduce.items():
+            value = _reduced(grid, name, sample)
+            variables[name], own = _reduction_variable(name, reduction, value)
+            coordinates.update(own)
+            if name in grid.references() and isinstance(reduction, Reduction):
+                reference_size += sample[reduction.attachment].nbytes
+    return Layout(
+        ranking=passes.ranking(renderer, grid.source, grid.settings, grid.axes),
+        variables=variables,
+        coordinates=coordinates,
+        reference_size=reference_size,
+        structural=structural,
+        ran=ran,
+        adapter=renderer.info.name,
+        driver=renderer.info.driver_info or renderer.info.driver,
+        version=_version(),
+    )
+
+
+def _version() -> str:
+    from vkbloom import __version__  # noqa: PLC0415  the package imports this module
+
+    return __version__
+
+
+class PassCounter:
+    """Counts what the points of a grid would cost alone.
+
+    Parameters
+    ----------
+    grid : Grid
+    layout : Layout
+    renderer : Renderer
+    """
+
+    def __init__(self, grid: Grid, layout: Layout, renderer: Renderer) -> None:
+        self._grid = grid
+        self._structural = layout.structural
+        self._renderer = renderer
+        self._known: dict[Index, int] = {}
+
+    def alone(self, index: Index) -> int:
+        """Return the passes of a point that nothing was rendered before."""
+        key = tuple(index[number] for number in self._structural)
+        if key not in self._known:
+            self._known[key] = _graph_of(self._grid, self._renderer, index)[1]
+        return self._known[key]
+
+
+def _graph_of(grid: Grid, renderer: Renderer, index: Index) -> tuple[Framebuffers, int]:
+    """Return the framebuffers of a point, and its passes alone."""
+    point = grid.point(index)
+    found = grid.source.survey(renderer, point.settings, point.place)
+    size = (found["glow"][0][1], found["glow"][0][0]) if "glow" in found else None
+    count = passes.passes_alone(grid.source, point.settings, point.place, size, grid.wanted)
+    return found, count
+
+
+def _survey(grid: Grid, renderer: Renderer) -> tuple[Framebuffers, tuple[int, ...]]:
+    """Return the framebuffers to keep, and the axes that change what there is.
+
+    Every value of every axis is looked at from the first and from the last corner of the grid, and
+    then every combination along the axes that change anything. Nothing is rendered.
+    """
+    first = tuple(0 for _ in grid.axes)
+    structural: set[int] = set()
+    for corner in {first, tuple(count - 1 for count in grid.shape)}:
+        basis = _graph_of(grid, renderer, corner)
+        for number, axis in enumerate(grid.axes):
+            for place in range(len(axis)):
+                index = (*corner[:number], place, *corner[number + 1 :])
+                if index != corner and _graph_of(grid, renderer, index) != basis:
+                    structural.add(number)
+                    break
+    expected = _graph_of(grid, renderer, first)[0]
+    names = tuple(expected) if grid.attachments == "all" else grid.attachments
+    ranges = (range(len(axis)) if i in structural else (0,) for i, axis in enumerate(grid.axes))
+    for index in itertools.product(*ranges):
+        found = _graph_of(grid, renderer, index)[0]
+        if grid.attachments == "all" and set(found) != set(expected):
+            names = tuple(sorted(set(found) ^ set(expected)))
+        for name in names:
+            if found.get(name) != expected.get(name):
+                _refuse(grid, name, (first, expected.get(name)), (index, found.get(name)))
+    for name in names:
+        if name not in expected:
+            raise ValueError(f"attachments: there is no {name!r} here, only {', '.join(expected)}")
+    return {name: expected[name] for name in names}, tuple(sorted(structural))
+
+
+def _refuse(
+    grid: Grid,
+    name: str,
+    *places: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None],
+) -> None:
+    """Raise ValueError for a framebuffer that is not the same at two points."""
+    (first, _), (second, _) = places
+    varied = [number for number, place in enumerate(second) if place != first[number]]
+    names = " and ".join(grid.axes[number].name for number in varied)
+    told = []
+    for index, found in places:
+        where = ", ".join(f"{grid.axes[i].name}={grid.axes[i].label(index[i])}" for i in varied)
+        what = f"{found[0]} {found[1]}" if found else "not there"
+        told.append(f"{what} at {where}")
+    raise ValueError(
+        f"axes: along {names}, {name} has no one shape and dtype: {'; '.join(told)}. Ask for "
+        "attachments that are the same at all points, or for a grid each"
+    )
+
+
+def _frame_variables(
+    framebuffers: Framebuffers,
+) -> dict[str, Variable]:
+    if not framebuffers:
+        return {}
+    # Of their arrays only the shapes count, and untouched memory costs nothing.
+    shapes = {name: np.empty(shape, dtype) for name, (shape, dtype) in framebuffers.items()}
+    dims = dimensions(shapes)
+    lead = leading(shapes)
+    found = {}
+    for name, array in shapes.items():
+        scale = ", 255 being 1" if array.dtype == np.uint8 else ""
+        kind = "Depth" if array.ndim == 2 else "Framebuffer"
+        attributes = {
+            "long_name": name,
+            "units": "1",
+            "description": f"{kind} {name}{scale}" + (", the picture" * (name == lead == "final")),
+        }
+        found[name] = Variable(dims[name], array.shape, array.dtype, attributes)
+    return found
+
+
+def _sample(grid: Grid, renderer: Renderer) -> Frames:
+    """Render the first point."""
+    first = tuple(0 for _ in grid.axes)
+    ((_, frames),) = visit(renderer, grid.source, [grid.point(first)], grid.wanted)
+    return frames
+
+
+def _reduced(grid: Grid, name: str, frames: Frames) -> NDArray[Any]:
+    """Return what a reduction makes of frames, compared with themselves where it compares."""
+    reduction = grid.reduce[name]
+    if name in grid.references() and isinstance(reduction, Comparing):
+        reduction = dataclasses.replace(reduction, against=frames[reduction.attachment])
+    return checked_value(name, reduction(frames))
+
+
+def checked_value(name: str, value: Any) -> NDArray[Any]:
+    """Return the value of a reduction as an array of numbers.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    array = np.asarray(value)
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"reduce: {name} gave {value!r}; numbers are needed")
+    # Python's numbers, and whatever has their precision, by one type each.
+    widest = {"b": np.bool_, "i": np.int64, "u": np.uint64, "f": np.float64}[array.dtype.kind]
+    return array.astype(widest)
+
+
+def _reduction_variable(
+    name: str, reduction: Callable[[Frames], Any], value: NDArray[Any]
+) -> tuple[Variable, dict[str, tuple[NDArray[Any], Mapping[str, str]]]]:
+    own = getattr(reduction, "dims", ())
+    if len(own) != value.ndim:
+        own = tuple(f"dim_{number}" for number in range(value.ndim))
+    dims = tuple(f"{name}_{dim}" for dim in own)
+    attributes = {"long_name": name, "units": str(getattr(reduction, "units", "1"))}
+    coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
+    if isinstance(reduction, Reduction):
+        attributes["description"] = reduction.description
+        for dim, values in reduction.coordinates.items():
+            coordinates[f"{name}_{dim}"] = (values, {"long_name": dim, "units": "pixel"})
+    return Variable(dims, value.shape, value.dtype, attributes), coordinates
+
+
+def attributes_of(grid: Grid, layout: Layout) -> dict[str, Any]:
+    """Return the attributes that a Dataset of the grid has."""
+    facts = {key: value for key, value in grid.source.description.items() if key != "images"}
+    return {
+        "adapter": layout.adapter,
+        "driver": layout.driver,
+        "version": layout.version,
+        "axes": json.dumps([axis.name for axis in grid.axes]),
+        "settings": json.dumps(grid.remaining_settings),
+        "source": json.dumps({key: value for key, value in facts.items() if key != "sha256"}),
+    }

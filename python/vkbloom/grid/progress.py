@@ -1,0 +1,69 @@
+"""A progress bar with what a grid's owner wants to know: rate, remaining time, passes."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from types import TracebackType
+from typing import Any
+
+from vkbloom.extras import import_extra
+from vkbloom.grid.filling import Tally
+
+__all__ = ["Progress"]
+
+
+def _is_watched() -> bool:
+    """Return whether there is a terminal or a notebook to draw in."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        return True
+    kernel = sys.modules.get("IPython")
+    shell = kernel.get_ipython() if kernel else None
+    return shell is not None and "IPKernelApp" in shell.config
+
+
+class Progress:
+    """Counts points and passes, and shows them.
+
+    Parameters
+    ----------
+    total : int
+        Points of the grid.
+    done : int
+        Of which that many were there before.
+    shown : bool or None
+        True: in a terminal or a notebook, silent elsewhere. None: the same, if tqdm is installed.
+        False: silent.
+    """
+
+    def __init__(self, total: int, done: int = 0, *, shown: bool | None = None) -> None:
+        self.tally = Tally()
+        self._bar: Any = None
+        if shown is not None and not isinstance(shown, bool):
+            raise TypeError(f"progress: True, False or None is needed, not {shown!r}")
+        if shown is False or (shown is None and find_spec("tqdm") is None):
+            return
+        tqdm = import_extra("tqdm.auto", "grid", "A progress bar").tqdm
+        if _is_watched():
+            self._bar = tqdm(total=total, initial=done, unit="point", mininterval=0.2)
+
+    def add(self, tally: Tally) -> None:
+        """Count points that are done."""
+        self.tally.add(tally)
+        if self._bar is not None:
+            self._bar.set_postfix_str(
+                f"passes run {self.tally.ran}, saved {self.tally.saved}", refresh=False
+            )
+            self._bar.update(tally.points)
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()

@@ -1,0 +1,75 @@
+"""A whole grid rendered into whatever keeps it, here or on a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+from vkbloom.grid.filling import Tally
+from vkbloom.grid.plan import Grid, Layout, lay_out
+from vkbloom.grid.progress import Progress
+from vkbloom.grid.running import Sink, run_here
+from vkbloom.renderer import Renderer
+
+__all__ = ["render_grid"]
+
+
+def render_grid(
+    grid: Grid,
+    prepared: Callable[[Layout], Sink],
+    *,
+    client: Any,
+    adapter: str,
+    validation: bool,
+    progress: bool | None,
+) -> Tally:
+    """Render the points of a grid that are not there yet.
+
+    Parameters
+    ----------
+    grid : Grid
+    prepared : callable
+        Gives what keeps the grid, ready to be written to, for the layout that a renderer found.
+    client : distributed.Client or None
+        None: this process renders.
+    adapter, validation
+        Of the renderers.
+    progress : bool or None
+        As for `vkbloom.Renderer.grid`.
+
+    Returns
+    -------
+    Tally
+        Of what was rendered now.
+    """
+    with ExitStack() as stack:
+        renderer: Renderer | None = None
+        if client is None:
+            renderer = stack.enter_context(Renderer(adapter, validation=validation))
+            layout = lay_out(grid, renderer)
+        else:
+            from vkbloom.grid import cluster  # noqa: PLC0415  Dask is optional
+
+            cluster.check_client(client)
+            layout = cluster.lay_out_there(client, grid, adapter, validation)
+        sink = prepared(layout)
+        done = int(sink.done.sum())
+        shown = stack.enter_context(Progress(sink.done.size, done, shown=progress))
+        if done < sink.done.size:
+            shown.add(Tally(ran=layout.ran))
+        if renderer is not None:
+            run_here(grid, layout, sink, sink.missing(), renderer=renderer, progress=shown)
+        else:
+            cluster.run_there(
+                client,
+                grid,
+                layout,
+                sink,
+                sink.missing(),
+                progress=shown,
+                missing=sink.done.size - done,
+                adapter=adapter,
+                validation=validation,
+            )
+    return shown.tally

@@ -1,0 +1,162 @@
+"""Blocks of points rendered in this process and handed to whatever keeps them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.order import Block
+from vkbloom.grid.plan import Grid, Layout
+from vkbloom.grid.progress import Progress
+
+if TYPE_CHECKING:
+    from vkbloom.renderer import Renderer
+
+__all__ = ["Sink", "Writer", "empty_arrays", "run_here", "written_behind"]
+
+# How long and how much may be rendered before it is brought to the disk and marked.
+_COMMIT_SECONDS: Final = 2.0
+_COMMIT_BLOCKS: Final = 64
+
+
+class Writer(Protocol):
+    """Writes blocks in whatever process renders them."""
+
+    def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write a block's variables."""
+
+    def flush(self, written: Iterable[Block]) -> None:
+        """Wait until blocks are on the disk."""
+
+
+class Sink(Protocol):
+    """What keeps a grid."""
+
+    @property
+    def done(self) -> NDArray[np.bool_]:
+        """The points that are there, in the grid's shape."""
+
+    @property
+    def writer(self) -> Writer:
+        """What can be sent to other processes."""
+
+    def missing(self) -> Iterable[Block]:
+        """Return the blocks that are not done, in the order of visiting."""
+
+    def mark(self, written: Iterable[Block]) -> None:
+        """Mark points as done; their data are on the disk."""
+
+
+def empty_arrays(layout: Layout, block: Block) -> dict[str, NDArray[Any]]:
+    """Return arrays for the points of a block."""
+    return {
+        name: np.empty((*block.shape, *variable.shape), variable.dtype)
+        for name, variable in layout.variables.items()
+    }
+
+
+def run_here(
+    grid: Grid,
+    layout: Layout,
+    sink: Sink,
+    todo: Iterable[Block],
+    *,
+    renderer: Renderer,
+    progress: Progress,
+) -> None:
+    """Render blocks one after the other.
+
+    Whatever ends it, blocks that were written are marked as done.
+
+    Parameters
+    ----------
+    grid : Grid
+    layout : Layout
+    sink : Sink
+    todo : iterable of Block
+    renderer : Renderer
+    progress : Progress
+
+    Raises
+    ------
+    OSError
+        A block cannot be written; those before it are kept.
+    """
+    filler = Filler(grid, layout, renderer)
+    pending: list[Block] = []
+    committed = time.monotonic()
+
+    def commit() -> None:
+        if pending:
+            sink.writer.flush(pending)
+            sink.mark(pending)
+            pending.clear()
+
+    try:
+        for block in written_behind(filler, sink.writer, todo, layout, progress.add):
+            pending.append(block)
+            if len(pending) >= _COMMIT_BLOCKS or time.monotonic() - committed > _COMMIT_SECONDS:
+                commit()
+                committed = time.monotonic()
+        commit()
+    except BaseException as error:
+        _commit_after(error, commit)
+        raise
+
+
+def written_behind(
+    filler: Filler,
+    writer: Writer,
+    todo: Iterable[Block],
+    layout: Layout,
+    on_point: Callable[[Tally], object],
+) -> Iterator[Block]:
+    """Render blocks, each written while the next is rendered.
+
+    Parameters
+    ----------
+    filler : Filler
+    writer : Writer
+    todo : iterable of Block
+    layout : Layout
+    on_point : callable
+        Called with the count of each point that is rendered.
+
+    Yields
+    ------
+    Block
+        That is written; when rendering fails, the one before it still is.
+    """
+    with ThreadPoolExecutor(1, "vkbloom-grid") as pool:
+        behind: tuple[Block, Future[None]] | None = None
+        failure: Exception | None = None
+        for block in todo:
+            arrays = empty_arrays(layout, block)
+            try:
+                filler.fill(block, arrays, on_point)
+            except Exception as error:
+                failure = error
+                break
+            if behind is not None:
+                behind[1].result()
+                yield behind[0]
+            behind = block, pool.submit(writer.write, block, arrays)
+        if behind is not None:
+            behind[1].result()
+            yield behind[0]
+    if failure is not None:
+        raise failure
+
+
+def _commit_after(error: BaseException, commit: Callable[[], None]) -> None:
+    try:
+        commit()
+    except OSError as second:
+        # On a full disk the marks may not fit either. Blocks that are whole are found again.
+        error.add_note(f"the last points that were written are not marked as done: {second}")

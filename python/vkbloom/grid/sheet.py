@@ -1,0 +1,165 @@
+"""A contact sheet of a grid: a picture a point, in rows and columns by axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import pictures
+from vkbloom.dimensions import leading
+from vkbloom.grid import views
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["contact_sheet"]
+
+_BACKGROUND: Final = 24
+_CELL: Final = 40
+# Of the letters' size; those of OpenImageIO's font are about half as wide as high.
+_LETTER_WIDTH: Final = 0.6
+
+
+def contact_sheet(
+    dataset: xarray.Dataset,
+    rows: str | None = None,
+    columns: str | None = None,
+    *,
+    attachment: str | None = None,
+    at: Mapping[str, Any] | None = None,
+    width: int = 160,
+    most: int = 12,
+) -> bytes:
+    """Return a labelled contact sheet of a grid as PNG.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        From `vkbloom.Renderer.grid`, `vkbloom.grid_to_zarr`, or the latter's store opened by
+        xarray; also a part of it. Points that are not done yet are left empty.
+    rows, columns : str, optional
+        The axes that go down and across. By default the last two that have more than one value,
+        the last going across.
+    attachment : str, optional
+        The framebuffer to show, by default ``final`` or else the last image.
+    at : mapping of str to object, optional
+        Where to stand along the other axes (the nearest number, or that text); by default at their
+        first value. The sheet's first line tells.
+    width : int
+        Of a picture, in pixels, 48 to 4096. Pictures are made smaller by averaging, and larger
+        with hard pixels.
+    most : int
+        Pictures in a row and in a column, 1 to 64; of longer axes as many values are shown,
+        evenly spread.
+
+    Returns
+    -------
+    bytes
+        An 8-bit RGB PNG file. 8-bit frames are shown as they are, float ones clipped to 0..1 with
+        the sRGB curve, unless the settings have an encoding.
+
+    Raises
+    ------
+    TypeError, ValueError
+        The Dataset is no grid or holds no framebuffers, or an argument is wrong.
+    """
+    width = pictures.in_range("width", width, 48, 4096)
+    most = pictures.in_range("most", most, 1, 64)
+    rows, columns = _shown(dataset, rows, columns)
+    name = _attachment(dataset, attachment)
+    shown = [axis for axis in (rows, columns) if axis is not None]
+    part = views.select(dataset, at, shown)
+    part = views.thinned(views.thinned(part, rows, most), columns, most)
+    down, across = (
+        range(part.sizes[axis]) if axis is not None else range(1) for axis in (rows, columns)
+    )
+    height, length = _frame_size(part, name, shown)
+    size = pictures.scaled(length, height, width / length)
+    texts: list[tuple[int, int, str]] = []
+    letter = max(11, width // 14)
+    gap = letter // 2
+    row_labels = [_heading(part, rows, row) for row in down]
+    left = gap + round(_LETTER_WIDTH * letter * max(map(len, row_labels)))
+    top = 3 * letter + gap
+    sheet = np.full(
+        (
+            top + len(down) * (size[1] + gap) + gap,
+            left + gap + len(across) * (size[0] + gap) + gap,
+            3,
+        ),
+        _BACKGROUND,
+        np.uint8,
+    )
+    headings = [_heading(part, columns, column) for column in across]
+    title = [name, views.caption(part)]
+    if max(map(len, headings)) * _LETTER_WIDTH * letter > size[0]:
+        # Narrow columns have room for the values only.
+        headings = [text.partition("=")[2] for text in headings]
+        title.insert(1, f"{columns} across")
+    texts.append((gap, letter + gap, ", ".join(filter(None, title))))
+    for column in across:
+        x = left + gap + column * (size[0] + gap)
+        texts.append((x, top - gap, headings[column]))
+        for row in down:
+            y = top + row * (size[1] + gap)
+            cell = _cell(part, {rows: row, columns: column}, name, size)
+            sheet[y : y + size[1], x : x + size[0]] = cell
+    for row, text in enumerate(row_labels):
+        texts.append((gap, top + row * (size[1] + gap) + size[1] // 2, text))
+    return pictures.png(pictures.labelled(sheet, texts, letter))
+
+
+def _shown(
+    dataset: xarray.Dataset, rows: str | None, columns: str | None
+) -> tuple[str | None, str | None]:
+    """Return the axes that go down and across."""
+    axes = views.axes_of(dataset)
+    for field, name in (("rows", rows), ("columns", columns)):
+        if name is not None and name not in axes:
+            raise ValueError(f"{field}: {name!r} is not an axis of the grid: {', '.join(axes)}")
+    if rows is not None and rows == columns:
+        raise ValueError(f"rows: {rows!r} goes across already")
+    free = [name for name in axes if dataset.sizes[name] > 1 and name not in (rows, columns)]
+    if columns is None:
+        columns = free.pop() if free else None
+    if rows is None:
+        rows = free.pop() if free else None
+    return rows, columns
+
+
+def _attachment(dataset: xarray.Dataset, attachment: str | None) -> str:
+    """Return the framebuffer to show."""
+    found = {name: np.empty((0,) * dims) for name, dims in views.framebuffers_of(dataset).items()}
+    if not found:
+        raise ValueError("dataset: the grid holds no framebuffers")
+    if attachment is None:
+        return leading(found)
+    if attachment not in found:
+        raise ValueError(f"attachment: {attachment!r} is not one of {', '.join(found)}")
+    return attachment
+
+
+def _frame_size(part: xarray.Dataset, name: str, shown: list[str]) -> tuple[int, int]:
+    """Return height and width of a framebuffer."""
+    sizes = [part[name].sizes[dim] for dim in part[name].dims if dim not in shown]
+    return sizes[0], sizes[1]
+
+
+def _heading(part: xarray.Dataset, axis: str | None, place: int) -> str:
+    if axis is None:
+        return ""
+    return f"{axis}={views.label(part[axis].values[place])}"
+
+
+def _cell(
+    part: xarray.Dataset, place: Mapping[str | None, int], name: str, size: tuple[int, int]
+) -> NDArray[np.uint8]:
+    point = part.isel({axis: number for axis, number in place.items() if axis is not None})
+    if "done" in point and not bool(point["done"].values):
+        return np.full((size[1], size[0], 3), _CELL, np.uint8)
+    is_encoded = name == "final" and views.encoding_of(point) != "none"
+    picture = pictures.picture(point[name].values, name, encoded=is_encoded, size=size)
+    return np.broadcast_to(picture[:, :, :3], (size[1], size[0], 3))

@@ -1,0 +1,269 @@
+"""What a grid is made of: a scene, an image or several images, driven through a renderer."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import itertools
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.frames import Frames
+from vkbloom.grid.order import Index
+from vkbloom.settings import Settings, check_size
+
+if TYPE_CHECKING:
+    from vkbloom.renderer import Renderer, Shading
+    from vkbloom.scene import Scene
+
+__all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
+
+#: Name to shape and dtype.
+Framebuffers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
+
+_SCENE_SIZE = (1280, 720)
+# Pixels of a side; enough for every pass to have a target.
+_SMALL = 24
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a grid: its index, its settings, and the image's number or the time."""
+
+    index: Index
+    settings: Settings
+    place: float
+
+
+def visit(
+    renderer: Renderer,
+    source: ImageSource | SceneSource,
+    points: Iterable[Point],
+    attachments: str | Sequence[str],
+) -> Iterator[tuple[Index, Frames]]:
+    """Render points in their order.
+
+    Parameters
+    ----------
+    renderer : Renderer
+    source : Source
+    points : iterable of Point
+        Drawn as they are needed, some ahead.
+    attachments : "all" or sequence of str
+
+    Yields
+    ------
+    (tuple of int, Frames)
+        The index of each point, and its frames.
+    """
+    for place, group in itertools.groupby(points, key=lambda point: point.place):
+        drawn: deque[Index] = deque()
+        for frames in source.many(renderer, _noted(group, drawn), place, attachments):
+            yield drawn.popleft(), frames
+
+
+def _noted(points: Iterable[Point], drawn: deque[Index]) -> Iterator[Settings]:
+    """Yield the settings of points, whose indices are noted as they are drawn."""
+    for point in points:
+        drawn.append(point.index)
+        yield point.settings
+
+
+class ImageSource:
+    """One image or several of one shape."""
+
+    has_time = False
+    shading = "image"
+    #: Of points where no axis gives another.
+    place = 0.0
+
+    def __init__(self, images: Sequence[NDArray[Any]], labels: tuple[Any, ...] = ()) -> None:
+        self.images = tuple(images)
+        self.labels = labels
+
+    def many(
+        self,
+        renderer: Renderer,
+        settings: Iterable[Settings],
+        place: float,
+        attachments: str | Sequence[str],
+    ) -> Iterator[Frames]:
+        """Yield the frames of some settings on one image."""
+        return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
+
+    def survey(self, renderer: Renderer, settings: Settings, place: float) -> Framebuffers:
+        """Tell the shapes and dtypes of all framebuffers, without rendering."""
+        return renderer._survey_apply(self.images[int(place)], settings)
+
+    def small(self) -> ImageSource:
+        """Return the images with few pixels."""
+        height, width = self.images[0].shape[:2]
+        rows, columns = -(-height // _SMALL), -(-width // _SMALL)
+        thinned = [np.ascontiguousarray(image[::rows, ::columns]) for image in self.images[:2]]
+        # Two images must differ for a change of the image to be one.
+        thinned[-1] = thinned[-1].copy()
+        thinned[-1][0, 0, 0] = 0 if len(thinned) == 1 or thinned[0][0, 0, 0] != 0 else 1
+        return ImageSource((thinned * len(self.images))[: len(self.images)], self.labels)
+
+    def size_at(self, place: float) -> tuple[int, int]:
+        """Return (width, height) of an image."""
+        height, width = self.images[int(place)].shape[:2]
+        return width, height
+
+    @functools.cached_property
+    def description(self) -> dict[str, Any]:
+        """What identifies the source: shapes, dtypes and digests."""
+        return {
+            "kind": "image",
+            "images": [
+                {"shape": list(image.shape), "dtype": image.dtype.name, "sha256": digest(image)}
+                for image in self.images
+            ],
+        }
+
+
+class SceneSource:
+    """A scene, rendered at one size in one shading."""
+
+    has_time = True
+    labels: tuple[Any, ...] = ()
+
+    def __init__(
+        self, scene: Scene, size: tuple[int, int], shading: Shading, time: float = 0.0
+    ) -> None:
+        self.scene = scene
+        self.size = size
+        self.shading: Shading = shading
+        self.place = time
+
+    def many(
+        self,
+        renderer: Renderer,
+        settings: Iterable[Settings],
+        place: float,
+        attachments: str | Sequence[str],
+    ) -> Iterator[Frames]:
+        """Yield the frames of some settings at one time."""
+        return renderer.render_many(
+            self.scene,
+            settings,
+            self.size,
+            shading=self.shading,
+            time=place,
+            attachments=attachments,
+        )
+
+    def survey(self, renderer: Renderer, settings: Settings, place: float) -> Framebuffers:
+        """Tell the shapes and dtypes of all framebuffers, without rendering."""
+        return renderer._survey_render(self.scene, settings, self.size, self.shading)
+
+    def small(self) -> SceneSource:
+        """Return the scene in few pixels."""
+        return SceneSource(self.scene, (_SMALL, _SMALL), self.shading, self.place)
+
+    def size_at(self, place: float) -> tuple[int, int]:
+        """Return (width, height) of the frame."""
+        return self.size
+
+    @functools.cached_property
+    def description(self) -> dict[str, Any]:
+        """What identifies the source: size, shading, time and a digest of the scene."""
+        return {
+            "kind": "scene",
+            "sha256": digest(self.scene),
+            "size": list(self.size),
+            "shading": self.shading,
+            "time": self.place,
+        }
+
+
+Source: TypeAlias = ImageSource | SceneSource
+
+
+def read_source(source: object, size: tuple[int, int] | None, shading: str, time: float) -> Source:
+    """Check what a grid shall be made of.
+
+    Parameters
+    ----------
+    source : Scene, ndarray, or list or mapping of ndarray
+        A mapping gives the images' labels.
+    size : (int, int), optional
+        Of a scene's frame, by default (1280, 720). Images have their own.
+    shading : {"forward", "deferred"}
+        Of a scene.
+    time : float
+        Of a scene, in turns.
+
+    Returns
+    -------
+    ImageSource or SceneSource
+
+    Raises
+    ------
+    TypeError, ValueError
+        The source is none of these, or an argument does not belong to it.
+    """
+    from vkbloom.renderer import SHADINGS, _check_image  # noqa: PLC0415  it imports the grids
+    from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+    if isinstance(source, Scene):
+        if shading not in SHADINGS:
+            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+        if not isinstance(time, int | float | np.number):
+            raise TypeError(f"time: a number is needed, not {time!r}")
+        if not math.isfinite(time):
+            raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+        return SceneSource(source, check_size("size", size or _SCENE_SIZE), shading, float(time))
+    for name, is_given in (
+        ("size", size is not None),
+        ("shading", shading != "forward"),
+        ("time", time != 0.0),
+    ):
+        if is_given:
+            raise ValueError(f"{name}: only scenes have one, an image is given")
+    if isinstance(source, np.ndarray):
+        return ImageSource([_check_image(source)])
+    labels: list[Any]
+    if isinstance(source, Mapping):
+        images, labels = list(source.values()), [str(label) for label in source]
+    elif isinstance(source, list | tuple):
+        images, labels = list(source), list(range(len(source)))
+    else:
+        raise TypeError(
+            f"source: a Scene, an image or a list of images is needed, not {type(source).__name__}"
+        )
+    if not images:
+        raise ValueError("source: the list of images is empty")
+    return ImageSource([_check_image(image) for image in images], tuple(labels))
+
+
+def digest(value: object) -> str:
+    """Return a SHA-256 of plain values, arrays, and dataclasses of such."""
+    found = hashlib.sha256()
+
+    def add(part: object) -> None:
+        if isinstance(part, np.ndarray):
+            found.update(f"{part.dtype.str}{part.shape}".encode())
+            found.update(np.ascontiguousarray(part).data)
+        elif dataclasses.is_dataclass(part):
+            for field in dataclasses.fields(part):
+                # Fields that are no arguments, such as a serial number, say nothing.
+                if field.init:
+                    found.update(f"{field.name}:".encode())
+                    add(getattr(part, field.name))
+        elif isinstance(part, tuple | list):
+            found.update(f"[{len(part)}]".encode())
+            for item in part:
+                add(item)
+        else:
+            found.update(repr(part).encode())
+
+    add(value)
+    return found.hexdigest()

@@ -1,0 +1,398 @@
+"""A grid in a Zarr store that xarray opens, complete or not.
+
+Order of events, so that a process may be killed at any time:
+
+1. The group's metadata, with the identity of the grid in it and a copy of all other metadata.
+2. The metadata of the arrays, and the coordinates.
+3. Blocks of points, each whole: a chunk of each variable, with a checksum. Zarr's LocalStore
+   writes a key under another name first and renames it.
+4. When blocks are on the disk, their points' marks in ``done``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.extras import import_extra
+from vkbloom.grid.axes import Axis
+from vkbloom.grid.identity import FORMAT, differences, identity
+from vkbloom.grid.keys import Keys
+from vkbloom.grid.order import Block, Index, blocks, default_chunk
+from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of
+from vkbloom.grid.running import Writer
+
+__all__ = [
+    "DONE",
+    "IDENTITY",
+    "ROOT",
+    "GridStore",
+    "GridWriter",
+    "chunk_key",
+    "describe",
+    "read_json",
+    "reason",
+]
+
+ROOT: Final = "zarr.json"
+IDENTITY: Final = "vkbloom_grid"
+DONE: Final = "done"
+
+_PURPOSE: Final = "Grids on disk"
+_DONE_POINTS: Final = 1 << 20
+# Fast, and little worse than higher levels on pictures with noise.
+_ZSTD_LEVEL: Final = 1
+# One folder for all chunks of an array, not one an axis.
+_KEYS: Final = {"name": "default", "separator": "."}
+
+
+def chunk_key(name: str, block: Block, chunk: Index, trailing: int) -> str:
+    """Return the key of a variable's chunk that holds a block.
+
+    Parameters
+    ----------
+    name : str
+        Of the variable.
+    block : Block
+    chunk : tuple of int
+        Number of a block's values by axis.
+    trailing : int
+        Dimensions of the variable beside the axes, which no chunk divides.
+    """
+    places = (start // size for start, size in zip(block.start, chunk, strict=True))
+    # An array without dimensions has the key "c".
+    return f"{name}/" + ".".join(["c", *map(str, places), *("0" * trailing)])
+
+
+def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
+    """Return all that a store holds before its first block, the group's metadata first.
+
+    Parameters
+    ----------
+    grid : Grid
+    layout : Layout
+    chunk : tuple of int
+
+    Returns
+    -------
+    dict of str to bytes
+    """
+    zarr = import_extra("zarr", "grid", _PURPOSE)
+    memory = zarr.storage.MemoryStore()
+    own = identity(grid, layout, chunk)
+    attributes = {**attributes_of(grid, layout), IDENTITY: own}
+    group = zarr.open_group(memory, mode="w", zarr_format=3, attributes=attributes)
+    dims = tuple(axis.name for axis in grid.axes)
+    mark = {"grid": hashlib.sha256(json.dumps(own).encode()).hexdigest()}
+    for axis in grid.axes:
+        _add_coordinate(group, axis.name, axis.coordinate, axis.attributes)
+    for name, (values, attrs) in layout.coordinates.items():
+        _add_coordinate(group, name, values, attrs)
+    _add_array(
+        group,
+        DONE,
+        Variable((), (), np.dtype(np.bool_), {"description": "Whether the point is there", **mark}),
+        (dims, grid.shape, default_chunk(grid.shape, range(len(dims)), _DONE_POINTS)),
+    )
+    for name, variable in layout.variables.items():
+        marked = Variable(
+            variable.dims, variable.shape, variable.dtype, {**variable.attributes, **mark}
+        )
+        _add_array(group, name, marked, (dims, grid.shape, chunk))
+    with warnings.catch_warnings():
+        # Format 3 does not define consolidated metadata yet, and xarray wants it all the same.
+        warnings.filterwarnings("ignore", message="Consolidated metadata")
+        zarr.consolidate_metadata(memory)
+    keys = Keys(memory)
+    names = sorted(keys.all(), key=lambda key: (key != ROOT, key))
+    return {key: keys.read(key) or b"" for key in names}
+
+
+def _add_coordinate(
+    group: Any, name: str, values: NDArray[Any], attributes: Mapping[str, str]
+) -> None:
+    is_text = values.dtype.kind == "U"
+    array = group.create_array(
+        name,
+        shape=values.shape,
+        chunks=values.shape,
+        dtype=str if is_text else values.dtype,
+        dimension_names=[name],
+        attributes=dict(attributes),
+        chunk_key_encoding=_KEYS,
+        config={"write_empty_chunks": True},
+    )
+    array[...] = values.astype(object) if is_text else values
+
+
+def _add_array(
+    group: Any, name: str, variable: Variable, lattice: tuple[tuple[str, ...], Index, Index]
+) -> None:
+    codecs = import_extra("zarr.codecs", "grid", _PURPOSE)
+    dims, shape, chunk = lattice
+    group.create_array(
+        name,
+        shape=(*shape, *variable.shape),
+        chunks=(*chunk, *variable.shape),
+        dtype=variable.dtype,
+        dimension_names=[*dims, *variable.dims],
+        attributes=dict(variable.attributes),
+        chunk_key_encoding=_KEYS,
+        # The checksum comes last, so that it covers what is on the disk.
+        compressors=[codecs.ZstdCodec(level=_ZSTD_LEVEL), codecs.Crc32cCodec()],
+        fill_value=math.nan if variable.dtype.kind == "f" else 0,
+    )
+
+
+@dataclass
+class GridWriter:
+    """Writes blocks into a store, in whatever process renders them.
+
+    Parameters
+    ----------
+    keys : Keys
+    trailing : mapping of str to int
+        Number of dimensions beside the axes, by variable.
+    chunk : tuple of int
+    """
+
+    keys: Keys
+    trailing: Mapping[str, int]
+    chunk: Index
+
+    def _array(self, name: str) -> Any:
+        zarr = import_extra("zarr", "grid", _PURPOSE)
+        array = zarr.open_array(self.keys.store, path=name, mode="r+")
+        # Black is a picture too: without its file nobody could tell that it is there.
+        return array.with_config({"write_empty_chunks": True})
+
+    def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write a block's variables."""
+        for name, values in arrays.items():
+            self._array(name)[block.slices] = values
+
+    def read(self, block: Block, name: str) -> NDArray[Any]:
+        """Read a block of a variable.
+
+        Raises
+        ------
+        Exception
+            Its chunk is damaged; what is raised depends on where.
+        """
+        values: NDArray[Any] = self._array(name)[block.slices]
+        return values
+
+    def keys_of(self, block: Block) -> list[str]:
+        """Return the keys that hold a block."""
+        return [chunk_key(name, block, self.chunk, n) for name, n in self.trailing.items()]
+
+    def flush(self, written: Iterable[Block]) -> None:
+        """Wait until blocks are on the disk."""
+        self.keys.flush(itertools.chain.from_iterable(map(self.keys_of, written)))
+
+
+class GridStore:
+    """A grid's store, with the marks of its points.
+
+    Parameters
+    ----------
+    keys : Keys
+    grid : Grid
+    layout : Layout
+    chunk : tuple of int
+        Number of a block's values by axis.
+
+    Attributes
+    ----------
+    done : ndarray of bool, shape of the grid
+        The points that are safely there.
+    writer : Writer
+    """
+
+    def __init__(self, keys: Keys, grid: Grid, layout: Layout, chunk: Index) -> None:
+        self.keys = keys
+        self.grid = grid
+        self.layout = layout
+        self.chunk = chunk
+        self.done = np.zeros(grid.shape, np.bool_)
+        self._chunks = GridWriter(
+            keys, {name: len(v.shape) for name, v in layout.variables.items()}, chunk
+        )
+
+    @property
+    def writer(self) -> Writer:
+        """What writes blocks, in any process."""
+        return self._chunks
+
+    def blocks(self) -> Iterable[Block]:
+        """Return all blocks in the order of visiting."""
+        return blocks(self.grid.shape, self.chunk, self.layout.ranking)
+
+    def missing(self) -> Iterable[Block]:
+        """Return the blocks that are not done, in the order of visiting."""
+        return (block for block in self.blocks() if not self.done[block.slices].all())
+
+    def prepare(self, *, resume: bool, verify: bool) -> list[str]:
+        """Make the store, or find out what is in it and mend what is damaged.
+
+        Parameters
+        ----------
+        resume : bool
+            Whether a store that is there may be gone on with.
+        verify : bool
+            Whether to read all that is there.
+
+        Returns
+        -------
+        list of str
+            What was mended, one phrase each.
+
+        Raises
+        ------
+        FileExistsError
+            There is a store and `resume` is False.
+        ValueError
+            There is something else, or a grid that differs; the message tells what. Nothing was
+            written.
+        """
+        expected = expected_keys(self.grid, self.layout, self.chunk)
+        held = self.keys.all()
+        if not held:
+            for key, content in expected.items():
+                self.keys.write(key, content)
+            self.keys.flush(expected)
+            return []
+        if not resume:
+            raise FileExistsError(
+                f"{self.keys.name}: there is a grid already; resume it, or name another store"
+            )
+        self._check_identity(held, expected)
+        self.keys.remove_leftovers()
+        mended = self._mend_metadata(expected)
+        return mended + self._find_done(held, verify=verify)
+
+    def _check_identity(self, held: set[str], expected: Mapping[str, bytes]) -> None:
+        """Raise ValueError unless what is there is this grid."""
+        asked = identity(self.grid, self.layout, self.chunk)
+        root = read_json(self.keys.read(ROOT))
+        if root is not None:
+            stored = root.get("attributes", {}).get(IDENTITY)
+            if stored is None:
+                raise ValueError(f"{self.keys.name}: there is no grid in it, but something else")
+            if stored.get("format") != FORMAT:
+                raise ValueError(
+                    f"{self.keys.name}: its format is {stored.get('format')!r}, {FORMAT} is known"
+                )
+            found = differences(stored, asked)
+            if found:
+                raise ValueError(f"{self.keys.name}: another grid is there; {'; '.join(found)}")
+            return
+        # The arrays tell which grid they belong to.
+        marks = {_mark(self.keys.read(key)) for key in held if key.endswith(f"/{ROOT}")} - {None}
+        if marks != {_mark(expected[f"{DONE}/{ROOT}"])}:
+            what = "another grid is there" if marks else "there is no grid in it"
+            raise ValueError(f"{self.keys.name}: {what}, and its {ROOT} is missing or damaged")
+
+    def _mend_metadata(self, expected: Mapping[str, bytes]) -> list[str]:
+        mended = []
+        for key, content in expected.items():
+            found = self.keys.read(key)
+            # The same in other letters is no damage.
+            is_same = found == content or (
+                key.endswith(ROOT) and read_json(found) == read_json(content)
+            )
+            if not is_same:
+                self.keys.write(key, content)
+                mended.append(f"{key} was {'missing' if found is None else 'damaged'}")
+        self.keys.flush(expected)
+        return mended
+
+    def _find_done(self, held: set[str], *, verify: bool) -> list[str]:
+        """Find the points that are there; take the marks of damaged ones away."""
+        mended: list[str] = []
+        zarr = import_extra("zarr", "grid", _PURPOSE)
+        try:
+            marked = zarr.open_array(self.keys.store, path=DONE, mode="r")[...]
+        except Exception as error:
+            mended.append(f"the marks in {DONE} were damaged ({reason(error)})")
+            marked = np.zeros(self.grid.shape, np.bool_)
+        for block in self.blocks():
+            is_marked = bool(marked[block.slices].all())
+            if not is_marked and not verify:
+                continue
+            problem = self._problem(block, held, verify=verify)
+            # A block that is whole but not marked was written just before the end.
+            self.done[block.slices] = problem is None
+            if is_marked and problem is not None:
+                mended.append(f"{problem}, of {describe(self.grid.axes, block)}")
+        if not np.array_equal(self.done, marked) or mended:
+            self._write_marks(np.ones(self.grid.shape, np.bool_))
+        return mended
+
+    def _problem(self, block: Block, held: set[str], *, verify: bool) -> str | None:
+        for name, key in zip(self._chunks.trailing, self._chunks.keys_of(block), strict=True):
+            if key not in held:
+                return f"{key} was missing"
+            if verify:
+                try:
+                    self._chunks.read(block, name)
+                except Exception as error:
+                    return f"{key} was damaged ({reason(error)})"
+        return None
+
+    def mark(self, written: Iterable[Block]) -> None:
+        """Mark points as done; their data must be on the disk."""
+        touched = np.zeros(self.grid.shape, np.bool_)
+        for block in written:
+            self.done[block.slices] = True
+            touched[block.slices] = True
+        self._write_marks(touched)
+
+    def _write_marks(self, touched: NDArray[np.bool_]) -> None:
+        """Write the chunks of ``done`` in which a point was touched, each at once."""
+        zarr = import_extra("zarr", "grid", _PURPOSE)
+        array = zarr.open_array(self.keys.store, path=DONE, mode="r+")
+        array = array.with_config({"write_empty_chunks": True})
+        written = []
+        for part in blocks(self.grid.shape, array.chunks, range(touched.ndim)):
+            if touched[part.slices].any():
+                array[part.slices] = self.done[part.slices]
+                written.append(chunk_key(DONE, part, array.chunks, 0))
+        self.keys.flush(written)
+
+
+def describe(axes: Iterable[Axis], block: Block) -> str:
+    """Return the points of a block in words: the values along each axis, or the first and last."""
+    parts = []
+    for axis, start, stop in zip(axes, block.start, block.stop, strict=True):
+        labels = [axis.label(start)] + [axis.label(stop - 1)] * (stop - start > 1)
+        parts.append(f"{axis.name}={'..'.join(labels)}")
+    return ", ".join(parts) or "the only point"
+
+
+def reason(error: Exception) -> str:
+    """Return the first sentence of why a chunk cannot be read."""
+    return str(error).partition(". ")[0].removesuffix(".") or type(error).__name__
+
+
+def read_json(content: bytes | None) -> dict[str, Any] | None:
+    """Return the object that a key holds, None where it is missing or damaged."""
+    try:
+        found = None if content is None else json.loads(content)
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _mark(content: bytes | None) -> Any:
+    metadata = read_json(content)
+    return metadata.get("attributes", {}).get("grid") if metadata else None

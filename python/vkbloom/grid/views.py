@@ -1,0 +1,122 @@
+"""Parts of a grid that fit on a page: which axes are shown, and where the others stand."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = [
+    "axes_of",
+    "caption",
+    "encoding_of",
+    "framebuffers_of",
+    "label",
+    "places",
+    "select",
+    "thinned",
+]
+
+
+def axes_of(dataset: xarray.Dataset) -> list[str]:
+    """Return the axes of a grid that are dimensions still.
+
+    Raises
+    ------
+    TypeError, ValueError
+        It is no Dataset of a grid.
+    """
+    if not hasattr(dataset, "data_vars"):
+        raise TypeError(f"dataset: a Dataset is needed, not {type(dataset).__name__}")
+    if "axes" not in dataset.attrs:
+        raise ValueError("dataset: not a grid, its attributes name no axes")
+    return [name for name in json.loads(dataset.attrs["axes"]) if name in dataset.dims]
+
+
+def framebuffers_of(dataset: xarray.Dataset) -> dict[str, int]:
+    """Return the framebuffers of a grid, with the number of dimensions that a point has."""
+    found = {}
+    for name, array in dataset.data_vars.items():
+        own = [str(dim).rpartition("_")[2] for dim in array.dims]
+        if {"y", "x"} <= set(own):
+            found[str(name)] = 3 if "channel" in own else 2
+    return found
+
+
+def select(
+    dataset: xarray.Dataset, at: Mapping[str, Any] | None, shown: Sequence[str]
+) -> xarray.Dataset:
+    """Reduce a grid to the axes that are shown.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    at : mapping of str to object, optional
+        Where to stand along other axes: the nearest number, or that text.
+    shown : sequence of str
+
+    Returns
+    -------
+    xarray.Dataset
+        Along axes that are neither shown nor in `at`, the first value is taken.
+
+    Raises
+    ------
+    ValueError
+        `at` names no axis, or a value that is not there.
+    """
+    axes = axes_of(dataset)
+    for name in at or {}:
+        if name not in axes:
+            raise ValueError(f"at: {name!r} is not an axis of the grid: {', '.join(axes)}")
+        if name in shown:
+            raise ValueError(f"at: {name!r} is one of the axes that are shown")
+    for name in axes:
+        if name in (at or {}):
+            value = (at or {})[name]
+            is_number = dataset[name].dtype.kind in "iuf"
+            try:
+                dataset = dataset.sel({name: value}, method="nearest" if is_number else None)
+            except (KeyError, TypeError) as error:
+                raise ValueError(f"at: {name} has no value {value!r}") from error
+        elif name not in shown:
+            dataset = dataset.isel({name: 0})
+    return dataset
+
+
+def label(value: Any) -> str:
+    """Return a coordinate's value in short."""
+    plain = value.item() if hasattr(value, "item") else value
+    return f"{plain:.4g}" if isinstance(plain, float) else str(plain)
+
+
+def caption(dataset: xarray.Dataset) -> str:
+    """Return where a part of a grid stands along the axes that are not shown."""
+    names = (name for name in json.loads(dataset.attrs["axes"]) if name not in dataset.dims)
+    return ", ".join(f"{name}={label(dataset[name].values[()])}" for name in names)
+
+
+def places(count: int, most: int) -> list[int]:
+    """Return up to a number of places that are spread evenly over all, the ends included."""
+    if count <= most:
+        return list(range(count))
+    return [int(place) for place in np.linspace(0, count - 1, most).round()]
+
+
+def thinned(dataset: xarray.Dataset, axis: str | None, most: int) -> xarray.Dataset:
+    """Leave up to a number of values of an axis."""
+    if axis is None:
+        return dataset
+    return dataset.isel({axis: places(dataset.sizes[axis], most)})
+
+
+def encoding_of(dataset: xarray.Dataset) -> str:
+    """Return the encoding of a point of a grid."""
+    if "encoding" in dataset.coords:
+        return str(dataset["encoding"].values[()])
+    return str(json.loads(dataset.attrs.get("settings", "{}")).get("encoding", "none"))

@@ -1,0 +1,367 @@
+"""``vkbloom grid``: axes in words, files of options, stores and image files, resumed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from framebuffers import noise
+
+import vkbloom
+from vkbloom import Pyramid, Renderer, Separable
+from vkbloom.cli.axis_options import axis_values
+from vkbloom.cli.program import program
+from vkbloom.image_reading import load
+from vkbloom.image_writing import save
+from vkbloom.images import Picture
+
+pytest.importorskip("OpenImageIO")
+xr = pytest.importorskip("xarray")
+
+
+def run(*arguments: Any) -> Result:
+    words = ["grid", *(str(argument) for argument in arguments), "--adapter", "software"]
+    return CliRunner().invoke(program, words)
+
+
+def done(*arguments: Any) -> str:
+    result = run(*arguments)
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result.stdout
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    values = np.random.default_rng(5).random((9, 12, 3)).astype(np.float32)
+    save(Picture.of_values(values, "float"), tmp_path / "a.exr")
+    return tmp_path / "a.exr"
+
+
+class TestAxes:
+    @pytest.mark.parametrize(
+        ("word", "expected"),
+        [
+            ("blur_scale=0.1:2:3", [0.1, 1.05, 2.0]),
+            ("blur-scale=1:4:3:log", [1.0, 2.0, 4.0]),
+            ("blur_scale=2", [2.0]),
+            ("time=0,0.5", [0.0, 0.5]),
+            ("loops=1,2", [1, 2]),
+            ("tonemap=none,aces", ["none", "aces"]),
+            ("threshold=none,0.5", [None, 0.5]),
+            ("direct=off,on", [False, True]),
+            ("bloom_size=none,64x32", [None, (64, 32)]),
+            ("weights=0.5,0.25;1;", [(0.5, 0.25), (1.0,)]),
+            ("layers=1:1,2:0.5;1:1", [((1.0, 1.0), (2.0, 0.5)), ((1.0, 1.0),)]),
+        ],
+    )
+    def test_words(self, word: str, expected: list[Any]) -> None:
+        (found,) = axis_values([word], Separable()).values()
+        if word.endswith("log"):
+            np.testing.assert_allclose(found, expected)
+        else:
+            assert list(found) == expected
+
+    @pytest.mark.parametrize(
+        ("word", "told"),
+        [
+            ("blur_scale", "NAME=FIRST:LAST:COUNT"),
+            ("blur_sale=1", "no such field"),
+            ("radius=1", "no such field"),
+            ("blur_scale=1:2", "not a valid float"),
+            ("blur_scale=1:2:0", "out of range"),
+            ("blur_scale=0:2:3:log", "above 0"),
+            ("blur_scale=0:2:3:lin", "not FIRST:LAST:COUNT"),
+            ("tonemap=nice", "is not one of"),
+            ("blur_scale=1,99", "blur_scale: 99.0 is out of range"),
+            ("loops=1:2:4", "whole number"),
+        ],
+    )
+    def test_wrong_use_is_one_line(self, tmp_path: Path, word: str, told: str) -> None:
+        result = run("--axis", word, "-o", tmp_path / "a.zarr")
+        assert result.exit_code == 2
+        assert told in result.stderr
+        assert result.stderr.count("\n") == 1
+        assert not (tmp_path / "a.zarr").exists()
+
+
+class TestStores:
+    def test_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
+        out = tmp_path / "a.zarr"
+        told = done(
+            "--axis", "time=0,0.25", "--axis", "blur_scale=1:2:2", "--size", "32x18",
+            "--tonemap", "aces", "-o", out, "--reduce", "mean", "--reduce",
+            "like=psnr:final@blur_scale=1", "--attachments", "final,depth",
+            "--sheet", tmp_path / "s.png", "--curves", tmp_path / "c.svg", "--chunk", "time=2",
+        )  # fmt: skip
+        assert "4 points; passes run" in told
+        found = xr.open_zarr(out)
+        expected = renderer.render(
+            scene, Separable(blur_scale=2, tonemap="aces"), (32, 18), time=0.25
+        )
+        np.testing.assert_array_equal(found["final"].values[1, 1], expected["final"])
+        assert found["final"].chunks[0] == (2,)
+        assert np.isinf(found["like"].values[:, 0]).all()
+        assert load(tmp_path / "s.png").pixels.shape[2] == 3
+        assert "<svg" in (tmp_path / "c.svg").read_text()
+
+    def test_images_by_their_names(self, tmp_path: Path, picture: Path) -> None:
+        save(Picture.of_values(noise(9, 12, 3, dtype="float32"), "float"), tmp_path / "b.exr")
+        done(
+            picture,
+            tmp_path / "b.exr",
+            "--axis",
+            "radius=1,2",
+            "--method",
+            "pyramid",
+            "--attachments",
+            "none",
+            "--reduce",
+            f"psnr@{picture}",
+            "-o",
+            tmp_path / "a.zarr",
+        )
+        found = xr.open_zarr(tmp_path / "a.zarr")
+        assert set(found) == {"done", "psnr"}
+        assert list(found["image"].values) == [str(picture), str(tmp_path / "b.exr")]
+
+    def test_resumed_only_when_asked(self, tmp_path: Path, picture: Path) -> None:
+        words = [picture, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
+        done(*words)
+        (tmp_path / "a.zarr" / "final" / "c.0.0.0.0").write_bytes(b"")
+        again = run(*words)
+        assert again.exit_code == 1
+        assert "resume it" in again.stderr
+        mended = run(*words, "--resume")
+        assert mended.exit_code == 0
+        assert "c.0.0.0.0 was damaged" in mended.stderr
+        assert "exposure=0..1" in mended.stderr
+        other = run(*words, "--resume", "--intensity", "0.5")
+        assert other.exit_code == 1
+        assert "settings.intensity: 1.0 in the store, 0.5 asked for" in other.stderr
+
+    def test_workers(self, tmp_path: Path, picture: Path) -> None:
+        words = [picture, "--axis", "exposure=0:1:4"]
+        told = done(*words, "-o", tmp_path / "a.zarr", "--workers", "1")
+        assert "4 points" in told
+        done(*words, "-o", tmp_path / "b.zarr")
+        found, expected = (xr.open_zarr(tmp_path / name) for name in ("a.zarr", "b.zarr"))
+        np.testing.assert_array_equal(found["final"].values, expected["final"].values)
+
+    @pytest.mark.parametrize(
+        ("words", "told"),
+        [
+            (["--workers", "1", "--scheduler", "tcp://localhost:1"], "give one of them"),
+            (["--reduce", "median"], "'median' is not one of"),
+            (["--reduce", "ssim"], "needs @REFERENCE"),
+            (["--reduce", "mean@blur_scale=1"], "has no @REFERENCE"),
+            (["--reduce", "ssim@blur_scale=3"], "is not a value of the grid"),
+            (["--chunk", "blur_scale"], "NAME=COUNT"),
+            (["--size", "3x3"], "only scenes"),
+            (["--attachments", "none"], "nothing is asked for"),
+        ],
+        ids=str,
+    )
+    def test_wrong_use(self, tmp_path: Path, picture: Path, words: list[str], told: str) -> None:
+        out = tmp_path / "a.zarr"
+        result = run(picture, "--axis", "blur_scale=1,2", "-o", out, *words)
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert told in result.stderr
+        assert not out.exists()
+
+
+class TestImageFiles:
+    def test_one_a_point_in_the_colours_of_apply(self, tmp_path: Path, picture: Path) -> None:
+        out = tmp_path / "files"
+        done(
+            picture,
+            "--axis",
+            "intensity=0,1",
+            "--axis",
+            "exposure=-1,0",
+            "-o",
+            out,
+            "--attachments",
+            "final,bloom",
+        )
+        assert sorted(path.name for path in out.iterdir()) == sorted(
+            [
+                f"00{i}_00{j}_{name}"
+                for i in (0, 1)
+                for j in (0, 1)
+                for name in ("final.png", "bloom.exr")
+            ]
+            + ["grid.json"]
+        )
+        CliRunner().invoke(
+            program,
+            [
+                "apply",
+                str(picture),
+                str(tmp_path / "one.png"),
+                "--exposure",
+                "-1",
+                "--adapter",
+                "software",
+            ],
+        )
+        np.testing.assert_array_equal(
+            load(out / "001_000_final.png").pixels, load(tmp_path / "one.png").pixels
+        )
+
+    def test_exr_of_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
+        out = tmp_path / "files"
+        done(
+            "--axis",
+            "blur_scale=1,2",
+            "--size",
+            "20x10",
+            "-o",
+            out,
+            "--image-format",
+            "exr",
+            "--attachments",
+            "final",
+        )
+        expected = renderer.render(scene, Separable(blur_scale=2), (20, 10))["final"]
+        found = load(out / "001_final.exr").pixels
+        np.testing.assert_array_equal(np.rint(found * np.float32(255)), expected)
+
+    def test_resumed(self, tmp_path: Path, picture: Path) -> None:
+        out = tmp_path / "files"
+        words = [picture, "--axis", "exposure=0,1,2", "-o", out, "--image-format", "exr"]
+        done(*words)
+        before = {path.name: path.read_bytes() for path in out.iterdir()}
+        (out / "001_final.exr").unlink()
+        assert "there is a grid already" in run(*words).stderr
+        assert "passes run 0" not in done(*words, "--resume")
+        assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+        assert "passes run 0" in done(*words, "--resume")
+        other = run(*words, "--resume", "--knee", "0.5")
+        assert other.exit_code == 1
+        assert "settings.knee" in other.stderr
+
+    def test_something_else_is_left_alone(self, tmp_path: Path, picture: Path) -> None:
+        (tmp_path / "files").mkdir()
+        (tmp_path / "files" / "letter.txt").write_text("dear")
+        result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", "--resume")
+        assert result.exit_code == 1
+        assert "there is no grid in it" in result.stderr
+
+    def test_what_is_for_stores(self, tmp_path: Path, picture: Path) -> None:
+        for words in (["--reduce", "mean"], ["--sheet", "a.png"], ["--chunk", "exposure=1"]):
+            result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", *words)
+            assert result.exit_code == 2
+            assert "for a store" in result.stderr
+
+
+TOML = """
+out = "{out}"
+images = ["{picture}"]
+attachments = "final,bloom"
+
+[settings]
+method = "pyramid"
+levels = 3
+firefly_filter = true
+bloom_size = [16, 8]
+
+[axes]
+radius = "0.5:2:2"
+intensity = [0.25, 1]
+tonemap = ["none", "aces"]
+
+[reduce]
+mean = "mean"
+energy = "encircled_energy:bloom"
+
+[chunks]
+intensity = 2
+"""
+
+YAML = """
+out: "{out}"
+images: "{picture}"
+attachments: final,bloom
+settings: {{method: pyramid, levels: 3, firefly_filter: true, bloom_size: [16, 8]}}
+axes:
+  radius: 0.5:2:2
+  intensity: [0.25, 1]
+  tonemap: [none, aces]
+reduce: {{mean: mean, energy: "encircled_energy:bloom"}}
+chunks: {{intensity: 2}}
+"""
+
+
+class TestOptionFiles:
+    @pytest.mark.parametrize(("suffix", "text"), [("toml", TOML), ("yaml", YAML)])
+    def test_holds_options(self, tmp_path: Path, picture: Path, suffix: str, text: str) -> None:
+        file = tmp_path / f"a.{suffix}"
+        file.write_text(text.format(out=tmp_path / "a.zarr", picture=picture))
+        done("--from", file)
+        found = xr.open_zarr(tmp_path / "a.zarr")
+        settings = json.loads(found.attrs["settings"])
+        assert (settings["levels"], settings["bloom_size"]) == (3, [16, 8])
+        assert settings["firefly_filter"] is True
+        assert dict(found.sizes)["radius"] == 2
+        assert list(found["tonemap"].values) == ["none", "aces"]
+        assert found["final"].chunks[1] == (2,)
+        assert {"mean", "energy"} <= set(found)
+        image = load(picture).pixels
+        with Renderer("software") as renderer:
+            expected = renderer.apply(
+                image,
+                Pyramid(
+                    levels=3,
+                    firefly_filter=True,
+                    radius=2,
+                    bloom_size=(16, 8),
+                    intensity=0.25,
+                    tonemap="aces",
+                ),
+            )
+        np.testing.assert_array_equal(found["final"].values[1, 0, 1], expected["final"])
+
+    def test_the_command_line_comes_on_top(self, tmp_path: Path, picture: Path) -> None:
+        file = tmp_path / "a.toml"
+        file.write_text(TOML.format(out=tmp_path / "a.zarr", picture=picture))
+        done(f"--from={file}", "--levels", "2", "-o", tmp_path / "b.zarr")
+        settings = json.loads(xr.open_zarr(tmp_path / "b.zarr").attrs["settings"])
+        assert settings["levels"] == 2
+        assert not (tmp_path / "a.zarr").exists()
+
+    def test_lists_in_lists(self, tmp_path: Path, picture: Path) -> None:
+        file = tmp_path / "a.toml"
+        file.write_text(
+            "[settings]\nlayers = [[1, 1], [2, 0.5]]\n[axes]\nbloom_size = [[4, 4], [8, 8]]\n"
+            "weights = [[0.5, 0.25], [1.0]]\n"
+        )
+        done(picture, "--from", file, "-o", tmp_path / "a.zarr")
+        found = xr.open_zarr(tmp_path / "a.zarr")
+        assert list(found["bloom_size"].values) == ["[4, 4]", "[8, 8]"]
+        assert list(found["weights"].values) == ["[0.5, 0.25]", "[1.0]"]
+        assert json.loads(found.attrs["settings"])["layers"] == [[1.0, 1.0], [2.0, 0.5]]
+
+    @pytest.mark.parametrize(
+        ("name", "text", "status", "told"),
+        [
+            ("a.toml", "a = ", 1, "a.toml: "),
+            ("a.yaml", "a: [", 1, "a.yaml: "),
+            ("a.yaml", "3", 1, "names and values"),
+            ("a.txt", "", 1, "none of .toml"),
+            ("a.toml", "axes = 3", 1, "axes must be a table"),
+            ("a.toml", "nonsense = 3", 2, "--nonsense"),
+            ("missing.toml", None, 1, "missing.toml: No such file"),
+        ],
+    )
+    def test_files_that_do_not_load(
+        self, tmp_path: Path, name: str, text: str | None, status: int, told: str
+    ) -> None:
+        if text is not None:
+            (tmp_path / name).write_text(text)
+        result = run("--from", tmp_path / name, "-o", tmp_path / "a.zarr")
+        assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
+        assert told in result.stderr

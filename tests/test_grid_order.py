@@ -1,0 +1,67 @@
+"""The order in which a grid's points are visited."""
+
+from __future__ import annotations
+
+import collections
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vkbloom.grid.order import blocks, default_chunk, points
+
+
+@st.composite
+def lattices(draw: st.DrawFn) -> tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]:
+    """Shapes, chunks and rankings; chunks need not divide the shape."""
+    shape = tuple(draw(st.lists(st.integers(1, 5), max_size=4)))
+    chunk = tuple(draw(st.integers(1, count)) for count in shape)
+    return shape, chunk, tuple(draw(st.permutations(range(len(shape)))))
+
+
+def visited(
+    shape: tuple[int, ...], chunk: tuple[int, ...], ranking: tuple[int, ...]
+) -> list[tuple[int, ...]]:
+    return [index for block in blocks(shape, chunk, ranking) for index in points(block, ranking)]
+
+
+@given(lattices())
+def test_every_point_once_and_one_axis_a_step(
+    lattice: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]],
+) -> None:
+    found = visited(*lattice)
+    assert sorted(found) == list(np.ndindex(lattice[0]))
+    for before, after in itertools.pairwise(found):
+        assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
+
+
+def steps(
+    shape: tuple[int, ...], chunk: tuple[int, ...], ranking: tuple[int, ...]
+) -> collections.Counter[int]:
+    """Count the steps along each axis."""
+    return collections.Counter(
+        next(axis for axis, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)
+        for before, after in itertools.pairwise(visited(shape, chunk, ranking))
+    )
+
+
+@given(lattices(), st.integers(1, 40))
+def test_default_chunks_cost_no_steps_along_slow_axes(
+    lattice: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]], most: int
+) -> None:
+    shape, _, ranking = lattice
+    chunk = default_chunk(shape, ranking, most)
+    assert math.prod(chunk) <= most
+    assert steps(shape, chunk, ranking) == steps(shape, shape, ranking)
+
+
+@pytest.mark.parametrize("ranking", [(0, 1), (1, 0)])
+def test_blocks_cover_the_grid(ranking: tuple[int, int]) -> None:
+    count = np.zeros((5, 4), int)
+    for block in blocks((5, 4), (2, 3), ranking):
+        assert block.count == count[block.slices].size
+        count[block.slices] += 1
+    assert (count == 1).all()
