@@ -97,6 +97,13 @@ static PyObject *optional_attribute(const struct reader *reader, size_t attribut
     return value;
 }
 
+bool vkb_require_tuple(PyObject *object, const char *what)
+{
+    if (!PyTuple_Check(object))
+        PyErr_Format(PyExc_TypeError, "%s: a tuple is needed, not %R", what, object);
+    return PyTuple_Check(object);
+}
+
 static void store_value(struct vkb_values *values, const struct vkb_value_row *row, double number)
 {
     char *place = (char *)values + row->offset;
@@ -194,7 +201,8 @@ static bool read_size(const struct reader *reader, struct vkb_settings *settings
     if (!value)
         return !PyErr_Occurred();
     if (value != Py_None) {
-        done = PyArg_ParseTuple(value, "II;bloom_size must be (width, height)",
+        done = vkb_require_tuple(value, "bloom_size")
+            && PyArg_ParseTuple(value, "II;bloom_size must be (width, height)",
                                 &settings->bloom_width, &settings->bloom_height);
         if (done && (settings->bloom_width == 0 || settings->bloom_height == 0)) {
             PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, 1 a side at least",
@@ -269,7 +277,7 @@ static bool read_layers(const struct reader *reader, struct vkb_settings *settin
     for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
         PyObject *item = PySequence_GetItem(value, i);
         struct vkb_layer *layer = &settings->layers[i];
-        if (item
+        if (item && vkb_require_tuple(item, "layers")
             && PyArg_ParseTuple(item, "ff;layers must hold (scale, strength)", &layer->scale,
                                 &layer->strength)
             && !(isfinite(layer->scale) && isfinite(layer->strength)))

@@ -73,6 +73,9 @@ bool vkb_make_attributes(struct vkb_module_state *state);
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 
+// Whether it is a tuple, as PyArg_ParseTuple must have it; else with a TypeError set.
+bool vkb_require_tuple(PyObject *object, const char *what);
+
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
 

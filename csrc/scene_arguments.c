@@ -42,8 +42,9 @@ static bool read_surfaces(PyObject *tuple, uint32_t texture_count, struct vkb_me
         return false;
     for (Py_ssize_t i = 0; i < count; ++i) {
         struct vkb_surface *surface = &mesh->surfaces[i];
-        if (!PyArg_ParseTuple(PyTuple_GetItem(tuple, i), "III", &surface->index_count,
-                              &surface->base, &surface->emission))
+        if (!vkb_require_tuple(PyTuple_GetItem(tuple, i), "scene: surface")
+            || !PyArg_ParseTuple(PyTuple_GetItem(tuple, i), "III", &surface->index_count,
+                                 &surface->base, &surface->emission))
             return false;
         taken += surface->index_count;
         if (surface->base >= texture_count || surface->emission >= texture_count
@@ -81,8 +82,9 @@ static bool read_mesh(struct vkb_held_scene *scene, PyObject *tuple, struct vkb_
 
     if (tuple == Py_None)
         return true;
-    if (!PyArg_ParseTuple(tuple, "OOOOO!", &vertices, &indices, &emission, &texcoords,
-                          &PyTuple_Type, &surfaces))
+    if (!vkb_require_tuple(tuple, "scene: mesh")
+        || !PyArg_ParseTuple(tuple, "OOOOO!", &vertices, &indices, &emission, &texcoords,
+                             &PyTuple_Type, &surfaces))
         return false;
     const Py_buffer *vertex_view = hold(scene, vertices, "vertices", "f");
     const Py_buffer *index_view = vertex_view ? hold(scene, indices, "indices", "I") : NULL;
@@ -185,8 +187,9 @@ static bool read_texture(struct vkb_held_scene *scene, PyObject *tuple,
     int modes[2], filter[3];
     PyObject *levels;
 
-    if (!PyArg_ParseTuple(tuple, "O!sssss", &PyTuple_Type, &levels, &across, &down, &magnified,
-                          &minified, &between)
+    if (!vkb_require_tuple(tuple, "texture")
+        || !PyArg_ParseTuple(tuple, "O!sssss", &PyTuple_Type, &levels, &across, &down, &magnified,
+                             &minified, &between)
         || !find_name(address_modes, across, &modes[0])
         || !find_name(address_modes, down, &modes[1]) || !find_name(filters, magnified, &filter[0])
         || !find_name(filters, minified, &filter[1])

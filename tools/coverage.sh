@@ -8,9 +8,9 @@ set -eu
 cd "$(dirname "$0")/.."
 PYTHON=${PYTHON:-python3}
 if [ $# = 0 ]; then
-    for name in apply apply_input batches deferred deferred_passes errors forms graph interruption \
-        lifetime out_of_date pipeline_cache presets readback render scene separable settings \
-        skybox textures; do
+    for name in adapters apply apply_input batches core_arguments deferred deferred_passes errors \
+        forms graph interruption lifetime out_of_date pipeline_cache presets readback render scene \
+        separable settings skybox textures; do
         set -- "$@" "tests/test_$name.py"
     done
 fi

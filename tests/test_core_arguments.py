@@ -1,0 +1,130 @@
+"""The core checks what it is given, also where the package has checked it before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vkbloom import Renderer, Scene, Separable, _core
+from vkbloom.renderer import _render_arguments
+
+
+def settings_with(**fields: Any) -> object:
+    """Return settings of a type of their own: the core keeps in mind what a type lacks."""
+    return type("Given", (), {"method": "separable", **fields})()
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"blur_scale": -1.0}, "blur_scale: -1.0 is out of range, 0.0 to 16.0"),
+        ({"blur_scale": float("nan")}, "blur_scale: nan is out of range"),
+        ({"blur_scale": "1"}, "real number"),
+        ({"composite": "divide"}, "composite: there is no 'divide'"),
+        ({"composite": 5}, "composite: there is no 5"),
+        ({"format": "bgra8unorm"}, "format: 'bgra8unorm' is no format of bloom buffers"),
+        ({"format": "depth32float"}, "format: 'depth32float' is no format"),
+        ({"format": 5}, "format: 5 is no format"),
+        ({"bloom_size": (0, 5)}, r"bloom_size: \(0, 5\) is out of range"),
+        ({"bloom_size": 5}, "bloom_size: a tuple is needed, not 5"),
+        ({"method": "gauss"}, "method: there is no 'gauss'"),
+        ({"method": None}, "method: there is no None"),
+        ({"weights": ()}, "weights: 0 weights are out of range, 1 to"),
+        ({"weights": (1.0,) * 100}, "weights: 100 weights are out of range"),
+        ({"weights": 5}, "len|sequence"),
+        ({"weights": ("a",)}, "real number"),
+        ({"layers": ()}, "layers: 0 layers are out of range, 1 to"),
+        ({"layers": ((1.0, float("inf")),)}, "layers: .* is not finite"),
+        ({"layers": (1.0,)}, "layers: a tuple is needed, not 1.0"),
+        ({"layers": 5}, "len|sequence"),
+    ],
+)
+def test_settings(fields: dict[str, Any], message: str) -> None:
+    with pytest.raises((TypeError, ValueError), match=message):
+        _core.describe(settings_with(**fields), (16, 16), True, "forward")
+
+
+def test_settings_that_raise() -> None:
+    class Given:
+        method = "separable"
+
+        @property
+        def blur_scale(self) -> float:
+            raise OSError("no disk")
+
+    with pytest.raises(OSError, match="no disk"):
+        _core.describe(Given(), (16, 16), True, "forward")
+    with pytest.raises(AttributeError, match="method"):
+        _core.describe(object(), (16, 16), True, "forward")
+
+
+def test_shadings_and_sizes() -> None:
+    with pytest.raises(ValueError, match="shading: there is no toon"):
+        _core.describe(Separable(), (16, 16), True, "toon")
+    with pytest.raises(TypeError):
+        _core.describe(Separable(), 16, True, "forward")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.zeros((4, 4, 3)),
+        np.zeros((4, 4, 3), np.int32),
+        np.zeros((4, 4), np.uint8),
+        np.zeros((4, 4, 2), np.uint8),
+        np.zeros((0, 4, 3), np.uint8),
+        "image",
+    ],
+    ids=str,
+)
+def test_images(renderer: Renderer, array: Any) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        renderer._core.apply(array, None)
+
+
+def test_arrays_of_the_wrong_size(renderer: Renderer) -> None:
+    batch = renderer._core.apply(np.zeros((4, 4, 3), np.uint8), None)
+    with pytest.raises(ValueError, match="glow: the array has the wrong size"):
+        batch.add(Separable(), lambda name, shape, dtype: np.zeros(3, dtype))
+    with pytest.raises(RuntimeError, match="without points"):
+        batch.submit()
+    with pytest.raises(RuntimeError, match="collected once"):
+        batch.collect()
+
+
+def test_scenes(renderer: Renderer, scene: Scene) -> None:
+    arrays, *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+    serial, body, glow, sky, textures = arrays
+    wrong = [
+        (serial, (body[0].astype(np.float64), *body[1:]), glow, sky, textures),
+        (serial, (body[0], body[1].astype(np.int8), *body[2:]), glow, sky, textures),
+        (serial, (*body[:2], np.zeros((1, 3), np.float32), *body[3:]), glow, sky, textures),
+        (serial, (*body[:4], ((3, 0, 0),)), glow, sky, textures),
+        (serial, body, glow, sky[:1] * 20, textures),
+        (serial, body, glow, sky[:1] * 2, textures),
+        (serial, body, glow, sky, (((), "repeat", "repeat", "linear", "linear", "linear"),)),
+        (serial, body, glow, sky, ((sky, "repeat", "tile", "linear", "linear", "linear"),)),
+        (serial, body, glow, sky),
+        (serial, 5, glow, sky, textures),
+        (serial, (*body[:4], (5,)), glow, sky, textures),
+        (serial, body, glow, sky, (5,)),
+    ]
+    for given in wrong:
+        with pytest.raises((TypeError, ValueError)):
+            renderer._core.render(given, *rest)
+
+
+def test_a_renderer_takes_no_keywords() -> None:
+    make: Any = _core.Renderer
+    with pytest.raises(TypeError, match="keyword"):
+        make("software", validation=True)
+    with pytest.raises(OSError, match="no cache"):
+        _core.Renderer("software", True, "auto", 1.0, _no_cache)
+    with pytest.raises(TypeError):
+        _core.Renderer("software", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
+
+
+def _no_cache(uuid: bytes) -> bytes | None:
+    raise OSError("no cache")
