@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 import vkbloom
-from vkbloom.explorer.session import Session
+from vkbloom.explorer.viewer import Viewer
 
 # What starts both for the tests.
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
@@ -112,7 +112,7 @@ def main(count: int, in_lab: bool, adapter: str) -> None:
         stack.callback(browser.close)
         renderer = stack.enter_context(vkbloom.Renderer(adapter))
         scene = vkbloom.Scene.ufo()
-        url = stack.enter_context(served(lambda: Session(scene, renderer=renderer)))
+        url = stack.enter_context(served(lambda: Viewer(scene, renderer=renderer)))
         page = browser.new_page(viewport={"width": 1024, "height": 900})
         page.goto(url)
         fit(page)

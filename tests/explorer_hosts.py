@@ -18,18 +18,18 @@ from pathlib import Path
 
 import vkbloom
 from vkbloom.explorer.server import Server
-from vkbloom.explorer.session import Session
+from vkbloom.explorer.viewer import Viewer
 
 _PATIENCE = 60.0  # seconds, for JupyterLab on a busy machine
 
 
 @contextmanager
-def served(new_session: Callable[[], Session]) -> Iterator[str]:
+def served(new_viewer: Callable[[], Viewer]) -> Iterator[str]:
     """Serve the page from a thread, and yield where."""
     started: queue.Queue[tuple[str, asyncio.AbstractEventLoop, asyncio.Event]] = queue.Queue()
 
     async def main() -> None:
-        server, stopped = Server(new_session), asyncio.Event()
+        server, stopped = Server(new_viewer), asyncio.Event()
         started.put((server.url, asyncio.get_running_loop(), stopped))
         await stopped.wait()
         await server.stop()

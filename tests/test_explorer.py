@@ -1,4 +1,4 @@
-"""The explorer without a browser: controls, settings as code, and the session's answers."""
+"""The explorer without a browser: controls, settings as code, and the viewer's answers."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from framebuffers import decode, make, noise
 import vkbloom
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, presets
 from vkbloom.explorer.controls import METHODS, as_code, controls, settings_from
-from vkbloom.explorer.session import Session
 from vkbloom.explorer.shown import picture_of, reduced
+from vkbloom.explorer.viewer import Viewer
 
 EXAMPLES = [
     *presets.values(),
@@ -27,14 +27,14 @@ EXAMPLES = [
 ]
 
 
-def ask(session: Session, **message: Any) -> tuple[dict[str, Any], list[bytes]]:
+def ask(viewer: Viewer, **message: Any) -> tuple[dict[str, Any], list[bytes]]:
     """Ask as a page does: what goes through JSON comes out the same."""
-    answer, buffers = session.answer(json.loads(json.dumps(message, allow_nan=False)))
+    answer, buffers = viewer.answer(json.loads(json.dumps(message, allow_nan=False)))
     return json.loads(json.dumps(answer, allow_nan=False)), buffers
 
 
-def frame(session: Session, settings: Settings, **rest: Any) -> tuple[dict[str, Any], bytes]:
-    answer, buffers = ask(session, kind="frame", sides={"a": settings.as_dict()}, **rest)
+def frame(viewer: Viewer, settings: Settings, **rest: Any) -> tuple[dict[str, Any], bytes]:
+    answer, buffers = ask(viewer, kind="frame", sides={"a": settings.as_dict()}, **rest)
     assert answer["kind"] == "frame", answer
     assert "error" not in answer["sides"]["a"], answer
     (picture,) = buffers
@@ -47,8 +47,8 @@ def image() -> np.ndarray[Any, Any]:
 
 
 @pytest.fixture
-def session(scene: Scene, renderer: Renderer) -> Session:
-    return Session(scene, renderer=renderer, size=(64, 36))
+def viewer(scene: Scene, renderer: Renderer) -> Viewer:
+    return Viewer(scene, renderer=renderer, size=(64, 36))
 
 
 class TestControls:
@@ -171,47 +171,47 @@ class TestShown:
         assert reduced(image, (1, 1)).shape == (1, 1, 3)
 
 
-class TestSession:
-    def test_setup(self, session: Session) -> None:
-        answer, buffers = ask(session, kind="setup", view="v", id=4)
+class TestViewer:
+    def test_setup(self, viewer: Viewer) -> None:
+        answer, buffers = ask(viewer, kind="setup", view="v", id=4)
         assert (answer["kind"], answer["view"], answer["id"], buffers) == ("setup", "v", 4, [])
         assert answer["sides"]["a"] == json.loads(json.dumps(Separable().as_dict()))
         assert answer["sides"]["b"]["bloom"] is False
         assert (answer["animated"], answer["own_size"]) == (True, [64, 36])
 
     def test_a_frame_is_that_of_the_renderer(
-        self, session: Session, scene: Scene, renderer: Renderer, tmp_path: Path
+        self, viewer: Viewer, scene: Scene, renderer: Renderer, tmp_path: Path
     ) -> None:
         settings = Separable(blur_scale=1.5)
-        facts, picture = frame(session, settings, size=[80, 45], time=0.25)
+        facts, picture = frame(viewer, settings, size=[80, 45], time=0.25)
         expected = renderer.render(scene, settings, (80, 45), time=0.25)
         assert np.array_equal(decode(picture, tmp_path), expected["final"][:, :, :3])
         assert facts["names"] == list(expected)
         assert (facts["framebuffer"], facts["size"], facts["dtype"]) == ("final", [80, 45], "uint8")
         assert facts["code"] == "vkbloom.Separable(blur_scale=1.5)"
         assert set(facts["passes"]) <= {"glow", "blur_vertical", "bloom", "scene", "final"}
-        assert session.settings["a"] == settings
-        assert np.array_equal(session.frames["a"]["final"], expected["final"])
+        assert viewer.settings["a"] == settings
+        assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
         # Without a size, the scene's own.
-        assert frame(session, settings)[0]["size"] == [64, 36]
+        assert frame(viewer, settings)[0]["size"] == [64, 36]
 
     @pytest.mark.parametrize("shading", ["forward", "deferred"])
     def test_every_framebuffer_can_be_looked_at(
         self, scene: Scene, renderer: Renderer, shading: Any
     ) -> None:
-        session = Session(scene, renderer=renderer, size=(64, 36), shading=shading)
+        viewer = Viewer(scene, renderer=renderer, size=(64, 36), shading=shading)
         settings = Pyramid(levels=2)
         names = list(renderer.render(scene, settings, (64, 36), shading=shading))
-        assert frame(session, settings)[0]["names"] == names
+        assert frame(viewer, settings)[0]["names"] == names
         for name in names:
-            assert frame(session, settings, framebuffer=name)[0]["framebuffer"] == name
+            assert frame(viewer, settings, framebuffer=name)[0]["framebuffer"] == name
 
-    def test_a_framebuffer_that_is_not_there_is_final(self, session: Session) -> None:
-        assert frame(session, Separable(), framebuffer="down_3")[0]["framebuffer"] == "final"
+    def test_a_framebuffer_that_is_not_there_is_final(self, viewer: Viewer) -> None:
+        assert frame(viewer, Separable(), framebuffer="down_3")[0]["framebuffer"] == "final"
 
-    def test_both_sides_at_once(self, session: Session, tmp_path: Path) -> None:
+    def test_both_sides_at_once(self, viewer: Viewer, tmp_path: Path) -> None:
         sides = {"b": Separable(bloom=False).as_dict(), "a": Separable().as_dict()}
-        answer, buffers = ask(session, kind="frame", sides=sides)
+        answer, buffers = ask(viewer, kind="frame", sides=sides)
         with_bloom, without = (
             decode(buffers[answer["sides"][side]["picture"]], tmp_path).astype(int).sum()
             for side in "ab"
@@ -221,51 +221,51 @@ class TestSession:
     def test_an_image_is_reduced_unless_its_own_size_is_asked_for(
         self, image: Any, renderer: Renderer, tmp_path: Path
     ) -> None:
-        session = Session(image, renderer=renderer)
+        viewer = Viewer(image, renderer=renderer)
         settings = Pyramid(levels=2)
-        facts, _ = frame(session, settings, size=[20, 99])
+        facts, _ = frame(viewer, settings, size=[20, 99])
         assert facts["size"] == [20, 15]
         expected = renderer.apply(reduced(image, (20, 99)), settings)
-        assert np.array_equal(session.frames["a"]["final"], expected["final"])
+        assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
         for size in (None, [400, 300]):
-            facts, picture = frame(session, settings, size=size, stops=-2)
+            facts, picture = frame(viewer, settings, size=size, stops=-2)
             assert facts["size"] == [40, 30]
             whole = renderer.apply(image, settings)["final"]
             shown = picture_of(whole, "final", is_encoded=False, stops=-2)
             assert np.array_equal(decode(picture, tmp_path), decode(shown, tmp_path))
 
     def test_a_later_change_of_the_image_is_not_seen(self, image: Any, renderer: Renderer) -> None:
-        session = Session(image, Separable(bloom=False), renderer=renderer)
+        viewer = Viewer(image, Separable(bloom=False), renderer=renderer)
         before = image.copy()
         image[...] = 0
-        frame(session, Separable(bloom=False))
-        assert np.array_equal(session.frames["a"]["final"], before)
+        frame(viewer, Separable(bloom=False))
+        assert np.array_equal(viewer.frames["a"]["final"], before)
 
     def test_the_pointer_reads_the_framebuffer_itself(self, image: Any, renderer: Renderer) -> None:
         image[29, 39] = (1.2345, np.inf, 3000)
-        session = Session(image, renderer=renderer)
+        viewer = Viewer(image, renderer=renderer)
         settings = Separable(bloom=False)
-        facts, _ = frame(session, settings, view="v", at=[1, 1])
+        facts, _ = frame(viewer, settings, view="v", at=[1, 1])
         # The half float that is nearest to 1.2345, in as few digits as tell it from the next.
         assert facts["probe"] == {"x": 39, "y": 29, "values": ["1.234", "inf", "3000.0"]}
-        answer, _ = ask(session, kind="probe", view="v", at=[0.5, 0.1])
+        answer, _ = ask(viewer, kind="probe", view="v", at=[0.5, 0.1])
         found = answer["sides"]["a"]["probe"]
         assert (found["x"], found["y"]) == (20, 3)
         assert np.array_equal(np.array(found["values"], np.float16), image[3, 20])
         # Another view has shown nothing yet; what many others show is not kept for ever.
-        assert ask(session, kind="probe", view="w", at=[0, 0])[0]["sides"] == {}
+        assert ask(viewer, kind="probe", view="w", at=[0, 0])[0]["sides"] == {}
         for view in range(20):
-            ask(session, kind="probe", view=str(view), at=[0, 0])
-        assert ask(session, kind="probe", view="v", at=[0, 0])[0]["sides"] == {}
+            ask(viewer, kind="probe", view=str(view), at=[0, 0])
+        assert ask(viewer, kind="probe", view="v", at=[0, 0])[0]["sides"] == {}
 
-    def test_a_side_that_fails_leaves_the_other(self, session: Session) -> None:
+    def test_a_side_that_fails_leaves_the_other(self, viewer: Viewer) -> None:
         wrong = {"method": "kino", "composite": "mix"}
         sides = {"a": wrong, "b": Separable().as_dict()}
-        answer, buffers = ask(session, kind="frame", sides=sides)
+        answer, buffers = ask(viewer, kind="frame", sides=sides)
         assert "composite: 'mix' is not one of add" in answer["sides"]["a"]["error"]
         assert "code" in answer["sides"]["b"]
         assert len(buffers) == 1
-        assert session.settings["a"] == Separable()
+        assert viewer.settings["a"] == Separable()
 
     @pytest.mark.parametrize(
         "message",
@@ -285,8 +285,8 @@ class TestSession:
             {"kind": "probe", "at": [None, 0]},
         ],
     )
-    def test_messages_without_sense(self, session: Session, message: Any) -> None:
-        answer, buffers = session.answer(message)
+    def test_messages_without_sense(self, viewer: Viewer, message: Any) -> None:
+        answer, buffers = viewer.answer(message)
         assert (answer["kind"], buffers) == ("error", [])
         assert answer["error"]
 
@@ -297,24 +297,24 @@ class TestSession:
             ((scene, 3), TypeError, "settings"),
         ):
             with pytest.raises(kind, match=message):
-                Session(*arguments, renderer=renderer)
+                Viewer(*arguments, renderer=renderer)
         for options, message in (({"shading": "x"}, "shading"), ({"size": (0, 1)}, "size")):
             with pytest.raises(ValueError, match=message):
-                Session(scene, renderer=renderer, **options)
+                Viewer(scene, renderer=renderer, **options)
 
     def test_the_renderer(
         self, scene: Scene, renderer: Renderer, new_renderer: Callable[[], Renderer]
     ) -> None:
-        Session(scene, renderer=renderer).close()
+        Viewer(scene, renderer=renderer).close()
         assert not renderer.closed
-        owner = Session(scene, adapter="software")
+        owner = Viewer(scene, adapter="software")
         owner.close()
         owner.close()
         assert owner.renderer.closed
         closed = new_renderer()
         closed.close()
         with pytest.raises(ValueError, match="closed"):
-            Session(scene, renderer=closed)
+            Viewer(scene, renderer=closed)
 
 
 class TestWidget:

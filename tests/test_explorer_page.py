@@ -23,7 +23,7 @@ from framebuffers import decode
 from numpy.typing import NDArray
 
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
-from vkbloom.explorer.session import Session
+from vkbloom.explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -50,17 +50,17 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def serve() -> Iterator[Callable[[Callable[[], Session]], str]]:
-    """Serves sessions from a thread, and returns where."""
+def serve() -> Iterator[Callable[[Callable[[], Viewer]], str]]:
+    """Serves viewers from a thread, and returns where."""
     with ExitStack() as stack:
-        yield lambda new_session: stack.enter_context(served(new_session))
+        yield lambda new_viewer: stack.enter_context(served(new_viewer))
 
 
 @pytest.fixture(scope="module")
 def scene_url(
-    serve: Callable[[Callable[[], Session]], str], scene: Scene, renderer: Renderer
+    serve: Callable[[Callable[[], Viewer]], str], scene: Scene, renderer: Renderer
 ) -> str:
-    return serve(lambda: Session(scene, renderer=renderer, size=ASPECT))
+    return serve(lambda: Viewer(scene, renderer=renderer, size=ASPECT))
 
 
 @contextmanager
@@ -218,6 +218,11 @@ def test_the_pointer_reads_values(
         page.get_by_text(f"{name}[45, 123] = {values}", exact=True).wait_for(timeout=5000)
     page.mouse.move(1, 1)
     page.get_by_text("Point at the picture").wait_for()
+    # It comes to the picture while another framebuffer is on its way.
+    page.get_by_label("framebuffer").select_option("final")
+    page.locator("canvas").hover(position={"x": 123, "y": 45})
+    values = "  ".join(str(value) for value in expected["final"][45, 123])
+    page.get_by_text(f"final[45, 123] = {values}", exact=True).wait_for(timeout=5000)
 
 
 def test_time_plays_and_pauses(
@@ -289,7 +294,7 @@ def test_pictures_follow_the_window(page: Page, tmp_path: Path) -> None:
 
 def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Path) -> None:
     image = (np.random.default_rng(3).random((60, 80, 3)) ** 8 * 20).astype(np.float32)
-    url = serve(lambda: Session(image, KinoBloom(), renderer=renderer))
+    url = serve(lambda: Viewer(image, KinoBloom(), renderer=renderer))
     with opened(browser, url) as page:
         assert page.get_by_label("time, in turns").count() == 0
         expected = renderer.apply(image, KinoBloom())["final"]
@@ -310,7 +315,7 @@ def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Pa
 
 
 def test_a_server_that_stops_is_noticed(browser: Browser, serve: Any, renderer: Renderer) -> None:
-    class Failing(Session):
+    class Failing(Viewer):
         def answer(self, message: Any) -> Any:
             if message["kind"] == "frame" and message["sides"]["a"]["bloom"] is False:
                 raise ZeroDivisionError

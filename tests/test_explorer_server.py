@@ -17,7 +17,7 @@ from framebuffers import noise
 import vkbloom
 from vkbloom import Renderer, Separable
 from vkbloom.cli.program import program
-from vkbloom.explorer.session import Session
+from vkbloom.explorer.viewer import Viewer
 
 tornado = pytest.importorskip("tornado")
 
@@ -42,7 +42,7 @@ def serve(renderer: Renderer) -> Callable[[Callable[[Server], Awaitable[None]]],
 
     def run(talk: Callable[[Server], Awaitable[None]]) -> None:
         async def both() -> None:
-            server = Server(lambda: Session(image, renderer=renderer))
+            server = Server(lambda: Viewer(image, renderer=renderer))
             try:
                 await talk(server)
             finally:
@@ -101,7 +101,7 @@ def test_the_page_and_its_files(serve: Any) -> None:
             # Nothing is loaded from elsewhere.
             assert b"https://" not in response.body
             assert b"http://" not in response.body
-        for name in ("other.js", "session.py", "../server.py", "..%2fserver.py"):
+        for name in ("other.js", "viewer.py", "../server.py", "..%2fserver.py"):
             assert (await get(server.url + name)).code in (403, 404)
 
     serve(talk)
@@ -163,7 +163,7 @@ def test_frames_come_with_their_pictures(serve: Any) -> None:
         assert header["id"] == 1
         assert [side["picture"] for side in header["sides"].values()] == [0, 1]
         assert all(buffer.startswith(b"\x89PNG") for buffer in buffers)
-        # Each page has its own session.
+        # Each page has its own viewer.
         other = await connect(server)
         await other.write_message(json.dumps({"kind": "setup"}))
         assert (await answer(other))[0]["sides"]["a"]["intensity"] == 1.0

@@ -19,7 +19,7 @@ import OpenImageIO as oiio
 from playwright.sync_api import sync_playwright
 
 import vkbloom
-from vkbloom.explorer.session import Session
+from vkbloom.explorer.viewer import Viewer
 
 # What starts both for the tests.
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
@@ -58,7 +58,7 @@ def photograph_own_page(browser: Browser, folder: Path) -> None:
     with vkbloom.Renderer("software") as renderer:
         against = vkbloom.Separable()
         begun = vkbloom.Separable(blur_scale=1.6)
-        with served(lambda: Session(scene, begun, against=against, renderer=renderer)) as url:
+        with served(lambda: Viewer(scene, begun, against=against, renderer=renderer)) as url:
             for theme in THEMES:
                 page = browser.new_page(viewport={"width": 1120, "height": 560}, color_scheme=theme)
                 page.goto(url)

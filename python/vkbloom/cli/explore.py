@@ -19,7 +19,7 @@ from vkbloom.cli.image_files import read_picture, subimage_option
 from vkbloom.cli.program import blaming_the_call, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.explorer.session import Session
+from vkbloom.explorer.viewer import Viewer
 from vkbloom.extras import import_extra
 from vkbloom.renderer import SHADINGS, Shading
 
@@ -74,22 +74,22 @@ def command(
     )
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 
-        def new_session() -> Session:
-            return Session(looked_at, settings, size=size, shading=shading, renderer=renderer)
+        def new_viewer() -> Viewer:
+            return Viewer(looked_at, settings, size=size, shading=shading, renderer=renderer)
 
         with blaming_the_call():
             # What is wrong with the arguments is said here, not on the page.
-            new_session()
+            new_viewer()
         click.echo(f"Rendering on {renderer.info.summary}")
         with contextlib.suppress(KeyboardInterrupt):
-            asyncio.run(_serve(new_session, port, opens))
+            asyncio.run(_serve(new_viewer, port, opens))
 
 
-async def _serve(new_session: Callable[[], Session], port: int, opens: bool) -> None:
+async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> None:
     # Needs tornado, whose absence `command` has explained.
     from vkbloom.explorer.server import Server  # noqa: PLC0415
 
-    server = Server(new_session, port)
+    server = Server(new_viewer, port)
     stopped = asyncio.Event()
     # Without a handler of its own, Ctrl-C would come between the loop's own steps.
     with contextlib.suppress(NotImplementedError):

@@ -2,7 +2,7 @@
 
 ==================== ====================================================================
 `controls`           what can be set, for the page to make controls of; settings as code
-`session`            one viewer: messages of the page in, pictures and values out
+`viewer`             one viewer: messages of the page in, pictures and values out
 `shown`              framebuffers as PNG, quickly
 `widget`             the page in a notebook (anywidget)
 `server`             the page on 127.0.0.1 (tornado), for ``vkbloom explore``
@@ -80,9 +80,9 @@ def explore(
     texels looks wider in a reduced frame than in a larger one.
     """
     import_extra("anywidget", "notebook", "explore")
-    from vkbloom.explorer.session import Session  # noqa: PLC0415  needs the renderer's module
+    from vkbloom.explorer.viewer import Viewer  # noqa: PLC0415  needs the renderer's module
     from vkbloom.explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     return Explorer(
-        Session(source, settings, against=against, size=size, shading=shading, renderer=renderer)
+        Viewer(source, settings, against=against, size=size, shading=shading, renderer=renderer)
     )

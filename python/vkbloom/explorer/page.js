@@ -1,6 +1,6 @@
 // The explorer's page: a picture, and the controls that change it. `mount` puts it into an element;
 // a notebook's widget (the default export) and the page on its own (start.js) differ only in what
-// carries the messages. vkbloom/explorer/session.py says what those are.
+// carries the messages. vkbloom/explorer/viewer.py says what those are.
 
 const TURNS_PER_SECOND = 0.25; // of the forward system's animation
 const HIGHEST = 0.72; // of the window, that a picture takes
@@ -116,7 +116,7 @@ export function mount(parent, send) {
   let drawn = 0;
   let asked = 0;
   let waiting = 0; // the id of the frame that is under way, 0: none
-  const sent = new Map(); // id to when
+  const sent = new Map(); // id to when, and where the pointer was
   const outdated = new Set();
   let probing = false;
   let probeAgain = false;
@@ -163,7 +163,7 @@ export function mount(parent, send) {
     if (waiting || !sides.length || !setup || !box[0]) return;
     for (const side of sides) outdated.delete(side);
     waiting = ++asked;
-    sent.set(waiting, performance.now());
+    sent.set(waiting, { when: performance.now(), pointer });
     const ratio = window.devicePixelRatio || 1;
     send({
       kind: "frame",
@@ -239,7 +239,9 @@ export function mount(parent, send) {
       shown[side] = { ...facts, picture: pictures[index] };
     });
     draw();
-    showFacts(performance.now() - began);
+    showFacts(performance.now() - began.when);
+    // The values that came with it are of where the pointer was.
+    if (pointer !== began.pointer) probe();
     root.dispatchEvent(new CustomEvent("vkbloom:drawn", { detail: { id: message.id } }));
   }
 

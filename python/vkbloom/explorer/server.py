@@ -24,7 +24,7 @@ from tornado.httputil import HTTPServerRequest
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from vkbloom.explorer.session import Session
+from vkbloom.explorer.viewer import Viewer
 
 __all__ = ["Server"]
 
@@ -50,8 +50,8 @@ class Server:
 
     Parameters
     ----------
-    new_session : callable
-        Makes the session of each page that is opened. They may share a renderer.
+    new_viewer : callable
+        Makes the viewer of each page that is opened. They may share a renderer.
     port : int, default 0
         To listen on; 0: any that is free.
 
@@ -70,7 +70,7 @@ class Server:
     To be made and used in a running event loop.
     """
 
-    def __init__(self, new_session: Callable[[], Session], port: int = 0) -> None:
+    def __init__(self, new_viewer: Callable[[], Viewer], port: int = 0) -> None:
         listening = socket.create_server((_ADDRESS, port))
         listening.setblocking(False)
         self.port: int = listening.getsockname()[1]
@@ -78,7 +78,7 @@ class Server:
         self.url = f"http://{_ADDRESS}:{self.port}/{self.token}/"
         # One thread: the renderer takes one call at a time.
         self._worker = ThreadPoolExecutor(1, "vkbloom-explore")
-        shared = {"server": self, "new_session": new_session, "worker": self._worker}
+        shared = {"server": self, "new_viewer": new_viewer, "worker": self._worker}
         self._http = HTTPServer(
             Application(
                 [
@@ -140,10 +140,10 @@ class _Socket(WebSocketHandler):
     """One page: its newest message is answered, older ones that still wait are dropped."""
 
     def initialize(
-        self, server: Server, new_session: Callable[[], Session], worker: ThreadPoolExecutor
+        self, server: Server, new_viewer: Callable[[], Viewer], worker: ThreadPoolExecutor
     ) -> None:
         self._server = server
-        self._new_session = new_session
+        self._new_viewer = new_viewer
         self._worker = worker
         self._waiting: dict[str, dict[str, Any]] = {}
         self._answers: asyncio.Future[None] | None = None
@@ -160,7 +160,7 @@ class _Socket(WebSocketHandler):
     def open(self, *arguments: str) -> None:
         # Pictures are small messages that somebody waits for.
         self.set_nodelay(True)
-        self._session = self._new_session()
+        self._viewer = self._new_viewer()
 
     def on_message(self, message: str | bytes) -> None:
         try:
@@ -186,13 +186,13 @@ class _Socket(WebSocketHandler):
             while self._waiting:
                 asked = self._waiting.pop(next(iter(self._waiting)))
                 header, pictures = await loop.run_in_executor(
-                    self._worker, self._session.answer, asked
+                    self._worker, self._viewer.answer, asked
                 )
                 await self.write_message(_packed(header, pictures), binary=True)
         except WebSocketClosedError:
             self._waiting.clear()
         except Exception:
-            # Not one of those that a session answers with: the page shall not wait for ever.
+            # Not one of those that a viewer answers with: the page shall not wait for ever.
             self.close(1011, "the server failed")
             raise
 

@@ -1,4 +1,4 @@
-"""The page in a notebook: a widget whose messages a session answers."""
+"""The page in a notebook: a widget whose messages a viewer answers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import anywidget
 from vkbloom.renderer import _check_settings
 
 if TYPE_CHECKING:
-    from vkbloom.explorer.session import Session
+    from vkbloom.explorer.viewer import Viewer
     from vkbloom.frames import Frames
     from vkbloom.settings import Settings
 
@@ -24,7 +24,7 @@ class Explorer(anywidget.AnyWidget):
 
     Parameters
     ----------
-    session : Session
+    viewer : Viewer
 
     Attributes
     ----------
@@ -37,19 +37,19 @@ class Explorer(anywidget.AnyWidget):
     _esm = (_FILES / "page.js").read_text("utf-8")
     _css = (_FILES / "page.css").read_text("utf-8")
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, viewer: Viewer) -> None:
         super().__init__()
-        self._session = session
+        self._viewer = viewer
         self.on_msg(self._received)
 
     def _received(self, widget: object, message: object, buffers: object) -> None:
-        header, pictures = self._session.answer(message)
+        header, pictures = self._viewer.answer(message)
         self.send(header, pictures)
 
     @property
     def settings(self) -> Settings:
         """The settings of A."""
-        return self._session.settings["a"]
+        return self._viewer.settings["a"]
 
     @settings.setter
     def settings(self, settings: Settings) -> None:
@@ -58,22 +58,22 @@ class Explorer(anywidget.AnyWidget):
     @property
     def against(self) -> Settings:
         """The settings of B."""
-        return self._session.settings["b"]
+        return self._viewer.settings["b"]
 
     @against.setter
     def against(self, settings: Settings) -> None:
         self._set("b", settings)
 
     def _set(self, side: str, settings: Settings) -> None:
-        self._session.settings[side] = _check_settings(settings)
+        self._viewer.settings[side] = _check_settings(settings)
         self.send({"kind": "settings", "sides": {side: settings.as_dict()}}, [])
 
     @property
     def frames(self) -> Frames | None:
         """The framebuffer of A that was shown last."""
-        return self._session.frames.get("a")
+        return self._viewer.frames.get("a")
 
     def close(self) -> None:
         """Remove the page from the notebook, and close the renderer unless it was given."""
         super().close()
-        self._session.close()
+        self._viewer.close()

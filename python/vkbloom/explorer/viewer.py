@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from vkbloom.scene import Scene
     from vkbloom.settings import Settings
 
-__all__ = ["SIDES", "Session"]
+__all__ = ["SIDES", "Viewer"]
 
 SIDES: Final = ("a", "b")
 
@@ -50,7 +50,7 @@ _FAILURES: Final = (_core.Error, TypeError, ValueError, MemoryError)
 Answer = tuple[dict[str, Any], list[bytes]]
 
 
-class Session:
+class Viewer:
     """A source and the two settings that it is looked at with.
 
     Parameters
