@@ -218,9 +218,19 @@ def test_the_pointer_reads_values(
         page.get_by_text(f"{name}[45, 123] = {values}", exact=True).wait_for(timeout=5000)
     page.mouse.move(1, 1)
     page.get_by_text("Point at the picture").wait_for()
-    # It comes to the picture while another framebuffer is on its way.
+    # It comes to the picture while another framebuffer is on its way, which takes long.
+    page.evaluate(
+        """() => {
+            const decode = window.createImageBitmap;
+            window.createImageBitmap = async (...whatever) => {
+                await new Promise((done) => setTimeout(done, 500));
+                return decode(...whatever);
+            };
+        }"""
+    )
     page.get_by_label("framebuffer").select_option("final")
     page.locator("canvas").hover(position={"x": 123, "y": 45})
+    page.locator(".vkb-status", has_text="uint8").wait_for()
     values = "  ".join(str(value) for value in expected["final"][45, 123])
     page.get_by_text(f"final[45, 123] = {values}", exact=True).wait_for(timeout=5000)
 
