@@ -52,8 +52,8 @@ static PyObject *array_shape(const struct vkb_image_row *row, uint32_t channels)
 }
 
 // Asks the caller's allocate(name, shape, dtype) for the array of one framebuffer.
-static bool add_output(struct vkb_point *point, struct held_arrays *held, uint32_t image,
-                       PyObject *allocate)
+static bool add_output(const struct vkb_renderer *renderer, struct vkb_point *point,
+                       struct held_arrays *held, uint32_t image, PyObject *allocate)
 {
     const struct vkb_image_row *row = &point->graph.images[image];
     const struct vkb_format_info *format = &vkb_formats[row->format];
@@ -74,6 +74,7 @@ static bool add_output(struct vkb_point *point, struct held_arrays *held, uint32
         .image = image,
         .channels = channels,
         .memory = view->buf,
+        .pages = vkb_array_pages(renderer, view->buf),
     };
     if ((size_t)view->len == (size_t)row->width * row->height * channels * format->channel_size)
         return true;
@@ -114,8 +115,8 @@ static bool check_names(const struct vkb_graph *graph, PyObject *names)
 }
 
 // Arrays for the framebuffers in the graph's order.
-static bool hold_outputs(struct vkb_point *point, struct held_arrays *held, PyObject *names,
-                         PyObject *allocate)
+static bool hold_outputs(const struct vkb_renderer *renderer, struct vkb_point *point,
+                         struct held_arrays *held, PyObject *names, PyObject *allocate)
 {
     const struct vkb_graph *graph = &point->graph;
     struct vkb_error error;
@@ -133,7 +134,7 @@ static bool hold_outputs(struct vkb_point *point, struct held_arrays *held, PyOb
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         int wanted = graph->images[i].framebuffer ? is_wanted(names, graph->images[i].name) : 0;
-        if (wanted < 0 || (wanted && !add_output(point, held, i, allocate)))
+        if (wanted < 0 || (wanted && !add_output(renderer, point, held, i, allocate)))
             return false;
     }
     return true;
@@ -321,7 +322,7 @@ static PyObject *add(PyObject *object, PyObject *arguments)
         vkb_graph_destroy(&point.graph);
         Py_RETURN_FALSE;
     }
-    if (!hold_outputs(&point, &held, self->names, allocate)) {
+    if (!hold_outputs(self->renderer, &point, &held, self->names, allocate)) {
         release_point(&point, &held);
         return NULL;
     }

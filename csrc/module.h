@@ -1,5 +1,5 @@
-// What the files that speak Python share: module.c, renderer.c, batch.c, arguments.c,
-// scene_arguments.c, describe.c. The only header of the core that includes Python.h.
+// What the files that speak Python share: module.c, renderer.c, batch.c, array_memory.c,
+// arguments.c, scene_arguments.c, describe.c. The only header of the core that includes Python.h.
 #ifndef VKB_MODULE_H
 #define VKB_MODULE_H
 
@@ -42,6 +42,7 @@ struct vkb_renderer {
     struct vkb_cargo *adrift;  // touched with the GIL
     long process;              // that opened it: the device is no other's, not even a forked one's
     bool open;
+    PyObject *array_memory;  // a capsule, which the arrays hold too; NULL: closed
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -60,6 +61,18 @@ void vkb_renderer_leave(struct vkb_renderer *renderer);
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Takes the cargo over, whose flight may be in the air.
 void vkb_renderer_set_adrift(struct vkb_renderer *renderer, struct vkb_cargo *cargo);
+
+// Whose the device is: this process's number, whatever it was forked from.
+long vkb_current_process(void);
+
+// Memory for large arrays that the device writes to without a copy; false with an exception set.
+bool vkb_array_memory_create(struct vkb_renderer *renderer);
+// Before the device goes, with the GIL; arrays keep what they have.
+void vkb_array_memory_close(struct vkb_renderer *renderer);
+// The pages that the array's memory is in; NULL: it is not the renderer's. With the GIL.
+struct vkb_page_run *vkb_array_pages(const struct vkb_renderer *renderer, const void *memory);
+// Method of the Renderer: new_array(empty, shape, dtype), what empty(shape, dtype) makes there.
+PyObject *vkb_new_array(PyObject *renderer, PyObject *arguments);
 
 // Methods of the Renderer: a new Batch of points of one scene or of one image.
 PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments);

@@ -18,6 +18,20 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
     *readback = (struct vkb_readback){0};
 }
 
+// They are a buffer from its first use on.
+static bool import_pages(const struct vkb_device *device, struct vkb_output *output)
+{
+    struct vkb_page_run *run = output->pages;
+    VkDeviceSize start = 0;
+
+    if (!run->buffer.handle
+        && !vkb_buffer_import(device, READBACK_USAGE, run->memory, run->size, &run->buffer, &start))
+        return false;
+    output->imported = run->buffer.handle;
+    output->offset = start + (VkDeviceSize)((char *)output->memory - (char *)run->memory);
+    return true;
+}
+
 static bool import(const struct vkb_device *device, struct vkb_readback *readback, size_t size,
                    struct vkb_output *output)
 {
@@ -26,9 +40,11 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
 
     // The device writes whole pixels, to multiples of their size.
     if (output->channels != vkb_formats[output->format].channels
-        || (uintptr_t)output->memory % pixel_size != 0
-        || !vkb_buffer_import(device, READBACK_USAGE, output->memory, size, buffer,
-                              &output->offset))
+        || (uintptr_t)output->memory % pixel_size != 0)
+        return false;
+    if (output->pages)
+        return import_pages(device, output);
+    if (!vkb_buffer_import(device, READBACK_USAGE, output->memory, size, buffer, &output->offset))
         return false;
     output->imported = buffer->handle;
     ++readback->import_count;

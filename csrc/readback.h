@@ -3,7 +3,7 @@
 #ifndef VKB_READBACK_H
 #define VKB_READBACK_H
 
-#include "memory.h"
+#include "pages.h"
 
 // One image wanted on the host: tightly packed rows, top row first, the first `channels` channels
 // of each pixel.
@@ -11,6 +11,7 @@ struct vkb_output {
     uint32_t image;  // in the graph
     uint32_t channels;
     void *memory;
+    struct vkb_page_run *pages;  // that the memory is in; NULL: it is none of the renderer's
     // What vkb_readback_plan decides.
     enum vkb_format format;
     size_t pixels;

@@ -10,7 +10,7 @@ static struct vkb_module_state *state_of(PyObject *self)
     return PyType_GetModuleState(Py_TYPE(self));
 }
 
-static long current_process(void)
+long vkb_current_process(void)
 {
 #ifdef _WIN32
     return 0;  // nothing forks there
@@ -21,7 +21,7 @@ static long current_process(void)
 
 bool vkb_renderer_is_ours(const struct vkb_renderer *self)
 {
-    return self->process == current_process();
+    return self->process == vkb_current_process();
 }
 
 static bool require_ours(const struct vkb_renderer *self, struct vkb_error *error)
@@ -30,7 +30,7 @@ static bool require_ours(const struct vkb_renderer *self, struct vkb_error *erro
         || vkb_fail(error, VKB_ERROR_VALUE,
                     "the renderer was opened in another process (%ld), from which this one (%ld) "
                     "was forked; open one here",
-                    self->process, current_process());
+                    self->process, vkb_current_process());
 }
 
 // The device's question between the slices of a wait: whether a signal's handler raised.
@@ -172,11 +172,11 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
     if (!self)
         return NULL;
-    self->process = current_process();
+    self->process = vkb_current_process();
     self->lock = PyThread_allocate_lock();
     if (!self->lock)
         PyErr_NoMemory();
-    else
+    else if (vkb_array_memory_create(self))
         self->open = create(self, adapter, validation, forms, read_cache, &error);
     if (self->open) {
         self->device.interrupted = interrupted;
@@ -190,8 +190,8 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     return NULL;
 }
 
-// With the validation layer, an object left behind is a message here. A device that hangs is left
-// as it is, with all that it may still use.
+// With the lock, without the GIL. With the validation layer, an object left behind is a message
+// here. A device that hangs is left as it is, with all that it may still use.
 static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
 {
     struct vkb_error ignored;
@@ -209,6 +209,9 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     }
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
+    PyEval_RestoreThread(self->thread);
+    vkb_array_memory_close(self);
+    self->thread = PyEval_SaveThread();
     // The instance stays readable after its end: the messages are the renderer's own memory.
     vkb_device_destroy(&self->device);
     return vkb_instance_check(&self->device.instance, error);
@@ -222,14 +225,18 @@ static void dealloc(PyObject *object)
     struct vkb_error error = {0};
 
     self->device.interrupted = NULL;
-    if (vkb_renderer_is_ours(self))
+    if (vkb_renderer_is_ours(self)) {
+        self->thread = PyEval_SaveThread();
         destroy(self, &error);
+        PyEval_RestoreThread(self->thread);
+    }
     self->open = false;
     // A device that hangs, or another process's, is left behind, and with it what the driver may
     // still use: what is adrift, and this object, to which the messenger brings its messages.
     if (self->device.handle)
         return;
     release_adrift(self);
+    Py_CLEAR(self->array_memory);
     if (self->lock)
         PyThread_free_lock(self->lock);
     release(self);
@@ -316,6 +323,9 @@ static PyMethodDef methods[] = {
     {"render", vkb_batch_of_scene, METH_VARARGS,
      "render(scene, camera, size, shading, time, glow_intensity, names) -> Batch"},
     {"apply", vkb_batch_of_image, METH_VARARGS, "apply(image, names) -> Batch"},
+    {"new_array", vkb_new_array, METH_VARARGS,
+     "new_array(empty, shape, dtype): what empty(shape, dtype) makes, in memory that is used "
+     "again."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };

@@ -21,7 +21,7 @@ BEYOND = 40  # a frame that does without one refused block may stop at the next
 
 def collected(renderer: Renderer, n: int) -> tuple[bool, dict[str, Any] | None]:
     """Return whether request n was refused (0: none is), and the frame, or None after an error."""
-    image, settings, allocate = picture(SIZE), Separable(), _allocator(None)
+    image, settings, allocate = picture(SIZE), Separable(), _allocator(renderer._core, None)
     result = None
     failed = False
     if n:

@@ -56,6 +56,13 @@ class Renderer:
     @property
     def pipeline_count(self) -> int: ...
     def close(self) -> None: ...
+    def new_array(
+        self,
+        empty: Callable[[tuple[int, ...], str], _Array],
+        shape: tuple[int, ...],
+        dtype: str,
+        /,
+    ) -> _Array: ...
     def pipeline_cache(self) -> bytes: ...
     def render(
         self,

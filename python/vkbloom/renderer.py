@@ -90,6 +90,7 @@ def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | No
 
 
 def _allocator(
+    core: _core.Renderer,
     out: Mapping[str, NDArray[Any]] | None,
 ) -> Callable[[str, tuple[int, ...], str], NDArray[Any]]:
     """Return what gives the core its arrays: those of `out` where they fit, else new ones."""
@@ -98,7 +99,7 @@ def _allocator(
 
     def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
         if out is None or name not in out:
-            return np.empty(shape, dtype)
+            return core.new_array(np.empty, shape, dtype)
         array = out[name]
         if not isinstance(array, np.ndarray):
             raise TypeError(f"out: {name} must be an array, not {type(array).__name__}")
@@ -492,7 +493,7 @@ class Renderer:
         settings: Settings,
         out: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
-        batch.add(settings, _allocator(out))
+        batch.add(settings, _allocator(self._core, out))
         batch.submit()
         (result,) = batch.collect()
         _check_filled(out, result[0])
@@ -502,7 +503,7 @@ class Renderer:
         self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
     ) -> Iterator[Frames]:
         checked = map(_check_settings, settings_seq)
-        for settings, result in batches.run(checked, open_batch, _allocator(None)):
+        for settings, result in batches.run(checked, open_batch, _allocator(self._core, None)):
             yield self._frames(settings, result)
 
     def _frames(self, settings: Settings, result: batches.Result) -> Frames:
