@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -20,10 +20,9 @@ SIDE = 600
 
 
 @pytest.fixture
-def own() -> Iterator[Renderer]:
+def own(new_renderer: Callable[[], Renderer]) -> Renderer:
     """A renderer without pages from other tests."""
-    with Renderer("software", validation=True) as renderer:
-        yield renderer
+    return new_renderer()
 
 
 def picture(dtype: str, channels: int = 4, side: int = SIDE, seed: int = 0) -> NDArray[np.generic]:
@@ -94,11 +93,10 @@ def test_slices_of_an_array_are_written_in_place(own: Renderer, start: int) -> N
     assert (pages[start + image.size :] == 7).all()
 
 
-def test_arrays_outlive_the_renderer_and_can_grow() -> None:
-    with Renderer("software", validation=True) as renderer:
-        image = picture("float32")
-        array = final(renderer, image, 1.0)
-        kept = array.copy()
+def test_arrays_outlive_the_renderer_and_can_grow(own: Renderer) -> None:
+    array = final(own, picture("float32"), 1.0)
+    kept = array.copy()
+    own.close()
     np.testing.assert_array_equal(array, kept)
     array[0] = 3
     kept[0] = 3
