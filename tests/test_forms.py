@@ -127,6 +127,20 @@ def test_the_largest_halves_stay_finite(formed: Renderer, threshold: float | Non
         np.testing.assert_array_equal(alone, image)
 
 
+def test_large_images_in_the_form_of_gpus(monkeypatch: pytest.MonkeyPatch) -> None:
+    # There strips are for large images alone.
+    monkeypatch.setenv("VKBLOOM_FORM", "gpu")
+    image = picture(1028, 772, 4, "float16")
+    settings = Pyramid(levels=2)
+    expected = reference_apply(image, settings)["final"]
+    limit = tolerance(image.dtype, expected)
+    with Renderer(ADAPTER, validation=True) as renderer:
+        for attachments in (("final",), "all"):
+            frames = renderer.apply(image, settings, attachments=attachments)
+            assert np.abs(real(frames["final"]) - expected).max() <= limit
+            renderer.apply(image[::-1], settings)
+
+
 # What runs
 
 
