@@ -34,6 +34,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     vkb_upload_destroy(device, &frame->upload);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
+    vkb_graph_destroy(&frame->previous.graph);
     *frame = (struct vkb_frame){0};
 }
 
@@ -585,17 +586,46 @@ static void record_input(struct run *run)
     run->input->valid = true;
 }
 
-static bool record_point(struct run *run, struct vkb_point *point, struct vkb_error *error)
+static uint64_t source_version(const struct run *run)
+{
+    return run->input ? run->input->version : run->frame->scene.serial;
+}
+
+// A copy of the point's passes, for it may be gone when the next one comes.
+static bool keep_previous(struct run *run, struct vkb_error *error)
+{
+    struct vkb_previous *previous = &run->frame->previous;
+    struct vkb_graph *graph = &previous->graph;
+
+    graph->pass_count = 0;
+    if (!vkb_grow(error, (void **)&graph->passes, &graph->pass_capacity, run->graph->pass_count,
+                  sizeof *graph->passes))
+        return false;
+    memcpy(graph->passes, run->graph->passes, run->graph->pass_count * sizeof *graph->passes);
+    graph->pass_count = run->graph->pass_count;
+    previous->source = source_version(run);
+    return true;
+}
+
+// `next` is the point after it, NULL after the last.
+static bool record_point(struct run *run, struct vkb_point *point, const struct vkb_point *next,
+                         struct vkb_error *error)
 {
     struct vkb_flight *flight = run->flight;
+    const struct vkb_previous *previous = &run->frame->previous;
+    const struct vkb_neighbours neighbours = {
+        .previous = previous->source == source_version(run) ? &previous->graph : NULL,
+        .next = next ? &next->graph : NULL,
+    };
 
     run->point = point;
     run->graph = &point->graph;
     point->timing_count = 0;
     point->first_span = flight->timer.span_count;
     if (!mark_current(run, error)
-        || !vkb_plan(run->graph, point->outputs, point->output_count, run->current, run->needed,
-                     run->wanted, error))
+        || !vkb_plan(run->graph, &neighbours, point->outputs, point->output_count, run->current,
+                     run->needed, run->wanted, error)
+        || !keep_previous(run, error))
         return false;
     for (uint32_t i = 0; i < run->graph->image_count; ++i)
         if (run->wanted[i] && !resolve(run, i, error))
@@ -621,7 +651,7 @@ static bool record_and_submit(struct run *run, struct vkb_point *points, uint32_
     if (run->send_input)
         record_input(run);
     for (uint32_t i = 0; i < point_count; ++i)
-        if (!record_point(run, &points[i], error))
+        if (!record_point(run, &points[i], i + 1 < point_count ? &points[i + 1] : NULL, error))
             return false;
     vkb_barrier_record_host_read(device, commands);
     return vkb_buffer_flush(device, &flight->uniforms, error)

@@ -10,6 +10,12 @@
 #include "slots.h"
 #include "upload.h"
 
+// The passes of the point that was recorded last, and what its source was.
+struct vkb_previous {
+    struct vkb_graph graph;  // without images
+    uint64_t source;
+};
+
 // Everything that lives from frame to frame. What the flights share is changed by the device in the
 // order of the submissions, and by the host only when nothing is in the air.
 struct vkb_frame {
@@ -18,6 +24,7 @@ struct vkb_frame {
     struct vkb_scene scene;
     struct vkb_upload upload;
     struct vkb_slots slots;
+    struct vkb_previous previous;
     bool stale;  // something failed: the images are made anew before anything is recorded
 };
 

@@ -46,25 +46,48 @@ static uint32_t count_running(const struct vkb_graph *graph, const bool *needed,
     return count;
 }
 
-bool vkb_plan(const struct vkb_graph *graph, const struct vkb_output *outputs,
-              uint32_t output_count, const bool *current, bool *needed, bool *wanted,
-              struct vkb_error *error)
+static bool same_pass(const struct vkb_graph *a, const struct vkb_graph *b, uint32_t i)
 {
-    bool *skipped = vkb_alloc(error, graph->pass_count, sizeof *skipped);
+    return i < a->pass_count && i < b->pass_count
+        && memcmp(&a->passes[i], &b->passes[i], sizeof a->passes[i]) == 0;
+}
+
+// Whether the neighbour has what the alternative spares, the same, but not the pass before it,
+// which reads that.
+static bool shares(const struct vkb_graph *graph, const struct vkb_graph *neighbour,
+                   uint32_t alternative, const bool *plain, const bool *needed, const bool *current)
+{
+    if (!neighbour || same_pass(graph, neighbour, alternative - 1))
+        return false;
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (plain[i] && !needed[i] && !current[i] && i != alternative - 1
+            && !same_pass(graph, neighbour, i))
+            return false;
+    return true;
+}
+
+bool vkb_plan(const struct vkb_graph *graph, const struct vkb_neighbours *neighbours,
+              const struct vkb_output *outputs, uint32_t output_count, const bool *current,
+              bool *needed, bool *wanted, struct vkb_error *error)
+{
+    bool *skipped = vkb_alloc(error, (size_t)2 * graph->pass_count, sizeof *skipped);
 
     if (!skipped)
         return false;
+    bool *plain = skipped + graph->pass_count;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         skipped[i] = graph->passes[i].alternative;
     mark(graph, outputs, output_count, skipped, needed, wanted);
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         if (!graph->passes[i].alternative)
             continue;
-        const uint32_t before = count_running(graph, needed, current);
+        memcpy(plain, needed, graph->pass_count * sizeof *plain);
         skipped[i] = false;
         skipped[i - 1] = true;
         mark(graph, outputs, output_count, skipped, needed, wanted);
-        if (count_running(graph, needed, current) < before)
+        if (count_running(graph, needed, current) < count_running(graph, plain, current)
+            && !shares(graph, neighbours->previous, i, plain, needed, current)
+            && !shares(graph, neighbours->next, i, plain, needed, current))
             continue;
         skipped[i] = true;
         skipped[i - 1] = false;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from test_apply import DTYPES, METHODS, picture
 from tolerance import assert_matches_reference, real, tolerance
 
-from vkbloom import Pyramid, Renderer, Scene, Separable, Settings, gaussian_weights, presets
+from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, gaussian_weights, presets
 from vkbloom.reference import apply as reference_apply
 
 FORMS = ("fragment", "cpu", "gpu")
@@ -148,11 +148,9 @@ def test_one_pass_stands_for_all_of_a_final(form: str, formed: Renderer) -> None
     image = picture(33, 44, 4, "float32", seed=5)
     ran = list(formed.apply(image, Separable(), attachments=("final",)).timings)
     assert ran == (["glow", "blur_vertical", "bloom", "final"] if form == "fragment" else ["final"])
-    # The same again: nothing; the composite changed: one pass in any form.
+    # The same again: nothing.
     again = formed.apply(image, Separable(), attachments=("final",))
     assert list(again.timings) == []
-    darker = Separable(exposure=-1.0)
-    assert list(formed.apply(image, darker, attachments=("final",)).timings) == ["final"]
 
 
 def test_what_is_there_is_not_made_again(formed: Renderer) -> None:
@@ -164,6 +162,41 @@ def test_what_is_there_is_not_made_again(formed: Renderer) -> None:
     np.testing.assert_array_equal(alone["final"], frames["final"])
     darker = formed.apply(image, Separable(exposure=-1.0), attachments=("final",))
     assert list(darker.timings) == ["final"]
+
+
+def ran(frames: Iterable[Frames]) -> list[list[str]]:
+    return [list(one.timings) for one in frames]
+
+
+def test_a_sequence_makes_once_what_its_settings_share(form: str, formed: Renderer) -> None:
+    image = picture(37, 52, 4, "float32", seed=7)
+    whole = ["glow", "blur_vertical", "bloom", "final"]
+    alone = whole if form == "fragment" else ["final"]
+    exposures = [Separable(exposure=exposure) for exposure in (0.0, 1.0, 2.0, 3.0)]
+    # The first frame comes without a look at the next.
+    rest = ["final"] if form == "fragment" else whole
+    frames = list(formed.apply_many(image, exposures, attachments=("final",)))
+    assert ran(frames) == [alone, rest, ["final"], ["final"]]
+    for settings, one in zip(exposures, frames, strict=True):
+        expected = reference_apply(image, settings)["final"]
+        assert np.abs(one["final"] - expected).max() <= tolerance(image.dtype, expected)
+    # Nor are single calls looked at before they come.
+    image = image[::-1]
+    singly = [formed.apply(image, settings, attachments=("final",)) for settings in exposures]
+    assert ran(singly) == [alone, rest, ["final"], ["final"]]
+
+
+def test_a_sequence_makes_nothing_for_others(form: str, formed: Renderer) -> None:
+    image = picture(37, 52, 4, "float32", seed=8)
+    alone = ["blur_vertical", "bloom", "final"] if form == "fragment" else ["final"]
+    strengths = [Separable(blur_strength=strength) for strength in (1.0, 2.0, 2.0, 0.5, 0.25)]
+    frames = formed.apply_many(image, strengths, attachments=("final",))
+    assert ran(frames)[1:] == [alone, [], alone, alone]
+    # Another image has another bloom, whatever the exposure was before.
+    settings = [Separable(exposure=exposure) for exposure in (1.0, 2.0)]
+    for turn, changed in enumerate(settings):
+        one = formed.apply(image[turn + 1 :], changed, attachments=("final",))
+        assert ran([one]) == [["glow", *alone] if form == "fragment" else alone]
 
 
 def test_a_pass_has_one_time_in_every_form(formed: Renderer, scene: Scene) -> None:
