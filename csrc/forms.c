@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const char *const form_names[VKB_FORMS_COUNT] = {
@@ -34,7 +35,7 @@ static const enum vkb_mode stored_as[VKB_FORMAT_COUNT] = {
 
 // A kernel on whole texels: the same blur where each pixel of the target lies on a texel.
 struct kernel {
-    float weights[LINE_VEC4S * 4];
+    float weights[LINE_RADIUS + 4];  // the half-kernel, then zeros, in whole vec4s
     int radius;
 };
 
@@ -58,7 +59,7 @@ static bool find_kernel(const struct vkb_pass_row *blur, int limit, struct kerne
     const int taps = blur->constants[1];
     const double step = tap_step(blur), strength = params->layer_strength;
     const double side = strength * params->blur_strength;
-    double weights[LINE_VEC4S * 4] = {0};
+    double weights[LINE_RADIUS + 4] = {0};
 
     if (ceil(taps * step) > limit)
         return false;
@@ -119,28 +120,6 @@ struct form {
     uint32_t least_pixels;  // of the target
 };
 
-// A pass over all pixels of one target: drawn on processors, on GPUs a compute shader, for some of
-// them (made to compute) draw slowly.
-static bool add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
-                           const struct vkb_pass_row *pass, struct vkb_error *error)
-{
-    struct vkb_pass_row row;
-
-    memcpy(&row, pass, sizeof row);
-    if (forms == VKB_FORMS_GPU)
-        dispatch(&row, vkb_spirv[pass->shader].dispatch, 8, 8);
-    return vkb_graph_add_pass(graph, &row, error);
-}
-
-static bool add_pixels(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
-                       struct vkb_error *error)
-{
-    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
-         && vkb_spirv[pass->shader].dispatch != pass->shader
-         && is_written_once(&choice->plain, pass->targets[0]);
-    return !*fits || add_fullscreen(choice->forms, choice->graph, pass, error);
-}
-
 #define BY_FORMAT(shader) \
     { \
         [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
@@ -153,6 +132,68 @@ static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(strip_c
 static const enum vkb_shader halve_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(halve_comp);
 static const enum vkb_shader double_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(double_comp);
 static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(double_final_comp);
+static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(blend_comp);
+static const enum vkb_shader bright_shaders[VKB_FORMAT_COUNT] = BY_FORMAT(bright_comp);
+
+// A composite whose images have one size and format.
+static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF
+        && pass->constants[4] == BLOOM_OWN && vkb_same_size(graph, pass->reads[0], pass->targets[0])
+        && vkb_same_size(graph, pass->reads[1], pass->targets[0])
+        && graph->images[pass->reads[0]].format == graph->images[pass->reads[1]].format;
+}
+
+// An extraction in the image's own size.
+static bool brightens(const struct vkb_pass_row *pass)
+{
+    return pass->shader == VKB_SHADER_extract_frag && pass->constants[1] == SAMPLING_WHOLE;
+}
+
+// A pass that needs the texels at each pixel's own place alone, by a shader that loads them.
+static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t constants)
+{
+    dispatch(row, shader, 8 * TEXEL_COLUMNS, TEXEL_ROWS);
+    row->loads = true;
+    memset(&row->constants[constants], 0,
+           (VKB_MAX_CONSTANTS - constants) * sizeof row->constants[0]);
+    row->constant_count = constants;
+}
+
+// A pass over all pixels of one target: on processors drawn, where its texels cannot be loaded, on
+// GPUs a compute shader, for some of them (made to compute) draw slowly.
+static bool add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
+                           const struct vkb_pass_row *pass, struct vkb_error *error)
+{
+    const enum vkb_format format = graph->images[pass->reads[0]].format;
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    if (forms == VKB_FORMS_GPU)
+        dispatch(&row, vkb_spirv[pass->shader].dispatch, 8, 8);
+    else if (blends(graph, pass))
+        load_texels(&row, blend_shaders[format], 4);
+    else if (brightens(pass))
+        load_texels(&row, bright_shaders[format], 1);
+    return vkb_graph_add_pass(graph, &row, error);
+}
+
+static bool add_loaded(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
+                       struct vkb_error *error)
+{
+    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
+         && (blends(&choice->plain, pass) || brightens(pass));
+    return !*fits || add_fullscreen(choice->forms, choice->graph, pass, error);
+}
+
+static bool add_pixels(const struct choice *choice, const struct vkb_pass_row *pass, bool *fits,
+                       struct vkb_error *error)
+{
+    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
+         && vkb_spirv[pass->shader].dispatch != pass->shader
+         && is_written_once(&choice->plain, pass->targets[0]);
+    return !*fits || add_fullscreen(choice->forms, choice->graph, pass, error);
+}
 
 // A line's row: `origin` is the place of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct vkb_pass_row *blur,
@@ -169,12 +210,14 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     row.loads = true;
     row.targets[0] = target;
     row.constants[0] = blur->constants[0];
-    row.constant_count = 1;
+    row.constants[1] = kernel->radius <= LINE_SHORT_RADIUS ? kernel->radius : 0;
+    row.constant_count = 2;
     row.block = VKB_BLOCK_line;
     row.params.line.radius = kernel->radius;
     row.params.line.origin = origin;
     row.params.line.limit = vkb_formats[graph->images[target].format].limit;
-    memcpy(row.params.line.kernel, kernel->weights, sizeof row.params.line.kernel);
+    for (int tap = 0; tap <= 2 * kernel->radius; ++tap)
+        row.params.line.kernel[tap / 4][tap % 4] = kernel->weights[abs(tap - kernel->radius)];
     return row;
 }
 
@@ -570,6 +613,7 @@ static const struct form forms_table[] = {
     {VKB_FORMS_CPU, add_halved, 0},
     {VKB_FORMS_CPU, add_doubled, 0},
     {VKB_FORMS_CPU, add_doubled_final, 0},
+    {VKB_FORMS_CPU, add_loaded, 0},
     {VKB_FORMS_GPU, add_whole_taps, 0},
     {VKB_FORMS_GPU, add_enlarged, 0},
     {VKB_FORMS_GPU, add_from_lines, 0},

@@ -40,7 +40,7 @@
     VEC4S(B, weights, 17)
 
 // The same blur where the source's pixels are the target's: one symmetric kernel on whole texels,
-// v0..v79 with zeros beyond its radius. `origin` is the place of the target's first pixel along the
+// from the first tap to the last, then zeros. `origin` is the place of the target's first pixel along the
 // line, in the source's.
 #define LINE_BLOCK(B, SETTING, INPUT, VEC4S) \
     INPUT(B, int, radius) \
@@ -163,10 +163,11 @@
 #define MAX_LAYERS 8
 
 // Kernels on whole texels, w0.. in vec4s: the longest half-kernel of a line, and of the whole bloom
-// in one pass. A line's shader reads LINE_OUTPUTS - 1 weights beyond the radius, which are 0.
+// in one pass. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
 #define LINE_RADIUS 64
+#define LINE_SHORT_RADIUS 8
 #define LINE_OUTPUTS 8
-#define LINE_VEC4S 18
+#define LINE_VEC4S 34
 #define STRIP_RADIUS 4
 #define STRIP_COLUMNS 8
 #define STRIP_ROWS 72
@@ -174,6 +175,8 @@
 #define HALVE_ROWS 16
 #define DOUBLE_COLUMNS 4
 #define DOUBLE_ROWS 32
+#define TEXEL_COLUMNS 4
+#define TEXEL_ROWS 16
 #define TILE_LOADED 64
 #define TILE_ROWS 32
 #define TILE_RUNS 4
