@@ -31,7 +31,9 @@ def picture(dtype: str, channels: int = 4, side: int = SIDE, seed: int = 0) -> N
 
 
 def final(renderer: Renderer, image: NDArray[np.generic], exposure: float) -> NDArray[np.generic]:
-    return renderer.apply(image, Separable(exposure=exposure), attachments="final")["final"]
+    return renderer.apply(image, Separable(bloom=False, exposure=exposure), attachments="final")[
+        "final"
+    ]
 
 
 def place(array: NDArray[np.generic]) -> int:
@@ -74,7 +76,9 @@ def test_an_array_given_back_is_written_in_place(own: Renderer) -> None:
     image = picture("float16")
     expected = final(own, image, 0.5).copy()
     array = final(own, image, 1.0)
-    frames = own.apply(image, Separable(exposure=0.5), attachments="final", out={"final": array})
+    frames = own.apply(
+        image, Separable(bloom=False, exposure=0.5), attachments="final", out={"final": array}
+    )
     assert frames["final"] is array
     np.testing.assert_array_equal(array, expected)
 
@@ -87,7 +91,7 @@ def test_slices_of_an_array_are_written_in_place(own: Renderer, start: int) -> N
     pages = own._core.new_array(np.empty, (3 * image.size,), "float16")
     pages[:] = 7
     out = pages[start : start + image.size].reshape(image.shape)
-    own.apply(image, Separable(exposure=0.5), attachments="final", out={"final": out})
+    own.apply(image, Separable(bloom=False, exposure=0.5), attachments="final", out={"final": out})
     np.testing.assert_array_equal(out, expected)
     assert (pages[:start] == 7).all()
     assert (pages[start + image.size :] == 7).all()
