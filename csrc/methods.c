@@ -96,6 +96,16 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
     return vkb_graph_add_image(graph, &row, index, error);
 }
 
+// The luminances of 8-bit colours, (2126 r + 7152 g + 722 b) / 10000 / 255, are whole multiples of
+// 1 / 1275000. Half way between two of them, the threshold is out of reach of the rounding of
+// samplers and shaders, which else lift some colours over it that are no brighter than it.
+static float between_levels(float threshold)
+{
+    const double steps = 1275000.0;
+    // What a float makes of a decimal number up to 1 is less than a tenth of a step away from it.
+    return (float)((floor(threshold * steps + 0.1) + 0.5) / steps);
+}
+
 bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
                      struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -118,6 +128,9 @@ bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32
     if (row.constants[0] != THRESHOLD_NONE) {
         row.params.extract.threshold = settings->values.extract.threshold;
         row.params.extract.knee = settings->values.extract.knee;
+        if (row.constants[0] == THRESHOLD_HARD
+            && graph->images[image].format == VKB_FORMAT_RGBA8_UNORM)
+            row.params.extract.threshold = between_levels(row.params.extract.threshold);
     }
     return vkb_graph_add_pass(graph, &row, error);
 }

@@ -23,7 +23,10 @@ layout(set = 0, binding = 1) uniform sampler2D image;
 vec4 shade()
 {
     Place place = PLACE_IN(image);
-    vec3 reduced = sample_at(image, place, vec2(0.0), SAMPLING).rgb;
+    // A flat area at the threshold stays out of the bloom as a whole.
+    bool within = THRESHOLD_MODE == THRESHOLD_HARD && SAMPLING == SAMPLING_FETCH;
+    vec3 reduced = within ? fetch_within(image, place).rgb
+                          : sample_at(image, place, vec2(0.0), SAMPLING).rgb;
     vec3 bright = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
     return vec4(storable(bright), 1.0);
 }

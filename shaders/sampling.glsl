@@ -48,6 +48,17 @@ vec4 fetch_bilinear(sampler2D source, ivec2 texel, vec2 part)
     return mix(top, bottom, part.y);
 }
 
+// The same, never beyond its texels: rounding takes some pixels of a flat area off its value.
+vec4 fetch_within(sampler2D source, Place place)
+{
+    vec4 a = fetch_clamped(source, place.texel);
+    vec4 b = fetch_clamped(source, place.texel + ivec2(1, 0));
+    vec4 c = fetch_clamped(source, place.texel + ivec2(0, 1));
+    vec4 d = fetch_clamped(source, place.texel + ivec2(1, 1));
+    vec4 value = mix(mix(a, b, place.part.x), mix(c, d, place.part.x), place.part.y);
+    return clamp(value, min(min(a, b), min(c, d)), max(max(a, b), max(c, d)));
+}
+
 // The source at an offset, in texels, from a place.
 vec4 sample_at(sampler2D source, Place place, vec2 offset, int sampling)
 {

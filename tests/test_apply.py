@@ -349,3 +349,36 @@ def test_largest_numbers_do_not_overflow(renderer: Renderer, method: str, dtype:
             flat(largest, dtype),
             METHODS[method],
         )
+
+
+def test_a_grey_level_that_is_the_threshold_stays_out(renderer: Renderer) -> None:
+    levels = np.arange(256, dtype=np.uint8)
+    ramp = np.repeat(levels[None, :, None], 3, axis=2)
+    for level in range(256):
+        settings = Separable(threshold=level / 255)
+        glow = renderer.apply(ramp, settings, attachments="glow")["glow"][0, :, 0]
+        np.testing.assert_array_equal(glow, np.where(levels > level, levels, 0), str(level))
+
+
+@pytest.mark.parametrize("scale", [0.37, 1.0, 2.5])
+def test_a_flat_grey_that_is_the_threshold_stays_out_at_every_size(
+    renderer: Renderer, scale: float
+) -> None:
+    for level in (51, 102, 153, 204, 255):
+        flat = np.full((9, 13, 3), level, np.uint8)
+        settings = Separable(threshold=level / 255, bloom_scale=scale)
+        assert not renderer.apply(flat, settings, attachments="glow")["glow"][..., :3].any()
+        settings = Separable(threshold=(level - 1) / 255, bloom_scale=scale)
+        glow = renderer.apply(flat, settings, attachments="glow")["glow"]
+        np.testing.assert_array_equal(glow[..., :3], level)
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+@pytest.mark.parametrize("scale", [0.37, 0.5, 1.5])
+def test_flat_floats_of_the_threshold_stay_out_at_every_size(
+    renderer: Renderer, scale: float, dtype: type[np.floating[Any]]
+) -> None:
+    for value in (0.1, 0.3, 0.7, 1.0, 1.1, 3.0):
+        flat = np.full((37, 41, 3), value, dtype)
+        settings = Separable(threshold=float(dtype(value)), bloom_scale=scale)
+        assert not renderer.apply(flat, settings, attachments="glow")["glow"][..., :3].any()

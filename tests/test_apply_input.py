@@ -421,6 +421,17 @@ def test_out_that_is_no_array(renderer: Renderer) -> None:
         renderer.apply(picture(9, 12, 3, "uint8"), out=wrong)
 
 
+def test_out_that_shares_memory(renderer: Renderer) -> None:
+    image = picture(9, 12, 3, "uint8")
+    whole = np.zeros((18, 12, 4), np.uint8)
+    with pytest.raises(ValueError, match=r"^out: glow and bloom must not share memory"):
+        renderer.apply(image, out={"glow": whole[:9], "bloom": whole[4:13]})
+    expected = renderer.apply(image)
+    renderer.apply(image, out={"glow": whole[:9], "bloom": whole[9:]})
+    assert_array_equal(whole[:9], expected["glow"])
+    assert_array_equal(whole[9:], expected["bloom"])
+
+
 def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
     image = picture(9, 12, 3, "uint8", seed=12)
     first = renderer.apply(image)

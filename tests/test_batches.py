@@ -133,6 +133,12 @@ def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
     assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
 
 
+def test_settings_that_are_no_sequence(renderer: Renderer) -> None:
+    wrong: Any = Separable()
+    with pytest.raises(TypeError, match=r"^settings_seq: "):
+        list(renderer.apply_many(picture(4, 4, 3, 5), wrong))
+
+
 def test_no_settings(renderer: Renderer, scene: Scene) -> None:
     assert list(renderer.apply_many(picture(4, 4, 3, 5), [])) == []
     assert list(renderer.render_many(scene, [], SIZE)) == []

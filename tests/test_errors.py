@@ -185,7 +185,7 @@ def test_the_wrong_byte_order(renderer: Renderer, scene: Scene) -> None:
         renderer.render(scene, None, SIZE, out={"depth": np.zeros(SIZE[::-1], foreign)})
 
 
-@pytest.mark.parametrize("array", [None, [1], b"\0", bytearray(10), memoryview(b"1")], ids=str)
+@pytest.mark.parametrize("array", [None, [1], b"\0", bytearray(10), memoryview(b"1")], ids=type)
 def test_arrays_are_arrays(renderer: Renderer, scene: Scene, array: Any) -> None:
     with pytest.raises(TypeError, match=r"^out: final "):
         renderer.render(scene, None, SIZE, out={"final": array})

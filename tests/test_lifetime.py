@@ -72,6 +72,8 @@ def test_context_manager(scene: Scene) -> None:
     with Renderer("software", validation=True) as third:
         third.close()
     assert third.closed
+    with pytest.raises(ValueError, match="closed"), third:
+        pass
 
 
 @LINUX

@@ -223,6 +223,14 @@ def test_a_scene_from_files() -> None:
     assert loaded.glow.vertices[:, 1].max() > 5.0 > -loaded.glow.vertices[:, 1].min()
 
 
+def test_paths_of_another_type() -> None:
+    wrong: Any = 3
+    with pytest.raises(TypeError, match=r"^base: "):
+        Scene.from_gltf(wrong)
+    with pytest.raises(TypeError, match=r"^glow: "):
+        Scene.from_gltf("base.gltf", glow=wrong)
+
+
 def test_a_scene_of_one_file_has_neither_glow_nor_sky() -> None:
     folder = SEED_DATA / "retroufo"
     if not folder.exists():

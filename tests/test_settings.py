@@ -296,6 +296,23 @@ def test_wrong_gaussian_weights(sigma: float, radius: int | None, name: str) -> 
         gaussian_weights(sigma, radius)
 
 
+def test_gaussian_weights_of_another_type() -> None:
+    wrong: Any = "a"
+    with pytest.raises(TypeError, match=r"^sigma: "):
+        gaussian_weights(wrong)
+    with pytest.raises(TypeError, match=r"^radius: "):
+        gaussian_weights(1.0, wrong)
+    wrong = 2.5
+    with pytest.raises(TypeError, match=r"^radius: "):
+        gaussian_weights(1.0, wrong)
+
+
+def test_layers_that_are_no_pairs() -> None:
+    wrong: Any = (1.0, 0.5)
+    with pytest.raises(TypeError, match=r"^layers: \(scale, strength\) pairs"):
+        Separable(layers=wrong)
+
+
 # Presets
 
 

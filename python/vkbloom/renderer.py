@@ -96,6 +96,7 @@ def _allocator(
     """Return what gives the core its arrays: those of `out` where they fit, else new ones."""
     if out is not None and not isinstance(out, abc.Mapping):
         raise TypeError(f"out: a mapping of names to arrays is needed, not {type(out).__name__}")
+    given: dict[str, NDArray[Any]] = {}
 
     def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
         if out is None or name not in out:
@@ -110,6 +111,11 @@ def _allocator(
             )
         if not array.flags.c_contiguous or not array.flags.writeable:
             raise ValueError(f"out: {name} must be C-contiguous and writeable")
+        for other, taken in given.items():
+            # Of contiguous arrays the bounds say it all.
+            if np.may_share_memory(array, taken):
+                raise ValueError(f"out: {other} and {name} must not share memory")
+        given[name] = array
         return array
 
     return allocate
@@ -194,6 +200,8 @@ class Renderer:
         self._core.close()
 
     def __enter__(self) -> Renderer:
+        if self.closed:
+            raise ValueError("the renderer is closed")
         return self
 
     def __exit__(
@@ -502,6 +510,8 @@ class Renderer:
     def _run_many(
         self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
     ) -> Iterator[Frames]:
+        if not isinstance(settings_seq, abc.Iterable):
+            raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
         checked = map(_check_settings, settings_seq)
         for settings, result in batches.run(checked, open_batch, _allocator(self._core, None)):
             yield self._frames(settings, result)

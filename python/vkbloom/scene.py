@@ -292,6 +292,9 @@ class Scene:
         # Imported late because gltf.py makes the Mesh defined here.
         from . import gltf  # noqa: PLC0415
 
+        for name, path in (("base", base), ("glow", "" if glow is None else glow)):
+            if not isinstance(path, str | os.PathLike):
+                raise TypeError(f"{name}: a path is needed, not {path!r}")
         return cls(
             body=gltf.load_mesh(base),
             glow=None if glow is None else gltf.load_mesh(glow),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import operator
 from collections.abc import Iterable
 from typing import Any, ClassVar, Literal, Self
 
@@ -251,9 +252,11 @@ class Separable(Settings):
                 f"weights: {len(self.weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
             )
         try:
-            pairs = tuple(self.layers)
+            pairs = tuple(tuple(layer) for layer in self.layers)
         except TypeError:
-            raise TypeError(f"layers: pairs are needed, not {self.layers!r}") from None
+            raise TypeError(
+                f"layers: (scale, strength) pairs are needed, not {self.layers!r}"
+            ) from None
         layers = tuple(_finite_floats("layers", layer) for layer in pairs)
         if not 1 <= len(layers) <= _core.MAX_LAYERS:
             raise ValueError(
@@ -350,12 +353,20 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     ------
     ValueError
         `sigma` or `radius` is out of range.
+    TypeError
+        `sigma` is no number, or `radius` no integer.
     """
     limit = _core.MAX_WEIGHTS - 1
+    if isinstance(sigma, str) or not hasattr(sigma, "__float__"):
+        raise TypeError(f"sigma: a number is needed, not {sigma!r}")
     if not (sigma > 0 and math.isfinite(sigma)):
         raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
     if radius is None:
         radius = min(math.ceil(3 * sigma), limit)
+    try:
+        radius = operator.index(radius)
+    except TypeError:
+        raise TypeError(f"radius: a whole number is needed, not {radius!r}") from None
     if not 0 <= radius <= limit:
         raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
     weights = [math.exp(-0.5 * (tap / sigma) ** 2) for tap in range(radius + 1)]
