@@ -22,8 +22,12 @@ vec3 storable(vec3 value)
 // that their picture is that of the passes they spare.
 vec3 as_stored(vec3 value, int format)
 {
-    if (format == STORED_UNORM8)
-        return roundEven(255.0 * clamp(value, 0.0, 1.0)) * (1.0 / 255.0);
+    if (format == STORED_UNORM8) {
+        // Precise: a compiler may else take the factor out of the sums that follow, which then round
+        // where those of texels do not.
+        precise vec3 stored = roundEven(255.0 * clamp(value, 0.0, 1.0)) * (1.0 / 255.0);
+        return stored;
+    }
     if (format == STORED_HALF)
         return nearest_half(clamp(value, -HALF_LIMIT, HALF_LIMIT));
     return value;

@@ -90,7 +90,7 @@ def test_final_alone_is_the_final_of_all(
         assert np.abs(real(alone["final"]) - expected).max() <= limit
 
 
-@pytest.mark.parametrize("dtype", ["float16", "float32"])
+@pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("name", WHOLE)
 def test_strips_give_the_bits_of_the_passes_they_stand_for(
     monkeypatch: pytest.MonkeyPatch, name: str, dtype: str
@@ -98,7 +98,7 @@ def test_strips_give_the_bits_of_the_passes_they_stand_for(
     if ADAPTER != "software":
         pytest.skip("compilers of GPUs contract sums in one form and not in the other")
     monkeypatch.setenv("VKBLOOM_FORM", "cpu")
-    image = picture(96, 144, 4, dtype)
+    image = picture(256, 160, 4, dtype)
     with Renderer(ADAPTER, validation=True) as renderer:
         alone = renderer.apply(image, WHOLE[name], attachments=("final",))
         renderer.apply(image[::-1], WHOLE[name])
