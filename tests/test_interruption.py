@@ -14,9 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from numpy.typing import NDArray
 
-from vkbloom import DeviceLostError, Renderer, Scene, Separable, gaussian_weights
+import vkbloom
+from vkbloom import DeviceLostError, Frames, Renderer, Scene, Separable, gaussian_weights
 
 LEAVES_BEHIND = pytest.mark.skipif(
     "VKBLOOM_SANITIZED" in os.environ, reason="leaves a device behind on purpose: a leak to LSan"
@@ -115,6 +117,68 @@ def test_a_sequence_is_interrupted(
         for _ in renderer.apply_many(noise(200), settings):
             pass
     check(renderer, scene)
+
+
+STRENGTHS = {"blur_strength": np.linspace(1, 2, 24).tolist()}
+
+
+class Stopper:
+    """A reduction that sets the alarm at its fifth point; it comes in the wait for another."""
+
+    def __init__(self, alarm: Callable[[float], None] | None) -> None:
+        self.alarm = alarm
+        self.points = 0
+
+    def __call__(self, frames: Frames) -> np.float64:
+        self.points += 1
+        if self.alarm is not None and self.points == 5:
+            self.alarm(0.02)
+        return np.mean(frames["final"], dtype=np.float64)
+
+
+@UNIX
+def test_a_grid_is_interrupted(
+    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+) -> None:
+    renderer = new_renderer()
+    stopper = Stopper(alarm)
+    with pytest.raises(Alarm):
+        renderer.grid(noise(64), LONG, STRENGTHS, reduce={"mean": stopper}, progress=False)
+    assert stopper.points < 24
+    check(renderer, scene)
+
+
+@UNIX
+def test_an_interrupted_store_is_gone_on_with(
+    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], tmp_path: Path
+) -> None:
+    def to_store(stopper: Stopper) -> xarray.Dataset:
+        return vkbloom.grid_to_zarr(
+            noise(64),
+            LONG,
+            STRENGTHS,
+            tmp_path / "grid",
+            chunks={"blur_strength": 2},
+            reduce={"mean": stopper},
+            adapter="software",
+            validation=True,
+            progress=False,
+        )
+
+    first, second = Stopper(alarm), Stopper(None)
+    with pytest.raises(Alarm):
+        to_store(first)
+    done = int(xarray.open_zarr(tmp_path / "grid")["done"].sum())
+    assert 2 <= done <= first.points < 24
+    got = to_store(second)
+    # And the first point, for its shape; a block may be whole without its mark.
+    assert second.points <= 24 - done + 1
+    right = new_renderer().grid(
+        noise(64), LONG, STRENGTHS, reduce={"mean": Stopper(None)}, progress=False
+    )
+    assert bool(got["done"].all())
+    for name in ("final", "mean"):
+        np.testing.assert_array_equal(got[name], right[name])
 
 
 @UNIX
