@@ -45,6 +45,7 @@ struct vkb_renderer {
     long process;              // that opened it: the device is no other's, not even a forked one's
     atomic_bool open;          // changed with the lock, looked at without
     PyObject *array_memory;    // a capsule, which the arrays hold too; NULL: closed
+    PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;

@@ -236,6 +236,7 @@ static void dealloc(PyObject *object)
     if (self->device.handle)
         return;
     release_adrift(self);
+    Py_CLEAR(self->array_context);
     Py_CLEAR(self->array_memory);
     if (self->lock)
         PyThread_free_lock(self->lock);

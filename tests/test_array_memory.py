@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from numpy._core.multiarray import get_handler_name  # type: ignore[attr-defined]
+from numpy._core.multiarray import get_handler_name
 from numpy.typing import NDArray
 
 from vkbloom import Renderer, Separable
@@ -132,7 +132,7 @@ def test_memory_that_is_not_there(own: Renderer) -> None:
         own._core.new_array(np.empty, (1 << 20,), "no dtype")
     assert get_handler_name() == PLAIN
     with pytest.raises(TypeError):
-        own._core.new_array(np.empty, (1 << 20, "rows"), "uint8")
+        own._core.new_array(np.empty, (1 << 20, "rows"), "uint8")  # type: ignore[arg-type]
 
 
 def test_threads_free_what_others_render(own: Renderer) -> None:
