@@ -5,8 +5,6 @@
 
 #include "graph.h"
 
-#include <stdatomic.h>
-
 struct vkb_render_pass_entry;
 struct vkb_pipeline_entry;
 
@@ -29,8 +27,7 @@ struct vkb_pipelines {
     struct vkb_render_pass_entry *render_passes;
     struct vkb_pipeline_entry *entries;
     size_t render_pass_count, render_pass_capacity;
-    atomic_size_t entry_count;  // others look at it while pipelines are added
-    size_t entry_capacity;
+    size_t entry_count, entry_capacity;
 };
 
 // `cache_data` may be NULL; what the driver does not know it ignores.

@@ -33,8 +33,8 @@ SHORT = Separable(blur_strength=0.5)
 RIGHT_SIZE = (24, 16)
 
 
-class Alarm(Exception):
-    """What the signal's handler raises."""
+class Alarm(BaseException):
+    """What the signal's handler raises: no Exception, as KeyboardInterrupt is none."""
 
 
 @pytest.fixture
@@ -150,8 +150,20 @@ def test_a_grid_is_interrupted(
 
 @UNIX
 def test_an_interrupted_store_is_gone_on_with(
-    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], tmp_path: Path
+    new_renderer: Callable[[], Renderer],
+    alarm: Callable[[float], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    closers: list[threading.Thread] = []
+    close = Renderer.close
+
+    def noted_close(renderer: Renderer) -> None:
+        closers.append(threading.current_thread())
+        close(renderer)
+
+    monkeypatch.setattr(Renderer, "close", noted_close)
+
     def to_store(stopper: Stopper) -> xarray.Dataset:
         return vkbloom.grid_to_zarr(
             noise(64),
@@ -168,9 +180,12 @@ def test_an_interrupted_store_is_gone_on_with(
     first, second = Stopper(alarm), Stopper(None)
     with pytest.raises(Alarm):
         to_store(first)
+    # Whoever interrupts does not wait for what the device has.
+    assert threading.main_thread() not in closers
     done = int(xarray.open_zarr(tmp_path / "grid")["done"].sum())
     assert 2 <= done <= first.points < 24
     got = to_store(second)
+    assert closers[1:] == [threading.main_thread()]
     # And the first point, for its shape; a block may be whole without its mark.
     assert second.points <= 24 - done + 1
     right = new_renderer().grid(

@@ -53,6 +53,7 @@ struct renderer {
     struct vkb_frame frame;
     struct array_memory *memory;
     struct job *adrift;  // with the GIL
+    size_t pipelines;    // with the GIL
 };
 
 // batch.c's: points that go to the device together.
@@ -173,6 +174,9 @@ static void enter(struct renderer *renderer)
 
 static void leave(struct renderer *renderer)
 {
+    pthread_mutex_lock(&gil);
+    renderer->pipelines = renderer->frame.pipelines.entry_count;
+    pthread_mutex_unlock(&gil);
     pthread_mutex_unlock(&renderer->lock);
 }
 
@@ -435,7 +439,9 @@ static void render(struct worker *worker, struct renderer *renderer, unsigned de
         compare(job);
         worker->frames += job->count;
         // As Python does after each call, whoever renders now.
-        worker->pipelines += renderer->frame.pipelines.entry_count;
+        pthread_mutex_lock(&gil);
+        worker->pipelines += renderer->pipelines;
+        pthread_mutex_unlock(&gil);
     }
     finish(job);
 }
