@@ -4,10 +4,9 @@
 // device, and one mutex in place of the GIL around what those keep under it. Every picture is
 // compared with one that was made before by one thread alone.
 #include "forms.h"
+#include "frame.h"
 #include "methods.h"
 #include "pages.h"
-
-#include "frame.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
