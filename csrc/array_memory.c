@@ -103,6 +103,35 @@ static PyObject *(*find_set_handler(void))(PyObject *)
     return found;
 }
 
+// Run in a context, which the handler is for from then on.
+static PyObject *use_memory(PyObject *capsule, PyObject *unused)
+{
+    const struct vkb_array_memory *memory = PyCapsule_GetPointer(capsule, capsule_name);
+    PyObject *before = memory->set_handler(capsule);
+
+    (void)unused;
+    Py_XDECREF(before);
+    return before ? Py_NewRef(Py_None) : NULL;
+}
+
+// A context in which arrays are made with the handler. The caller's never has it: whatever fails,
+// nothing has to be put back there.
+static PyObject *new_context(PyObject *capsule)
+{
+    static PyMethodDef method = {"use_memory", use_memory, METH_NOARGS, NULL};
+    PyObject *contextvars = PyImport_ImportModule("contextvars");
+    PyObject *context = contextvars ? PyObject_CallMethod(contextvars, "Context", NULL) : NULL;
+    PyObject *use = context ? PyCFunction_New(&method, capsule) : NULL;
+    PyObject *used = use ? PyObject_CallMethod(context, "run", "O", use) : NULL;
+
+    if (!used)
+        Py_CLEAR(context);
+    Py_XDECREF(used);
+    Py_XDECREF(use);
+    Py_XDECREF(contextvars);
+    return context;
+}
+
 bool vkb_array_memory_create(struct vkb_renderer *renderer)
 {
     struct vkb_error error;
@@ -119,9 +148,13 @@ bool vkb_array_memory_create(struct vkb_renderer *renderer)
         .set_handler = find_set_handler(),
     };
     renderer->array_memory = PyCapsule_New(memory, capsule_name, release);
-    if (!renderer->array_memory)
+    if (!renderer->array_memory) {
         vkb_free(memory);
-    return renderer->array_memory != NULL;
+        return false;
+    }
+    if (memory->set_handler)
+        renderer->array_context = new_context(renderer->array_memory);
+    return !memory->set_handler || renderer->array_context;
 }
 
 static bool is_large(PyObject *shape)
@@ -133,23 +166,14 @@ static bool is_large(PyObject *shape)
     return elements >= LARGE_ELEMENTS;
 }
 
-static PyObject *call_with_handler(const struct vkb_array_memory *memory, PyObject *capsule,
-                                   PyObject *empty, PyObject *shape, PyObject *dtype)
+// In a copy of the context, as only one thread at a time can run in one.
+static PyObject *call_in_context(PyObject *context, PyObject *empty, PyObject *shape,
+                                 PyObject *dtype)
 {
-    PyObject *type, *value, *traceback;
-    PyObject *before = memory->set_handler(capsule);
+    PyObject *copy = PyObject_CallMethod(context, "copy", NULL);
+    PyObject *array = copy ? PyObject_CallMethod(copy, "run", "OOO", empty, shape, dtype) : NULL;
 
-    if (!before)
-        return NULL;
-    PyObject *array = PyObject_CallFunctionObjArgs(empty, shape, dtype, NULL);
-    PyErr_Fetch(&type, &value, &traceback);
-    PyObject *ours = memory->set_handler(before);
-    if (!ours)
-        Py_CLEAR(array);
-    else if (!array)
-        PyErr_Restore(type, value, traceback);
-    Py_XDECREF(ours);
-    Py_DECREF(before);
+    Py_XDECREF(copy);
     return array;
 }
 
@@ -161,12 +185,12 @@ PyObject *vkb_new_array(PyObject *object, PyObject *arguments)
     if (!PyArg_ParseTuple(arguments, "OO!O:new_array", &empty, &PyTuple_Type, &shape, &dtype))
         return NULL;
     struct vkb_array_memory *memory = memory_of(renderer);
-    if (!memory || !memory->set_handler || !is_large(shape))
+    if (!memory || !renderer->array_context || !is_large(shape))
         return PyErr_Occurred() ? NULL : PyObject_CallFunctionObjArgs(empty, shape, dtype, NULL);
-    // A handler that is in use by NumPy keeps the capsule, whatever becomes of the renderer.
+    // Kept for the error, whatever becomes of the renderer.
     PyObject *capsule = Py_NewRef(renderer->array_memory);
     memory->pages.error.kind = VKB_OK;
-    PyObject *array = call_with_handler(memory, capsule, empty, shape, dtype);
+    PyObject *array = call_in_context(renderer->array_context, empty, shape, dtype);
     if (!array && memory->pages.error.kind != VKB_OK) {
         PyErr_Clear();
         vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &memory->pages.error);
@@ -188,5 +212,6 @@ void vkb_array_memory_close(struct vkb_renderer *renderer)
 
     if (memory)
         vkb_pages_close(&memory->pages);
+    Py_CLEAR(renderer->array_context);
     Py_CLEAR(renderer->array_memory);
 }

@@ -4,6 +4,7 @@
 
 #include "adapter.h"
 
+#include <stdatomic.h>
 #include <volk.h>
 
 struct vkb_device {
@@ -18,8 +19,8 @@ struct vkb_device {
     uint64_t timestamp_mask;  // 0: the queue has no timestamps
     // Host memory that becomes a buffer starts and ends at multiples of it; 0: none can.
     VkDeviceSize import_alignment;
-    bool lost;
-    bool hung;  // lost because a wait took too long: it may be at work still
+    atomic_bool lost;  // others look at it while the device is used
+    bool hung;         // lost because a wait took too long: it may be at work still
     // Asked between the slices of a long wait; true ends it. NULL: nobody is.
     bool (*interrupted)(void *asked);
     void *asked;

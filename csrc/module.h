@@ -10,6 +10,8 @@
 #include "frame.h"
 #include "methods.h"
 
+#include <stdatomic.h>
+
 struct vkb_module_state {
     PyObject *renderer_type, *batch_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
@@ -41,8 +43,10 @@ struct vkb_renderer {
     PyThreadState *thread;     // that thread's, while it has given the GIL back
     struct vkb_cargo *adrift;  // touched with the GIL
     long process;              // that opened it: the device is no other's, not even a forked one's
-    bool open;
-    PyObject *array_memory;  // a capsule, which the arrays hold too; NULL: closed
+    atomic_bool open;          // changed with the lock, looked at without
+    PyObject *array_memory;    // a capsule, which the arrays hold too; NULL: closed
+    PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
+    size_t pipeline_count;     // made so far; read and written with the GIL
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;

@@ -109,6 +109,8 @@ bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
 void vkb_renderer_leave(struct vkb_renderer *self)
 {
     PyEval_RestoreThread(self->thread);
+    if (self->open)
+        self->pipeline_count = self->frame.pipelines.entry_count;
     self->holder = 0;
     PyThread_release_lock(self->lock);
 }
@@ -236,6 +238,7 @@ static void dealloc(PyObject *object)
     if (self->device.handle)
         return;
     release_adrift(self);
+    Py_CLEAR(self->array_context);
     Py_CLEAR(self->array_memory);
     if (self->lock)
         PyThread_free_lock(self->lock);
@@ -315,7 +318,7 @@ static PyObject *get_info(PyObject *object, void *unused)
 static PyObject *get_pipeline_count(PyObject *object, void *unused)
 {
     (void)unused;
-    return PyLong_FromSize_t(((struct vkb_renderer *)object)->frame.pipelines.entry_count);
+    return PyLong_FromSize_t(((struct vkb_renderer *)object)->pipeline_count);
 }
 
 static PyMethodDef methods[] = {

@@ -111,6 +111,16 @@ def test_arrays_outlive_the_renderer_and_can_grow(own: Renderer) -> None:
     np.testing.assert_array_equal(array, kept[:5])
 
 
+def test_zeros_in_memory_that_was_used(own: Renderer) -> None:
+    used = own._core.new_array(np.empty, (1 << 18,), "uint8")
+    used[:] = 7
+    before = place(used)
+    del used
+    zeros = own._core.new_array(np.zeros, (1 << 18,), "uint8")
+    assert place(zeros) == before
+    assert not zeros.any()
+
+
 def test_idle_memory_has_a_limit(own: Renderer) -> None:
     quarter = 64 << 20  # bytes, of the 256 MiB that are kept
 

@@ -98,6 +98,7 @@ def test_frames_that_fill_a_batch_alone(
 ) -> None:
     image = picture(33, 21, 4, 2)
     monkeypatch.setattr(batches, "BYTES", points * image.nbytes)
+    monkeypatch.setattr(batches, "SECONDS", 1e6)
     sizes = []
 
     def open_batch() -> Any:
@@ -111,6 +112,30 @@ def test_frames_that_fill_a_batch_alone(
     assert max(batch.size for batch in sizes) == points * image.nbytes
     for point, (arrays, _, _) in results:
         np.testing.assert_array_equal(arrays["final"], renderer.apply(image, point)["final"])
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, batches.POINTS)])
+def test_a_batch_is_as_long_as_a_wait_may_be(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
+) -> None:
+    image = picture(33, 21, 4, 2)
+    monkeypatch.setattr(batches, "SECONDS", seconds)
+    counts: list[int] = []
+
+    def open_batch() -> Any:
+        counts.append(0)
+        return renderer._core.apply(image, ("final",))
+
+    def allocate(_: str, *array: Any) -> Any:
+        counts[-1] += 1
+        return np.empty(*array)
+
+    settings = [Separable(exposure=step / 8) for step in range(100)]
+    results = list(batches.run(settings, open_batch, allocate))
+    assert [point for point, _ in results] == settings
+    # The first one goes alone, whatever it takes.
+    assert max(counts) == most
+    assert sum(counts) == len(settings)
 
 
 def test_arrays_are_the_takers(renderer: Renderer) -> None:

@@ -90,6 +90,8 @@ def names() -> set[str]:
         "render deferred",
         "batch",
         "grid",
+        "grid in memory",
+        "grid to Zarr",
         "readback",
     }
 

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Line and branch coverage of csrc by the tests that touch the core and by the walk over its faults.
+# Line and branch coverage of csrc by the tests that touch the core and by the walks over its faults
+# and over Python's.
 # PYTHON: an interpreter with the test requirements installed. STRIDE: of so many fault points one
 # (8). Arguments go to pytest. Prints a table of the files; build/coverage/uncovered.txt has the
 # lines that nothing reached.
@@ -8,9 +9,9 @@ set -eu
 cd "$(dirname "$0")/.."
 PYTHON=${PYTHON:-python3}
 if [ $# = 0 ]; then
-    for name in adapters apply apply_input batches core_arguments deferred deferred_passes errors \
-        forms graph interruption lifetime out_of_date pipeline_cache presets readback render scene \
-        separable settings skybox textures; do
+    for name in adapters apply apply_input array_memory batches core_arguments deferred \
+        deferred_passes errors forms graph interruption lifetime out_of_date pipeline_cache \
+        presets readback render scene separable settings skybox textures threads; do
         set -- "$@" "tests/test_$name.py"
     done
 fi
@@ -28,6 +29,8 @@ export PYTHONPATH="$PWD/python"
 set +e
 VKBLOOM_CACHE_DIR="" "$PYTHON" tests/fault_walk.py "${STRIDE:-8}" >"$folder/walk.txt"
 walked=$?
+VKBLOOM_CACHE_DIR="" "$PYTHON" tests/memory_walk.py
+walked=$((walked + $?))
 "$PYTHON" -m pytest -q -p no:cacheprovider -m "not slow" \
     --deselect tests/test_faults.py::test_what_is_shipped_cannot_be_told_to_fail "$@"
 tested=$?

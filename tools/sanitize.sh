@@ -37,7 +37,7 @@ stdcxx=$(${CC:-cc} -print-file-name=libstdc++.so.6)
 # The interpreter's own allocations would hide and fake leaks: plain malloc, and a filter that
 # looks for the core in the stacks.
 set +e
-ASAN_OPTIONS="detect_leaks=1:exitcode=0:log_path=$folder/log/asan" \
+ASAN_OPTIONS="detect_leaks=1:exitcode=0:allocator_may_return_null=1:log_path=$folder/log/asan" \
     LSAN_OPTIONS="suppressions=$PWD/tools/leaks.supp:print_suppressions=0" \
     UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:log_path=$folder/log/ubsan" \
     LD_PRELOAD="$asan $stdcxx" PYTHONMALLOC=malloc PYTHONPATH="$PWD/python" \

@@ -54,6 +54,9 @@ def frame(renderer: vkbloom.Renderer, scene: vkbloom.Scene, dice: random.Random)
     """Render one frame whose size, source and settings are by chance."""
     # Some presets have levels of a fixed height, whose width follows the frame's shape.
     size = (dice.randrange(4, 65), dice.randrange(4, 65))
+    if dice.random() < 0.01:
+        # Large arrays have pages of the renderer's, which are used again.
+        size = (dice.randrange(256, 400), dice.randrange(256, 400))
     settings = dice.choice(
         [
             vkbloom.Separable(blur_strength=dice.random(), loops=dice.randrange(1, 4)),

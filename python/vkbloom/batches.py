@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 POINTS = 32
 #: Bytes of the framebuffers of one batch at most, one frame at the least.
 BYTES = 64 << 20
+#: What one batch may take, one setting at the least: a device cannot be stopped, so that whoever is
+#: interrupted and closes the renderer waits for what the device has.
+SECONDS = 0.25
 #: Batches that the device has while the frames of another are taken.
 AHEAD = 2
 
@@ -28,6 +32,7 @@ AHEAD = 2
 class _Submitted(NamedTuple):
     batch: _core.Batch
     settings: list[Settings]
+    since: float
 
 
 class _Points:
@@ -51,6 +56,7 @@ class _Points:
         self._waiting: deque[Settings] = deque()  # taken from the sequence, and not submitted
         self._alone = 0  # how many of those go one by one
         self._limit = 1
+        self._most = POINTS  # in SECONDS, as far as is known
         self._ended = False
         self.failure: Exception | None = None
 
@@ -75,11 +81,15 @@ class _Points:
                 self._alone = max(0, self._alone - 1)
                 # The first frame waits for no other; nor are more settings taken than were used.
                 self._limit = min(2 * self._limit, POINTS)
-                return _Submitted(batch, settings)
+                return _Submitted(batch, settings, time.perf_counter())
+
+    def took(self, seconds: float, count: int) -> None:
+        """Learn from a batch of so many settings, which took no longer than that."""
+        self._most = max(1, int(SECONDS * count / max(seconds, SECONDS / POINTS)))
 
     def _fill(self, batch: _core.Batch) -> list[Settings]:
         settings: list[Settings] = []
-        limit = 1 if self._alone else self._limit
+        limit = 1 if self._alone else min(self._limit, self._most)
         while len(settings) < limit:
             if settings and batch.size + batch.size // len(settings) > BYTES:
                 break
@@ -150,15 +160,20 @@ def run(
     points = _Points(settings_seq, open_batch, allocate)
     submitted: deque[_Submitted] = deque()
     ahead = 1
+    before = 0.0  # when the last batch was collected
     try:
         while True:
             while len(submitted) < ahead and (added := points.submit()) is not None:
                 submitted.append(added)
             if not submitted:
                 break
-            batch, settings = submitted.popleft()
+            batch, settings, since = submitted.popleft()
             results = batch.collect()
             del batch
+            # The device began with it when it had it and was done with the one before.
+            end = time.perf_counter()
+            points.took(end - max(since, before), len(settings))
+            before = end
             # A result is the taker's alone: none is kept until its batch is through.
             results.reverse()
             for point in settings:

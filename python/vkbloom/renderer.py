@@ -527,7 +527,8 @@ class Renderer:
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
             # Without the cache the next start is slower: no reason to lose a frame that is there.
-            with contextlib.suppress(_core.Error):
+            # A ValueError: another thread has closed the renderer.
+            with contextlib.suppress(_core.Error, ValueError):
                 pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
                 self._saved_pipelines = count
 

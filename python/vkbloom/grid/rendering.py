@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from vkbloom.grid.filling import Tally
@@ -46,7 +47,7 @@ def render_grid(
     with ExitStack() as stack:
         renderer: Renderer | None = None
         if client is None:
-            renderer = stack.enter_context(Renderer(adapter, validation=validation))
+            renderer = stack.enter_context(_opened(adapter, validation))
             layout = lay_out(grid, renderer)
         else:
             from vkbloom.grid import cluster  # noqa: PLC0415  Dask is optional
@@ -73,3 +74,20 @@ def render_grid(
                 validation=validation,
             )
     return shown.tally
+
+
+@contextmanager
+def _opened(adapter: str, validation: bool) -> Iterator[Renderer]:
+    """Open a renderer, and close it without a wait where a signal ends the grid."""
+    renderer = Renderer(adapter, validation=validation)
+    try:
+        yield renderer
+    except Exception:
+        renderer.close()
+        raise
+    except BaseException:
+        # The device goes on with what it has, which may be points of many seconds.
+        threading.Thread(target=renderer.close, name="vkbloom-close").start()
+        raise
+    else:
+        renderer.close()

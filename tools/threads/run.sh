@@ -1,0 +1,25 @@
+#!/bin/sh
+# Threads over the core without Python, under ThreadSanitizer: run.sh [SECONDS] (60).
+# PYTHON: an interpreter with setuptools.
+set -eu
+
+cd "$(dirname "$0")/../.."
+PYTHON=${PYTHON:-python3}
+folder=$PWD/build/threads
+mkdir -p "$folder"
+# The shaders as C, and where volk is.
+volk=$("$PYTHON" - <<'END'
+import setuptools
+setuptools.setup = lambda **_: None
+import setup
+setup.write_spirv()
+print(setup.volk_folder())
+END
+)
+sources=$(grep -L -E '"module\.h"|Python\.h' csrc/*.c)
+# shellcheck disable=SC2086  # file names of this repository
+${CC:-cc} -std=gnu11 -g -O1 -fno-omit-frame-pointer -Wall -Wextra -Werror -DVK_NO_PROTOTYPES \
+    -fsanitize=thread -Icsrc -Ibuild/spirv -I"$volk" \
+    $sources build/spirv/spirv.c tools/threads/threads.c -o "$folder/threads" -lm -ldl -lpthread
+exec env TSAN_OPTIONS="suppressions=$PWD/tools/threads/threads.supp:exitcode=66" \
+    "$folder/threads" "${1:-60}"
