@@ -47,7 +47,7 @@ def main() -> int:
     seeds = target.seeds()
     # Readers load libraries with the first file.
     for seed in seeds:
-        target.run(seed)
+        targets.run(target, seed)
     limit_memory(options.memory << 20)
     end = time.monotonic() + options.seconds
     count = 0

@@ -14,7 +14,7 @@ from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.reductions import Reduction
 from vkbloom.grid.sources import digest
 
-__all__ = ["FORMAT", "differences", "identity"]
+__all__ = ["FORMAT", "chunk_in", "differences", "identity"]
 
 #: Of the stores' own layout; another number cannot be read.
 FORMAT: Final = 1
@@ -54,6 +54,25 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
     # As it comes back from the store: tuples are lists there.
     plain: dict[str, Any] = json.loads(json.dumps(found))
     return plain
+
+
+def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
+    """Return the points of a block by axis that an identity tells, None where it tells none.
+
+    Parameters
+    ----------
+    stored : mapping
+        From a store, which may hold anything there.
+    shape : tuple of int
+        Of the grid; a block that is larger is none.
+    """
+    held = stored.get("chunk")
+    if stored.get("format") != FORMAT or not isinstance(held, list) or len(held) != len(shape):
+        return None
+    for count, size in zip(held, shape, strict=True):
+        if type(count) is not int or not 1 <= count <= max(size, 1):
+            return None
+    return tuple(held)
 
 
 def _reduction(reduction: Any) -> str:
@@ -99,7 +118,10 @@ def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
 
 
 def _short(value: Any) -> str:
-    text = json.dumps(value)
+    try:
+        text = json.dumps(value)
+    except RecursionError:
+        text = "lists in lists"
     if len(text) <= _LONGEST:
         return text
     return f"{text[: _LONGEST - 20]} ... {text[-12:]}"

@@ -1,0 +1,263 @@
+"""A grid's Zarr store that something has changed, looked through and gone on with.
+
+An input is a byte of flags and then records: the number of a key, what is done with it, the length
+of what follows (two bytes), and that many bytes. They change a whole store, on which the call that
+made it is repeated. Only the device is left out: points are filled with numbers.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import google_crc32c
+import numpy as np
+from numcodecs.zstd import Zstd
+
+from vkbloom import check_grid, grid_to_zarr
+from vkbloom.grid import zarr_grid
+from vkbloom.grid.filling import Tally
+from vkbloom.grid.image_files import GridFiles
+from vkbloom.grid.plan import Grid, Layout, Variable, ask
+from vkbloom.grid.running import empty_arrays
+from vkbloom.grid.store import GridStore
+
+AXES = {"exposure": [0.0, 1.0, 2.0], "threshold": [None, 0.5]}
+CHUNKS = {"exposure": 2}
+IMAGE = np.linspace(0, 1, 60, dtype=np.float32).reshape(4, 5, 3)
+CHANNELS = np.array(["r", "g", "b", "a"])
+
+#: That no grid has.
+FOREIGN = ("letter.txt", "other/zarr.json", "final/c.9.9.9.9.9", "final/c.0.partial")
+ROOT = "zarr.json"
+#: The flags.
+VERIFY, CHUNKED, LOOK = 1, 2, 4
+
+
+def _laid_out(grid: Grid) -> Layout:
+    final = Variable(("y", "x", "rgba"), (4, 5, 4), np.dtype(np.float32), {"long_name": "final"})
+    mean = Variable((), (), np.dtype(np.float64), {"units": "1"})
+    return Layout(
+        ranking=(0, 1),
+        variables={"final": final, "mean": mean},
+        coordinates={"rgba": (CHANNELS, {"long_name": "channel"})},
+        reference_size=0,
+        structural=(),
+        ran=0,
+        adapter="none",
+        driver="none",
+        version="0",
+    )
+
+
+def _rendered(grid: Grid, prepared: Callable[[Layout], GridStore], **_: object) -> Tally:
+    """Do what `vkbloom.grid.rendering.render_grid` does, without a device."""
+    layout = _laid_out(grid)
+    kept = prepared(layout)
+    for block in list(kept.missing()):
+        arrays = empty_arrays(layout, block)
+        for name, array in arrays.items():
+            array[...] = _value(name, kept.grid.shape)[block.slices]
+        kept.writer.write(block, arrays)
+        kept.writer.flush([block])
+        kept.mark([block])
+    return Tally()
+
+
+def _value(name: str, shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    trailing = (4, 5, 4) if name == "final" else ()
+    count = int(np.prod(shape + trailing))
+    return np.arange(count, dtype=np.float64).reshape(shape + trailing)
+
+
+def _made(store: Path, **arguments: Any) -> Any:
+    with mock.patch.object(zarr_grid, "render_grid", _rendered):
+        return grid_to_zarr(IMAGE, None, AXES, store, **arguments)
+
+
+def _contents(store: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(store)): path.read_bytes()
+        for path in sorted(store.rglob("*"))
+        if path.is_file()
+    }
+
+
+class Stores:
+    """A whole store, and what is done with changed ones.
+
+    Parameters
+    ----------
+    folder : Path
+        In which they lie.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._changed = folder / "changed.zarr"
+        whole = folder / "whole.zarr"
+        _made(whole, chunks=CHUNKS)
+        self._whole = _contents(whole)
+        self._keys = [*self._whole, *FOREIGN]
+
+    def seeds(self) -> list[bytes]:
+        """Return inputs that change something each."""
+        found = [bytes([flags]) for flags in range(5)]
+        for number, key in enumerate(self._keys):
+            content = self._whole.get(key, b"{}")
+            kinds = [0, 2, 3] + [1] * (key.partition("/")[2].startswith("c."))
+            for kind in kinds:
+                # With their checksum they are changed and still whole.
+                payload = content[:-4] if kind == 1 else content
+                found.append(b"\1" + _record(number, kind, payload))
+        root = json.loads(self._whole[ROOT])
+        own = root["attributes"]["vkbloom_grid"]
+        texts = (own, root["attributes"], own["chunk"], "another")
+        found += [b"\1" + _record(0, 4 + n, json.dumps(t).encode()) for n, t in enumerate(texts)]
+        # A frame that promises 8 GiB, and one that holds 4 MiB.
+        frame = b"\x28\xb5\x2f\xfd\xe0" + struct.pack("<Q", 1 << 33) + b"\x01\x00\x00"
+        zeros = bytes(1 << 22)
+        for key in ("done/c.0.0", "mean/c.0.0", "final/c.0.0.0.0.0"):
+            number = self._keys.index(key)
+            found.append(b"\1" + _record(number, 1, frame))
+            found.append(b"\1" + _record(number, 1, Zstd(level=1).encode(zeros)))
+            found.append(b"\1" + _record(number, 8, self._decoded(key)))
+            found.append(b"\1" + _record(number, 9, bytes([0])))
+        return [*found, *(bytes([LOOK]) + one[1:] for one in found[5:])]
+
+    def _decoded(self, key: str) -> bytes:
+        return bytes(Zstd().decode(self._whole[key][:-4]))
+
+    def run(self, data: bytes) -> None:
+        """Look through a changed store, or go on with it."""
+        flags, store = (data[:1] or b"\0")[0], self._changed
+        self._change(data[1:])
+        before = _contents(store)
+        try:
+            if flags & LOOK:
+                check_grid(store)
+            else:
+                _made(
+                    store, verify=bool(flags & VERIFY), chunks=CHUNKS if flags & CHUNKED else None
+                )
+        except ValueError:
+            assert _contents(store) == before, "a refused store was changed"
+            return
+        if flags & LOOK:
+            assert _contents(store) == before, "looking through a store changed it"
+        elif flags & VERIFY:
+            report = check_grid(store)
+            assert report.complete, str(report)
+            assert report.points == 6, str(report)
+
+    def _change(self, data: bytes) -> None:
+        """Write the store that the records make of the whole one."""
+        contents: dict[str, bytes | None] = dict(self._whole)
+        for number, kind, payload in _records(data):
+            key = self._keys[number % len(self._keys)]
+            match kind % 10:
+                case 0:
+                    contents[key] = payload
+                case 1:
+                    contents[key] = _summed(payload)
+                case 2:
+                    contents.pop(key, None)
+                case 3:
+                    # A folder.
+                    contents[key] = None
+                case 4 | 5 | 6:
+                    contents[ROOT] = self._root_with(kind % 10, payload)
+                case 7:
+                    key = f"{key.partition('/')[0]}/{ROOT}"
+                    contents[key] = _replaced(self._whole.get(key), payload)
+                case 8:
+                    contents[key] = _summed(bytes(Zstd(level=1).encode(payload or b"\0")))
+                case _:
+                    source = self._keys[(payload or b"\0")[0] % len(self._keys)]
+                    contents[key] = self._whole.get(source, b"")
+        shutil.rmtree(self._changed, ignore_errors=True)
+        self._changed.mkdir()
+        for key, content in contents.items():
+            path = self._changed / key
+            if content is None:
+                path.mkdir(parents=True, exist_ok=True)
+            else:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+
+    def _root_with(self, kind: int, payload: bytes) -> bytes:
+        """Return the group's metadata with other text in one place."""
+        root = json.loads(self._whole[ROOT])
+        if kind == 4:
+            root["attributes"]["vkbloom_grid"] = "@"
+        elif kind == 5:
+            root["attributes"] = "@"
+        else:
+            root["attributes"]["vkbloom_grid"]["chunk"] = "@"
+        return json.dumps(root).encode().replace(b'"@"', payload)
+
+
+def _replaced(metadata: bytes | None, payload: bytes) -> bytes:
+    """Return an array's metadata with other text for the grid that it belongs to."""
+    if metadata is None:
+        return payload
+    found = json.loads(metadata)
+    found["attributes"]["grid"] = "@"
+    return json.dumps(found).encode().replace(b'"@"', payload)
+
+
+def _record(number: int, kind: int, payload: bytes) -> bytes:
+    return struct.pack("<BBH", number, kind, len(payload)) + payload
+
+
+def _records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    while len(data) >= 4:
+        number, kind, length = struct.unpack_from("<BBH", data)
+        yield number, kind, data[4 : 4 + length]
+        data = data[4 + length :]
+
+
+def _summed(content: bytes) -> bytes:
+    return content + struct.pack("<I", google_crc32c.value(content))
+
+
+class Folders:
+    """A grid's folder of image files with another ``grid.json``.
+
+    Parameters
+    ----------
+    folder : Path
+        In which it lies.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder / "images"
+        grid = ask(
+            IMAGE,
+            None,
+            AXES,
+            size=None,
+            shading="forward",
+            time=0.0,
+            attachments="final",
+            reduce=None,
+        )
+        self._files = GridFiles(self._folder, ".png", grid, _laid_out(grid))
+        self._files.prepare(resume=False)
+        self._index = self._folder / "grid.json"
+
+    def seeds(self) -> list[bytes]:
+        """Return what the file holds."""
+        return [self._index.read_bytes()]
+
+    def run(self, data: bytes) -> None:
+        """Go on with the folder."""
+        self._index.write_bytes(data)
+        try:
+            self._files.prepare(resume=True)
+        finally:
+            assert self._index.read_bytes() == data, "what was there was changed"
