@@ -123,7 +123,8 @@ class Options:
             contextlib.redirect_stdout(io.StringIO()),
         ):
             try:
-                command.command.main(["--from", str(self._path)], "grid", standalone_mode=False)
+                words = ["-o", "a.zarr", "--from", str(self._path)]
+                command.command.main(words, "grid", standalone_mode=False)
             except click.Abort:
                 return True
         # Where only the help is asked for.

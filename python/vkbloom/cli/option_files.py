@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Container, Mapping, Sized
 from pathlib import Path
@@ -92,9 +93,11 @@ def _yaml(content: bytes) -> object:
     yaml = import_extra("yaml", "cli", "Reading YAML")
     try:
         return yaml.safe_load(content.decode())
-    except (yaml.YAMLError, LookupError, AttributeError, TypeError) as error:
-        # The others are of values with a tag that they do not fit, such as "!!bool 3".
+    except yaml.YAMLError as error:
         raise ValueError(str(error)) from error
+    except (LookupError, AttributeError, TypeError) as error:
+        # Such as "!!bool 3".
+        raise ValueError(f"a value does not fit its tag ({error})") from error
 
 
 def _check_size(content: object) -> None:
@@ -127,7 +130,7 @@ def _words(content: Mapping[str, Any], path: str, switches: Container[str]) -> l
         elif key in _PLAIN_TABLES:
             prefix = "camera-" if key == "camera" else ""
             for name, inner in _table(value, key, path).items():
-                words += _option(f"{prefix}{name}", inner, switches)
+                words += _option(_named(name, prefix, path), inner, switches)
         elif key == _ARGUMENTS:
             listed = [value] if isinstance(value, str) else value
             if not isinstance(listed, list):
@@ -136,7 +139,7 @@ def _words(content: Mapping[str, Any], path: str, switches: Container[str]) -> l
         elif f"--{key}" == FILE_OPTION:
             raise ValueError(f"{path}: {key} cannot stand in a file")
         else:
-            words += _option(str(key), value, switches)
+            words += _option(_named(key, "", path), value, switches)
     return [*words, *arguments]
 
 
@@ -144,6 +147,13 @@ def _table(value: object, key: str, path: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ValueError(f"{path}: {key} must be a table")
     return value
+
+
+def _named(key: object, prefix: str, path: str) -> str:
+    # Others would be taken for a value, or for the end of the options.
+    if not re.fullmatch(r"[\w-]+", str(key)):
+        raise ValueError(f"{path}: {key!r} cannot name an option")
+    return f"{prefix}{key}"
 
 
 def _option(name: str, value: Any, switches: Container[str]) -> list[str]:
