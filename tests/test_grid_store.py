@@ -409,7 +409,8 @@ class TestDamaged:
 
 
 def with_sum(content: bytes) -> bytes:
-    return content + google_crc32c.value(content).to_bytes(4, "little")
+    summed: int = google_crc32c.value(content)
+    return content + summed.to_bytes(4, "little")
 
 
 def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:

@@ -45,11 +45,6 @@ def main() -> int:
 
     target = targets.TARGETS[options.target]
     seeds = target.seeds()
-    # Readers load libraries with the first file.
-    for seed in seeds:
-        targets.run(target, seed)
-    limit_memory(options.memory << 20)
-    end = time.monotonic() + options.seconds
     count = 0
 
     def one(data: bytes) -> None:
@@ -61,6 +56,11 @@ def main() -> int:
             Path(f"finding-{options.target}").write_bytes(data)
             raise
 
+    # Readers load libraries with the first file.
+    for seed in seeds:
+        one(seed)
+    limit_memory(options.memory << 20)
+    end = time.monotonic() + options.seconds
     if options.plain:
         for data in mutate.inputs(seeds, options.seed):
             one(data)

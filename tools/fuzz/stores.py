@@ -7,6 +7,9 @@ made it is repeated. Only the device is left out: points are filled with numbers
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import functools
 import json
 import shutil
 import struct
@@ -20,7 +23,7 @@ import numpy as np
 from numcodecs.zstd import Zstd
 
 from vkbloom import check_grid, grid_to_zarr
-from vkbloom.grid import zarr_grid
+from vkbloom.grid import keys, store, zarr_grid
 from vkbloom.grid.filling import Tally
 from vkbloom.grid.image_files import GridFiles
 from vkbloom.grid.plan import Grid, Layout, Variable, ask
@@ -35,6 +38,7 @@ CHANNELS = np.array(["r", "g", "b", "a"])
 #: That no grid has.
 FOREIGN = ("letter.txt", "other/zarr.json", "final/c.9.9.9.9.9", "final/c.0.partial")
 ROOT = "zarr.json"
+EXPECTED_KEYS = store.expected_keys
 #: The flags.
 VERIFY, CHUNKED, LOOK = 1, 2, 4
 
@@ -75,17 +79,51 @@ def _value(name: str, shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.flo
     return np.arange(count, dtype=np.float64).reshape(shape + trailing)
 
 
-def _made(store: Path, **arguments: Any) -> Any:
+def _made(path: Path, **arguments: Any) -> Any:
     with mock.patch.object(zarr_grid, "render_grid", _rendered):
-        return grid_to_zarr(IMAGE, None, AXES, store, **arguments)
+        return grid_to_zarr(IMAGE, None, AXES, path, **arguments)
 
 
-def _contents(store: Path) -> dict[str, bytes]:
+def _contents(folder: Path) -> dict[str, bytes]:
     return {
-        str(path.relative_to(store)): path.read_bytes()
-        for path in sorted(store.rglob("*"))
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
         if path.is_file()
     }
+
+
+async def _at_once(function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    return function(*arguments, **named)
+
+
+@functools.cache
+def _expected(chunk: tuple[int, ...]) -> dict[str, bytes]:
+    grid = _asked()
+    return EXPECTED_KEYS(grid, _laid_out(grid), chunk)
+
+
+def _asked() -> Grid:
+    return ask(
+        IMAGE,
+        None,
+        AXES,
+        size=None,
+        shading="forward",
+        time=0.0,
+        attachments="final",
+        reduce=None,
+    )
+
+
+@contextlib.contextmanager
+def _quick() -> Iterator[None]:
+    """Leave out what costs time and decides nothing: threads, waits for the disk, what is known."""
+    with (
+        mock.patch.object(asyncio, "to_thread", _at_once),
+        mock.patch.object(keys, "_flush"),
+        mock.patch.object(store, "expected_keys", lambda _, __, chunk: dict(_expected(chunk))),
+    ):
+        yield
 
 
 class Stores:
@@ -109,11 +147,14 @@ class Stores:
         found = [bytes([flags]) for flags in range(5)]
         for number, key in enumerate(self._keys):
             content = self._whole.get(key, b"{}")
-            kinds = [0, 2, 3] + [1] * (key.partition("/")[2].startswith("c."))
-            for kind in kinds:
+            if "/c." in key:
                 # With their checksum they are changed and still whole.
-                payload = content[:-4] if kind == 1 else content
-                found.append(b"\1" + _record(number, kind, payload))
+                found.append(b"\1" + _record(number, 1, content[:-4]))
+            else:
+                found.append(b"\1" + _record(number, 0, content))
+        for key in (ROOT, "done/c.0.0", "final/zarr.json", "final/c.0.0.0.0.0"):
+            number = self._keys.index(key)
+            found += [b"\1" + _record(number, kind, b"") for kind in (0, 2, 3)]
         root = json.loads(self._whole[ROOT])
         own = root["attributes"]["vkbloom_grid"]
         texts = (own, root["attributes"], own["chunk"], "another")
@@ -134,23 +175,26 @@ class Stores:
 
     def run(self, data: bytes) -> None:
         """Look through a changed store, or go on with it."""
-        flags, store = (data[:1] or b"\0")[0], self._changed
         self._change(data[1:])
-        before = _contents(store)
+        with _quick():
+            self._gone_on((data[:1] or b"\0")[0])
+
+    def _gone_on(self, flags: int) -> None:
+        path = self._changed
+        before = _contents(path)
         try:
             if flags & LOOK:
-                check_grid(store)
+                check_grid(path)
             else:
-                _made(
-                    store, verify=bool(flags & VERIFY), chunks=CHUNKS if flags & CHUNKED else None
-                )
+                chunks = CHUNKS if flags & CHUNKED else None
+                _made(path, verify=bool(flags & VERIFY), chunks=chunks)
         except ValueError:
-            assert _contents(store) == before, "a refused store was changed"
+            assert _contents(path) == before, "a refused store was changed"
             return
         if flags & LOOK:
-            assert _contents(store) == before, "looking through a store changed it"
+            assert _contents(path) == before, "looking through a store changed it"
         elif flags & VERIFY:
-            report = check_grid(store)
+            report = check_grid(path)
             assert report.complete, str(report)
             assert report.points == 6, str(report)
 
@@ -236,16 +280,7 @@ class Folders:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder / "images"
-        grid = ask(
-            IMAGE,
-            None,
-            AXES,
-            size=None,
-            shading="forward",
-            time=0.0,
-            attachments="final",
-            reduce=None,
-        )
+        grid = _asked()
         self._files = GridFiles(self._folder, ".png", grid, _laid_out(grid))
         self._files.prepare(resume=False)
         self._index = self._folder / "grid.json"
