@@ -73,8 +73,8 @@ def main() -> int:
     for number, seed in enumerate(seeds):
         (corpus / str(number)).write_bytes(seed)
     arguments = [f"-max_total_time={options.seconds:.0f}", f"-seed={options.seed}"]
-    arguments += ["-rss_limit_mb=0", "-max_len=65536", str(corpus)]
-    atheris.Setup([sys.argv[0], *arguments], one)
+    arguments += ["-rss_limit_mb=0", "-max_len=65536", "-len_control=0", "-keep_seed=1"]
+    atheris.Setup([sys.argv[0], *arguments, str(corpus)], one)
     atheris.Fuzz()
     return 0
 

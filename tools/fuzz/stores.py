@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import functools
 import json
+import random
 import shutil
 import struct
 from collections.abc import Callable, Iterator
@@ -39,6 +40,15 @@ CHANNELS = np.array(["r", "g", "b", "a"])
 FOREIGN = ("letter.txt", "other/zarr.json", "final/c.9.9.9.9.9", "final/c.0.partial")
 ROOT = "zarr.json"
 EXPECTED_KEYS = store.expected_keys
+KINDS = 8
+#: What stands in for any value of metadata; the last is for leaving it out.
+VALUES = (
+    *(None, True, 0, 1, 3.0, -1, 2, 1e308, float("nan"), 10**9, 2**40, 10**30),
+    *("", "x", "../..", "float64", "string", [], [[]], [1], [1, 1], {}, {"a": {}}, {"name": "x"}),
+    [10**9, 10**9],
+    functools.reduce(lambda inner, _: [inner], range(600), []),
+    ...,
+)
 #: The flags.
 VERIFY, CHUNKED, LOOK = 1, 2, 4
 
@@ -155,10 +165,12 @@ class Stores:
         for key in (ROOT, "done/c.0.0", "final/zarr.json", "final/c.0.0.0.0.0"):
             number = self._keys.index(key)
             found += [b"\1" + _record(number, kind, b"") for kind in (0, 2, 3)]
-        root = json.loads(self._whole[ROOT])
-        own = root["attributes"]["vkbloom_grid"]
-        texts = (own, root["attributes"], own["chunk"], "another")
-        found += [b"\1" + _record(0, 4 + n, json.dumps(t).encode()) for n, t in enumerate(texts)]
+        wanted = ["attributes", "vkbloom_grid", "chunk", "grid", "axes", "variables"]
+        for place, (inner, key) in enumerate(_places(json.loads(self._whole[ROOT]))):
+            if key in wanted:
+                wanted.remove(key)
+                text = struct.pack("<H", place) + json.dumps(inner[key]).encode()
+                found.append(b"\1" + _record(self._keys.index(ROOT), 4, text))
         # A frame that promises 8 GiB, and one that holds 4 MiB.
         frame = b"\x28\xb5\x2f\xfd\xe0" + struct.pack("<Q", 1 << 33) + b"\x01\x00\x00"
         zeros = bytes(1 << 22)
@@ -166,8 +178,12 @@ class Stores:
             number = self._keys.index(key)
             found.append(b"\1" + _record(number, 1, frame))
             found.append(b"\1" + _record(number, 1, Zstd(level=1).encode(zeros)))
-            found.append(b"\1" + _record(number, 8, self._decoded(key)))
-            found.append(b"\1" + _record(number, 9, bytes([0])))
+            found.append(b"\1" + _record(number, 6, self._decoded(key)))
+            found.append(b"\1" + _record(number, 7, bytes([0])))
+        dice = random.Random(1)
+        for name in (ROOT, "done/zarr.json", "final/zarr.json", "exposure/zarr.json"):
+            for _ in range(10):
+                found.append(b"\1" + _record(self._keys.index(name), 5, dice.randbytes(3)))
         return [*found, *(bytes([LOOK]) + one[1:] for one in found[5:])]
 
     def _decoded(self, key: str) -> bytes:
@@ -203,7 +219,7 @@ class Stores:
         contents: dict[str, bytes | None] = dict(self._whole)
         for number, kind, payload in _records(data):
             key = self._keys[number % len(self._keys)]
-            match kind % 10:
+            match kind % KINDS:
                 case 0:
                     contents[key] = payload
                 case 1:
@@ -213,12 +229,11 @@ class Stores:
                 case 3:
                     # A folder.
                     contents[key] = None
-                case 4 | 5 | 6:
-                    contents[ROOT] = self._root_with(kind % 10, payload)
-                case 7:
-                    key = f"{key.partition('/')[0]}/{ROOT}"
-                    contents[key] = _replaced(self._whole.get(key), payload)
-                case 8:
+                case 4:
+                    contents[key] = _with_other_text(contents.get(key) or b"{}", payload)
+                case 5:
+                    contents[key] = _with_other_values(contents.get(key) or b"{}", payload)
+                case 6:
                     contents[key] = _summed(bytes(Zstd(level=1).encode(payload or b"\0")))
                 case _:
                     source = self._keys[(payload or b"\0")[0] % len(self._keys)]
@@ -233,25 +248,45 @@ class Stores:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
 
-    def _root_with(self, kind: int, payload: bytes) -> bytes:
-        """Return the group's metadata with other text in one place."""
-        root = json.loads(self._whole[ROOT])
-        if kind == 4:
-            root["attributes"]["vkbloom_grid"] = "@"
-        elif kind == 5:
-            root["attributes"] = "@"
-        else:
-            root["attributes"]["vkbloom_grid"]["chunk"] = "@"
-        return json.dumps(root).encode().replace(b'"@"', payload)
+
+def _places(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield every list and dict within a value, with each of its indices or keys."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, part in list(inner):
+        yield value, key
+        if isinstance(part, dict | list):
+            yield from _places(part)
 
 
-def _replaced(metadata: bytes | None, payload: bytes) -> bytes:
-    """Return an array's metadata with other text for the grid that it belongs to."""
-    if metadata is None:
+def _read(metadata: bytes) -> Any:
+    try:
+        return json.loads(metadata)
+    except (ValueError, RecursionError):
+        return {}
+
+
+def _with_other_values(metadata: bytes, payload: bytes) -> bytes:
+    """Return metadata with others of `VALUES`, by two bytes of a place's number and one of its."""
+    found = _read(metadata)
+    for place, value in struct.iter_unpack("<HB", payload[: len(payload) // 3 * 3]):
+        places = list(_places(found)) if isinstance(found, dict | list) else []
+        if places:
+            inner, key = places[place % len(places)]
+            inner[key] = VALUES[value % len(VALUES)]
+            if inner[key] is ...:
+                del inner[key]
+    return json.dumps(found).encode()
+
+
+def _with_other_text(metadata: bytes, payload: bytes) -> bytes:
+    """Return metadata with other text in one place, whose number is in two bytes before it."""
+    found = _read(metadata)
+    places = list(_places(found)) if isinstance(found, dict | list) else []
+    if not places:
         return payload
-    found = json.loads(metadata)
-    found["attributes"]["grid"] = "@"
-    return json.dumps(found).encode().replace(b'"@"', payload)
+    inner, key = places[int.from_bytes(payload[:2], "little") % len(places)]
+    inner[key] = "@"
+    return json.dumps(found).encode().replace(b'"@"', payload[2:])
 
 
 def _record(number: int, kind: int, payload: bytes) -> bytes:
