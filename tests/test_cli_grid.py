@@ -300,6 +300,12 @@ chunks: {{intensity: 2}}
 """
 
 
+#: Lists in lists, 50 at a time, each within the next.
+CHAIN = "a0: &a0 1\n" + "".join(
+    f"a{i + 1}: &a{i + 1} {'[' * 50}*a{i}{']' * 50}\n" for i in range(40)
+)
+
+
 class TestOptionFiles:
     @pytest.mark.parametrize(("suffix", "text"), [("toml", TOML), ("yaml", YAML)])
     def test_holds_options(self, tmp_path: Path, picture: Path, suffix: str, text: str) -> None:
@@ -370,6 +376,8 @@ class TestOptionFiles:
             ("a.yaml", "a: !!float ''", 1, "a.yaml: a value does not fit its tag"),
             ("a.yaml", "a: 2001-99-99", 1, "a.yaml: month must be"),
             ("a.yaml", "a: &a [*a]", 1, "a.yaml: its values are too many, or hold each other"),
+            ("a.yaml", "axes: &a {b: *a}", 1, "a.yaml: its values are too many, or hold each"),
+            ("a.yaml", CHAIN, 1, "a.yaml: its values are too many, or hold each other"),
             ("a.yaml", "a: " + "[" * 5000, 1, "a.yaml: its values are too many"),
             ("a.toml", "a = " + "[" * 5000, 1, "a.toml: its values are too many"),
             ("a.toml", "a" + ".a" * 500 + " = 1", 1, "a.toml: its values are too many"),
@@ -389,7 +397,7 @@ class TestOptionFiles:
                 "600000 values are out of range, 1 to 400000",
             ),
         ],
-        ids=str,
+        ids=lambda value: str(value)[:40],
     )
     def test_files_that_do_not_load(
         self, tmp_path: Path, name: str, text: str | None, status: int, told: str
@@ -423,7 +431,7 @@ class TestOptionFiles:
             tracemalloc.stop()
         assert result.exit_code == 1
         assert "a.yaml: its values are too many, or hold each other" in result.stderr
-        # Some MB for the words of the file; the lists are not spelled.
+        # The file's own words and modules that the first call loads take some MB.
         assert most < 64 << 20
 
     def test_a_flag_that_is_off(self, tmp_path: Path, picture: Path) -> None:

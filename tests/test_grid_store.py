@@ -433,7 +433,9 @@ class TestHostile:
     """Stores that fuzzing found, or would."""
 
     @pytest.mark.parametrize(
-        "frame", [SAYS_TOO_MUCH, HOLDS_TOO_MUCH + LAST, STREAMS_TOO_MUCH + LAST]
+        "frame",
+        [SAYS_TOO_MUCH, HOLDS_TOO_MUCH + LAST, STREAMS_TOO_MUCH + LAST],
+        ids=["says", "holds", "streams"],
     )
     @pytest.mark.parametrize("key", [CHUNK_OF_FINAL, "done/c.0.0.0", "channel/c.0", "exposure/c.0"])
     def test_a_chunk_takes_no_more_memory_than_its_array_needs(
@@ -548,7 +550,7 @@ class TestHostile:
         with pytest.raises(ValueError, match="1000000000000 points are over the most"):
             check_grid(copy)
 
-    @pytest.mark.parametrize("name", ["final", "done", "channel", "exposure"])
+    @pytest.mark.parametrize("name", ["final", "done", "channel"])
     @pytest.mark.parametrize(
         "change",
         [

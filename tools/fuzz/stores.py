@@ -250,12 +250,13 @@ class Stores:
 
 
 def _places(value: Any) -> Iterator[tuple[Any, Any]]:
-    """Yield every list and dict within a value, with each of its indices or keys."""
-    inner = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, part in list(inner):
-        yield value, key
-        if isinstance(part, dict | list):
-            yield from _places(part)
+    """Yield the lists and dicts within a value, with each of their indices or keys."""
+    pending = [(value, 0)]
+    for inner, depth in pending:
+        if isinstance(inner, dict | list) and depth < 20:
+            for key, part in inner.items() if isinstance(inner, dict) else enumerate(inner):
+                yield inner, key
+                pending.append((part, depth + 1))
 
 
 def _read(metadata: bytes) -> Any:
@@ -265,28 +266,36 @@ def _read(metadata: bytes) -> Any:
         return {}
 
 
+def _written(value: Any) -> bytes:
+    try:
+        return json.dumps(value).encode()
+    except RecursionError:
+        # More lists in lists than any reader takes.
+        return b"[" * 5000
+
+
 def _with_other_values(metadata: bytes, payload: bytes) -> bytes:
     """Return metadata with others of `VALUES`, by two bytes of a place's number and one of its."""
     found = _read(metadata)
     for place, value in struct.iter_unpack("<HB", payload[: len(payload) // 3 * 3]):
-        places = list(_places(found)) if isinstance(found, dict | list) else []
+        places = list(_places(found))
         if places:
             inner, key = places[place % len(places)]
             inner[key] = VALUES[value % len(VALUES)]
             if inner[key] is ...:
                 del inner[key]
-    return json.dumps(found).encode()
+    return _written(found)
 
 
 def _with_other_text(metadata: bytes, payload: bytes) -> bytes:
     """Return metadata with other text in one place, whose number is in two bytes before it."""
     found = _read(metadata)
-    places = list(_places(found)) if isinstance(found, dict | list) else []
+    places = list(_places(found))
     if not places:
         return payload
     inner, key = places[int.from_bytes(payload[:2], "little") % len(places)]
     inner[key] = "@"
-    return json.dumps(found).encode().replace(b'"@"', payload[2:])
+    return _written(found).replace(b'"@"', payload[2:])
 
 
 def _record(number: int, kind: int, payload: bytes) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Container, Mapping, Sized
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -75,7 +75,7 @@ def _read(path: Path) -> dict[str, Any]:
     content = path.read_bytes()
     try:
         found = _toml(content) if suffix == ".toml" else _yaml(content)
-        _check_size(found)
+        _check_size(found, {})
     except RecursionError:
         raise ValueError(f"{path}: {_TOO_MUCH}") from None
     except ValueError as error:
@@ -100,23 +100,33 @@ def _yaml(content: bytes) -> object:
         raise ValueError(f"a value does not fit its tag ({error})") from error
 
 
-def _check_size(content: object) -> None:
-    """Raise ValueError for values that are too much to spell.
+def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, int]:
+    """Return about as many letters as a value takes when it is spelled, and its lists in lists.
 
-    What a YAML file names several times is there once until then.
+    What a YAML file names several times is there once until then, and is looked at once here.
+
+    Raises
+    ------
+    ValueError
+        Either is too much, or a number has too many digits to be spelled.
     """
-    room = _MOST_LETTERS
-    pending = [(content, 0)]
-    while pending:
-        value, depth = pending.pop()
+    if isinstance(value, str | bytes):
+        return len(value), 0
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        raise ValueError(f"a whole number of over {_MOST_BITS} bits is in it")
+    if not isinstance(value, dict | list | tuple | set):
+        return 1, 0
+    if id(value) not in known:
+        # What holds itself is met again before it is known.
+        known[id(value)] = 0, _MOST_DEPTH
         inner = [*value, *value.values()] if isinstance(value, dict) else value
-        if isinstance(inner, list | tuple | set):
-            pending += [(part, depth + 1) for part in inner]
-        elif isinstance(inner, int) and inner.bit_length() > _MOST_BITS:
-            raise ValueError(f"a whole number of over {_MOST_BITS} bits is in it")
-        room -= 1 + (len(inner) if isinstance(inner, Sized) else 0)
-        if room < 0 or depth > _MOST_DEPTH:
+        found = [_check_size(part, known) for part in inner]
+        letters = 1 + sum(1 + letters for letters, _ in found)
+        depth = 1 + max((depth for _, depth in found), default=0)
+        if letters > _MOST_LETTERS or depth > _MOST_DEPTH:
             raise ValueError(_TOO_MUCH)
+        known[id(value)] = letters, depth
+    return known[id(value)]
 
 
 def _words(content: Mapping[str, Any], path: str, switches: Container[str]) -> list[str]:
