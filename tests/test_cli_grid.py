@@ -255,6 +255,29 @@ class TestImageFiles:
         assert result.exit_code == 1
         assert "there is no grid in it" in result.stderr
 
+    @pytest.mark.parametrize(
+        ("content", "told"),
+        [
+            (b"{", "grid.json: damaged"),
+            (b"\xff", "grid.json: damaged"),
+            (b"[" * 100_000, "grid.json: damaged"),
+            (b"[]", "another grid is there"),
+            (b'{"settings": 3}', "another grid is there"),
+        ],
+        ids=["half", "no text", "deep", "a list", "a number"],
+    )
+    def test_a_damaged_index(
+        self, tmp_path: Path, picture: Path, content: bytes, told: str
+    ) -> None:
+        out = tmp_path / "files"
+        done(picture, "-o", out)
+        (out / "grid.json").write_bytes(content)
+        before = {path: path.read_bytes() for path in out.iterdir()}
+        result = run(picture, "-o", out, "--resume")
+        assert result.exit_code == 1
+        assert told in result.stderr
+        assert {path: path.read_bytes() for path in out.iterdir()} == before
+
     def test_what_is_for_stores(self, tmp_path: Path, picture: Path) -> None:
         for words in (["--reduce", "mean"], ["--sheet", "a.png"], ["--chunk", "exposure=1"]):
             result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", *words)

@@ -22,6 +22,7 @@ from framebuffers import noise
 import vkbloom
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, reductions
 from vkbloom.grid.filling import Filler
+from vkbloom.grid.identity import differences
 from vkbloom.grid.store import GridStore
 
 xr = pytest.importorskip("xarray")
@@ -297,6 +298,11 @@ class TestRefused:
         for call in (make, check_grid):
             with pytest.raises(ValueError, match="its format is 99"):
                 call(copy)
+        root["attributes"]["vkbloom_grid"]["format"] = "x" * 100_000
+        (copy / "zarr.json").write_text(json.dumps(root))
+        for call in (make, check_grid):
+            with pytest.raises(ValueError, match=r'its format is "x+ \.\.\. x+", 1 is known'):
+                call(copy)
 
     def test_something_else(self, tmp_path: Path) -> None:
         (tmp_path / "a").mkdir()
@@ -454,6 +460,16 @@ class TestHostile:
         assert most < 64 << 20
         assert contents(copy) == contents(undisturbed)
 
+    def test_texts_that_are_said_to_be_many(self, copy: Path, undisturbed: Path) -> None:
+        content = bytes(zstd.Zstd().encode((1 << 28).to_bytes(4, "little") + bytes(16)))
+        (copy / "channel" / "c.0").write_bytes(content)
+        (problem,) = check_grid(copy).problems
+        assert problem == (
+            "the coordinate channel is damaged (it does not hold 3 values), of all points"
+        )
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
     def test_memory_that_is_short_is_no_damage(
         self, copy: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -541,6 +557,13 @@ class TestHostile:
         with pytest.raises(ValueError, match="another grid is there"):
             make(copy)
         assert contents(copy) == before
+
+    def test_values_of_any_depth_are_told(self) -> None:
+        deep: list[Any] = []
+        for _ in range(100_000):
+            deep = [deep]
+        told = ["a: lists in lists in the store, 1 asked for"]
+        assert differences({"a": deep}, {"a": 1}) == told
 
     def test_more_points_than_memory(self, copy: Path) -> None:
         axes = {name: list(range(10_000)) for name in AXES}

@@ -15,7 +15,7 @@ import numpy as np
 from vkbloom.extras import import_extra
 from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import check_numbers, check_summed, check_text
-from vkbloom.grid.identity import FORMAT, chunk_in
+from vkbloom.grid.identity import FORMAT, chunk_in, short
 from vkbloom.grid.keys import Keys, open_keys
 from vkbloom.grid.order import Block, Index, blocks
 from vkbloom.grid.plan import Variable
@@ -43,8 +43,12 @@ _MOST_POINTS: Final = 1 << 28
 _MOST_VALUES: Final = 1 << 20
 _MOST_BYTES: Final = 1 << 40
 _DAMAGE: Final = (ValueError, OSError)
-# The data types of coordinates.
-_COORDINATES: Final = {'"string"': "U1", '"bool"': "?", '"int64"': "<i8", '"float64"': "<f8"}
+# The data types of coordinates, as Zarr's JSON has them.
+_NUMBERS: Final = (
+    *("bool", "float16", "float32", "float64"),
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+)
+_COORDINATES: Final = {'"string"': "U1", **{f'"{name}"': name for name in _NUMBERS}}
 # What an array's metadata say of its shape and its chunks.
 _DECISIVE: Final = (
     "zarr_format",
@@ -126,7 +130,9 @@ def check_grid(store: Any) -> GridReport:
     if own is None:
         raise ValueError(f"{keys.name}: there is no grid in it, but something else")
     if own.get("format") != FORMAT:
-        raise ValueError(f"{keys.name}: its format is {own.get('format')!r}, {FORMAT} is known")
+        raise ValueError(
+            f"{keys.name}: its format is {short(own.get('format'))}, {FORMAT} is known"
+        )
     try:
         stored = _read_stored(own, root)
     except (KeyError, TypeError, AttributeError, ValueError):

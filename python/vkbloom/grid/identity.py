@@ -14,7 +14,7 @@ from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.reductions import Reduction
 from vkbloom.grid.sources import digest
 
-__all__ = ["FORMAT", "chunk_in", "differences", "identity"]
+__all__ = ["FORMAT", "chunk_in", "differences", "identity", "short"]
 
 #: Of the stores' own layout; another number cannot be read.
 FORMAT: Final = 1
@@ -108,16 +108,17 @@ def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
         for key in dict.fromkeys((*stored, *asked)):
             inner = f"{name}.{key}" if name else key
             if key not in stored:
-                yield f"{inner}: not in the store, {_short(asked[key])} asked for"
+                yield f"{inner}: not in the store, {short(asked[key])} asked for"
             elif key not in asked:
-                yield f"{inner}: {_short(stored[key])} in the store, not asked for"
+                yield f"{inner}: {short(stored[key])} in the store, not asked for"
             else:
                 yield from _differences(inner, stored[key], asked[key])
     elif stored != asked:
-        yield f"{name}: {_short(stored)} in the store, {_short(asked)} asked for"
+        yield f"{name}: {short(stored)} in the store, {short(asked)} asked for"
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """Return a value of a store for a message, whatever it is."""
     try:
         text = json.dumps(value)
     except RecursionError:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from vkbloom.extras import import_extra
 from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import check_summed
-from vkbloom.grid.identity import FORMAT, differences, identity
+from vkbloom.grid.identity import FORMAT, differences, identity, short
 from vkbloom.grid.keys import Keys
 from vkbloom.grid.order import Block, Index, blocks, default_chunk
 from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of
@@ -296,7 +296,8 @@ class GridStore:
                 raise ValueError(f"{self.keys.name}: there is no grid in it, but something else")
             if stored.get("format") != FORMAT:
                 raise ValueError(
-                    f"{self.keys.name}: its format is {stored.get('format')!r}, {FORMAT} is known"
+                    f"{self.keys.name}: its format is {short(stored.get('format'))}, "
+                    f"{FORMAT} is known"
                 )
             found = differences(stored, asked)
             if found:
