@@ -7,7 +7,11 @@ from collections.abc import Iterator
 
 #: What lengths, counts and offsets go wrong with.
 NUMBERS = (0, 1, 3, 127, 255, 256, 32767, 65535, 2**24, 2**31 - 1, 2**31, 2**32 - 1)
-WORDS = (b"-1", b"1e400", b"null", b"[]", b"{}", b'"../x"', b"true", b"99999999999", b"NaN", b"")
+WORDS = (
+    *(b"-1", b"1e400", b"null", b"[]", b"{}", b'"../x"', b"true", b"99999999999", b"NaN", b""),
+    # More than a reader that calls itself can take.
+    b"[" * 5000,
+)
 
 
 def mutated(data: bytes, dice: random.Random) -> bytes:
