@@ -277,7 +277,7 @@ def _written(value: Any) -> bytes:
 def _with_other_values(metadata: bytes, payload: bytes) -> bytes:
     """Return metadata with others of `VALUES`, by two bytes of a place's number and one of its."""
     found = _read(metadata)
-    for place, value in struct.iter_unpack("<HB", payload[: len(payload) // 3 * 3]):
+    for place, value in struct.iter_unpack("<HB", payload[: min(len(payload) // 3, 8) * 3]):
         places = list(_places(found))
         if places:
             inner, key = places[place % len(places)]
