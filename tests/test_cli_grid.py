@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -254,6 +255,29 @@ class TestImageFiles:
         assert result.exit_code == 1
         assert "there is no grid in it" in result.stderr
 
+    @pytest.mark.parametrize(
+        ("content", "told"),
+        [
+            (b"{", "grid.json: damaged"),
+            (b"\xff", "grid.json: damaged"),
+            (b"[" * 100_000, "grid.json: damaged"),
+            (b"[]", "another grid is there"),
+            (b'{"settings": 3}', "another grid is there"),
+        ],
+        ids=["half", "no text", "deep", "a list", "a number"],
+    )
+    def test_a_damaged_index(
+        self, tmp_path: Path, picture: Path, content: bytes, told: str
+    ) -> None:
+        out = tmp_path / "files"
+        done(picture, "-o", out)
+        (out / "grid.json").write_bytes(content)
+        before = {path: path.read_bytes() for path in out.iterdir()}
+        result = run(picture, "-o", out, "--resume")
+        assert result.exit_code == 1
+        assert told in result.stderr
+        assert {path: path.read_bytes() for path in out.iterdir()} == before
+
     def test_what_is_for_stores(self, tmp_path: Path, picture: Path) -> None:
         for words in (["--reduce", "mean"], ["--sheet", "a.png"], ["--chunk", "exposure=1"]):
             result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", *words)
@@ -297,6 +321,12 @@ axes:
 reduce: {{mean: mean, energy: "encircled_energy:bloom"}}
 chunks: {{intensity: 2}}
 """
+
+
+#: Lists in lists, 50 at a time, each within the next.
+CHAIN = "a0: &a0 1\n" + "".join(
+    f"a{i + 1}: &a{i + 1} {'[' * 50}*a{i}{']' * 50}\n" for i in range(40)
+)
 
 
 class TestOptionFiles:
@@ -358,7 +388,39 @@ class TestOptionFiles:
             ("a.toml", "axes = 3", 1, "axes must be a table"),
             ("a.toml", "nonsense = 3", 2, "--nonsense"),
             ("missing.toml", None, 1, "missing.toml: No such file"),
+            ("a.toml", 'from = "b.toml"', 1, "a.toml: from cannot stand in a file"),
+            ("a.toml", '"" = 1', 1, "a.toml: '' cannot name an option"),
+            # Found by fuzzing, or while its targets were written.
+            ("a.yaml", "images:", 1, "a.yaml: images must be a list"),
+            ("a.toml", "images = 3", 1, "a.toml: images must be a list"),
+            ("a.yaml", "axes: {1: [[1, 2]]}", 2, "--axis 1: the method separable has no such"),
+            ("a.yaml", "a: !!bool x", 1, "a.yaml: a value does not fit its tag"),
+            ("a.yaml", "a: !!timestamp x", 1, "a.yaml: a value does not fit its tag"),
+            ("a.yaml", "a: !!float ''", 1, "a.yaml: a value does not fit its tag"),
+            ("a.yaml", "a: 2001-99-99", 1, "a.yaml: month must be"),
+            ("a.yaml", "a: &a [*a]", 1, "a.yaml: its values are too many, or hold each other"),
+            ("a.yaml", "axes: &a {b: *a}", 1, "a.yaml: its values are too many, or hold each"),
+            ("a.yaml", CHAIN, 1, "a.yaml: its values are too many, or hold each other"),
+            ("a.yaml", "a: " + "[" * 5000, 1, "a.yaml: its values are too many"),
+            ("a.toml", "a = " + "[" * 5000, 1, "a.toml: its values are too many"),
+            ("a.toml", "a" + ".a" * 500 + " = 1", 1, "a.toml: its values are too many"),
+            ("a.toml", "a = 0x" + "f" * 6000, 1, "a.toml: a whole number of over 64 bits"),
+            ("a.toml", 'axes = {exposure = ";"}', 2, "--axis exposure=;: it has no values"),
+            (
+                "a.toml",
+                'reduce = {p = "psnr@exposure=;"}\naxes = {exposure = [1]}',
+                2,
+                "--axis exposure=;: it has no values",
+            ),
+            ("a.toml", f"chunks = {{exposure = '{'9' * 5000}'}}", 2, "NAME=COUNT is needed"),
+            (
+                "a.toml",
+                'axes = {exposure = "0:1:600000", knee = "0:1:600000"}',
+                2,
+                "600000 values are out of range, 1 to 400000",
+            ),
         ],
+        ids=lambda value: str(value)[:40],
     )
     def test_files_that_do_not_load(
         self, tmp_path: Path, name: str, text: str | None, status: int, told: str
@@ -368,3 +430,35 @@ class TestOptionFiles:
         result = run("--from", tmp_path / name, "-o", tmp_path / "a.zarr")
         assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
         assert told in result.stderr
+
+    def test_bytes_that_are_no_text(self, tmp_path: Path) -> None:
+        (tmp_path / "a.toml").write_bytes(b"\xff")
+        result = run("--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
+        assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+        assert "a.toml: 'utf-8'" in result.stderr
+
+    @pytest.mark.parametrize("sequence", ["[{}]", "!!pairs [x: {}]"])
+    def test_values_that_are_named_many_times(self, tmp_path: Path, sequence: str) -> None:
+        # 9**12 letters, were they spelled.
+        lines = ["a0: &a0 lol"]
+        separator = ", x: " if "pairs" in sequence else ", "
+        for number in range(12):
+            listed = sequence.format(separator.join([f"*a{number}"] * 9))
+            lines.append(f"a{number + 1}: &a{number + 1} {listed}")
+        (tmp_path / "a.yaml").write_text("\n".join(lines))
+        tracemalloc.start()
+        try:
+            result = run("--from", tmp_path / "a.yaml", "-o", tmp_path / "a.zarr")
+            _, most = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        assert result.exit_code == 1
+        assert "a.yaml: its values are too many, or hold each other" in result.stderr
+        # The file's own words and modules that the first call loads take some MB.
+        assert most < 64 << 20
+
+    def test_a_flag_that_is_off(self, tmp_path: Path, picture: Path) -> None:
+        (tmp_path / "a.toml").write_text("resume = false\nraw = false\n[settings]\nbloom = false")
+        done(picture, "--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
+        settings = json.loads(xr.open_zarr(tmp_path / "a.zarr").attrs["settings"])
+        assert settings["bloom"] is False

@@ -17,7 +17,20 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address s
 
 @LINUX
 @pytest.mark.skipif("VKBLOOM_SANITIZED" in os.environ, reason="a sanitizer needs the address space")
-@pytest.mark.parametrize("target", ["gltf", "ktx", "faces", "equirectangular", "pipelines"])
+@pytest.mark.parametrize(
+    "target",
+    [
+        "gltf",
+        "ktx",
+        "faces",
+        "equirectangular",
+        "pipelines",
+        "zarr",
+        "images",
+        "toml",
+        "yaml",
+    ],
+)
 def test_a_short_run(target: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, str(RUN), target, "--plain", "--seconds", "2"],

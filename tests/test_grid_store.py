@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,13 @@ from framebuffers import noise
 import vkbloom
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, reductions
 from vkbloom.grid.filling import Filler
+from vkbloom.grid.identity import differences
 from vkbloom.grid.store import GridStore
 
 xr = pytest.importorskip("xarray")
 zarr = pytest.importorskip("zarr")
+google_crc32c = pytest.importorskip("google_crc32c")
+zstd = pytest.importorskip("numcodecs.zstd")
 
 AXES: dict[str, list[Any]] = {
     "exposure": [0.0, 1.0, 2.0],
@@ -294,6 +298,11 @@ class TestRefused:
         for call in (make, check_grid):
             with pytest.raises(ValueError, match="its format is 99"):
                 call(copy)
+        root["attributes"]["vkbloom_grid"]["format"] = "x" * 100_000
+        (copy / "zarr.json").write_text(json.dumps(root))
+        for call in (make, check_grid):
+            with pytest.raises(ValueError, match=r'its format is "x+ \.\.\. x+", 1 is known'):
+                call(copy)
 
     def test_something_else(self, tmp_path: Path) -> None:
         (tmp_path / "a").mkdir()
@@ -401,6 +410,208 @@ class TestDamaged:
 
     def test_leftovers_of_a_killed_writer_go(self, copy: Path, undisturbed: Path) -> None:
         (copy / "final" / "c.0.0.0.0.0.5c5c.partial").write_bytes(b"half")
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
+
+def with_sum(content: bytes) -> bytes:
+    summed: int = google_crc32c.value(content)
+    return content + summed.to_bytes(4, "little")
+
+
+def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    metadata = json.loads(path.read_text())
+    change(metadata)
+    path.write_text(json.dumps(metadata))
+
+
+CHUNK_OF_FINAL = "final/c.0.1.1.0.0.0"
+#: Frames of Zstandard that say or hold more than their chunks: 64 GiB said in 19 bytes; 256 MiB in
+#: 8 KB, in one frame that says so, and in one that does not.
+SAYS_TOO_MUCH = b"\x28\xb5\x2f\xfd\xe0" + (1 << 36).to_bytes(8, "little") + b"\x19\0\0abc"
+ONES = ((1 << 17 << 3) | 2).to_bytes(3, "little") + b"\1"
+HOLDS_TOO_MUCH = bytes.fromhex("28b52ffda0") + (1 << 28).to_bytes(4, "little") + ONES * 2048
+STREAMS_TOO_MUCH = bytes.fromhex("28b52ffd0058") + ONES * 2048
+LAST = b"\1\0\0"
+
+
+class TestHostile:
+    """Stores that fuzzing found, or would."""
+
+    @pytest.mark.parametrize(
+        "frame",
+        [SAYS_TOO_MUCH, HOLDS_TOO_MUCH + LAST, STREAMS_TOO_MUCH + LAST],
+        ids=["says", "holds", "streams"],
+    )
+    @pytest.mark.parametrize("key", [CHUNK_OF_FINAL, "done/c.0.0.0", "channel/c.0", "exposure/c.0"])
+    def test_a_chunk_takes_no_more_memory_than_its_array_needs(
+        self, copy: Path, undisturbed: Path, key: str, frame: bytes
+    ) -> None:
+        has_sum = key.startswith(("final", "done"))
+        (copy / key).write_bytes(with_sum(frame) if has_sum else frame)
+        tracemalloc.start()
+        try:
+            (problem,) = check_grid(copy).problems
+            make(copy)
+            _, most = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        assert "damaged" in problem
+        assert most < 64 << 20
+        assert contents(copy) == contents(undisturbed)
+
+    def test_texts_that_are_said_to_be_many(self, copy: Path, undisturbed: Path) -> None:
+        content = bytes(zstd.Zstd().encode((1 << 28).to_bytes(4, "little") + bytes(16)))
+        (copy / "channel" / "c.0").write_bytes(content)
+        (problem,) = check_grid(copy).problems
+        assert problem == (
+            "the coordinate channel is damaged (it does not hold 3 values), of all points"
+        )
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
+    def test_memory_that_is_short_is_no_damage(
+        self, copy: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def fails(*_: object) -> None:
+            raise MemoryError
+
+        before = contents(copy)
+        monkeypatch.setattr(vkbloom.grid.store, "check_summed", fails)
+        with pytest.raises(MemoryError):
+            make(copy)
+        assert contents(copy) == before
+
+    def test_a_chunk_that_holds_too_little(self, copy: Path, undisturbed: Path) -> None:
+        content = bytes(zstd.Zstd().encode(bytes(100)))
+        (copy / CHUNK_OF_FINAL).write_bytes(with_sum(content))
+        (problem,) = check_grid(copy).problems
+        assert f"{CHUNK_OF_FINAL} is damaged (it " in problem
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
+    @pytest.mark.parametrize(
+        "chunk",
+        [[0, 1, 1], [-1, 1, 1], [10**9, 10**9, 10**9], [1.0, 1, 1], [True, 1, 1], "abc", 3, [[]]],
+        ids=str,
+    )
+    def test_a_block_that_is_none(self, copy: Path, chunk: Any) -> None:
+        rewritten(
+            copy / "zarr.json",
+            lambda root: root["attributes"]["vkbloom_grid"].update(chunk=chunk),
+        )
+        before = contents(copy)
+        assert "it says what the grid is" in check_grid(copy).problems[0]
+        with pytest.raises(ValueError, match="another grid is there; chunk: "):
+            make(copy, chunks=None)
+        assert contents(copy) == before
+
+    def test_a_block_that_is_not_the_arrays(self, copy: Path) -> None:
+        # Taken over, all that is there would be rendered again.
+        rewritten(
+            copy / "zarr.json",
+            lambda root: root["attributes"]["vkbloom_grid"].update(chunk=[1, 1, 1]),
+        )
+        before = contents(copy)
+        with pytest.raises(ValueError, match=r"another grid is there, and its zarr.json is"):
+            make(copy, chunks=None)
+        assert contents(copy) == before
+
+    @pytest.mark.parametrize("identity", [3, [], "x", None], ids=str)
+    @pytest.mark.parametrize("place", ["vkbloom_grid", "attributes"])
+    def test_metadata_of_other_types(self, copy: Path, place: str, identity: Any) -> None:
+        rewritten(
+            copy / "zarr.json",
+            lambda root: (root if place in root else root["attributes"]).update({place: identity}),
+        )
+        before = contents(copy)
+        for call in (make, check_grid):
+            with pytest.raises(ValueError, match="there is no grid in it"):
+                call(copy)
+        assert contents(copy) == before
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"axes": {}},
+            {"axes": {**AXES, "exposure": 3}},
+            {"order of axes": ["../../a", "b", "c"]},
+            {"order of axes": 3},
+            {"variables": {"../final": {"shape": [], "dtype": "float32"}}},
+            {"variables": {"final": {"shape": [10**30], "dtype": "float32"}}},
+            {"variables": {"final": {"shape": [1.5], "dtype": "float32"}}},
+            {"variables": {"final": {"shape": [], "dtype": "object"}}},
+            {"variables": {"final": 3}},
+            {"variables": []},
+        ],
+        ids=str,
+    )
+    def test_an_identity_that_is_none(self, copy: Path, change: dict[str, Any]) -> None:
+        rewritten(
+            copy / "zarr.json", lambda root: root["attributes"]["vkbloom_grid"].update(change)
+        )
+        before = contents(copy)
+        report = check_grid(copy)
+        assert (report.points, report.done, report.complete) == (0, 0, False)
+        assert report.problems == ("zarr.json is damaged: it says what the grid is",)
+        with pytest.raises(ValueError, match="another grid is there"):
+            make(copy)
+        assert contents(copy) == before
+
+    def test_values_of_any_depth_are_told(self) -> None:
+        deep: list[Any] = []
+        for _ in range(100_000):
+            deep = [deep]
+        told = ["a: lists in lists in the store, 1 asked for"]
+        assert differences({"a": deep}, {"a": 1}) == told
+
+    def test_more_points_than_memory(self, copy: Path) -> None:
+        axes = {name: list(range(10_000)) for name in AXES}
+        rewritten(
+            copy / "zarr.json", lambda root: root["attributes"]["vkbloom_grid"].update(axes=axes)
+        )
+        with pytest.raises(ValueError, match="1000000000000 points are over the most"):
+            check_grid(copy)
+
+    @pytest.mark.parametrize("name", ["final", "done", "channel"])
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"shape": [10**9]},
+            {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [10**9]}}},
+            {"codecs": [{"name": "bytes"}]},
+            {"data_type": "int8"},
+            {"zarr_format": 3.0},
+            {"attributes": 3},
+            {"attributes": {"grid": {}}},
+            {"attributes": {"grid": [[]]}},
+            {"dimension_names": [3]},
+        ],
+        ids=str,
+    )
+    def test_an_arrays_metadata(
+        self, copy: Path, undisturbed: Path, name: str, change: dict[str, Any]
+    ) -> None:
+        rewritten(copy / name / "zarr.json", lambda metadata: metadata.update(change))
+        tracemalloc.start()
+        try:
+            report = check_grid(copy)
+            make(copy)
+            _, most = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        # Names and attributes decide nothing of what is read.
+        is_harmless = set(change) <= {"attributes", "dimension_names"}
+        assert report.complete is not bool(report.problems)
+        assert is_harmless or f"{name}/zarr.json is damaged, of all points" in report.problems
+        assert most < 64 << 20
+        assert contents(copy) == contents(undisturbed)
+
+    @pytest.mark.parametrize("key", ["zarr.json", "final/zarr.json", "mean/zarr.json"])
+    def test_lists_in_lists_without_an_end(self, copy: Path, undisturbed: Path, key: str) -> None:
+        (copy / key).write_text('{"attributes": ' + "[" * 100_000)
+        (problem,) = check_grid(copy).problems
+        assert problem.startswith(f"{key} is damaged")
         make(copy)
         assert contents(copy) == contents(undisturbed)
 

@@ -1,4 +1,7 @@
-"""Fuzz a reader: ``python tools/fuzz/run.py TARGET [--seconds N] [--memory MIB] [--seed N]``.
+"""Fuzz a reader: ``python tools/fuzz/run.py TARGET [--seconds N] [--corpus FOLDER]``.
+
+The run starts from the target's whole files and from ``corpus/TARGET.zip``, inputs that reached
+something new in earlier runs; what this one adds to them stays in FOLDER, if one is given.
 
 With atheris the inputs are guided by the coverage of the package's Python code; without it (or with
 --plain) they are mutations of whole files. What a reader does not promise to raise ends the run, as
@@ -12,6 +15,7 @@ import argparse
 import resource
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 
@@ -22,6 +26,15 @@ def limit_memory(more: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
+def kept(target: str) -> list[bytes]:
+    """Return the inputs that earlier runs found worth keeping."""
+    path = Path(__file__).parent / "corpus" / f"{target}.zip"
+    if not path.exists():
+        return []
+    with zipfile.ZipFile(path) as archive:
+        return [archive.read(name) for name in archive.namelist()]
+
+
 def main() -> int:
     """Run one target; 1 where something was found."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -29,6 +42,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--memory", type=int, default=1024)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--corpus", type=Path)
     parser.add_argument("--plain", action="store_true")
     options = parser.parse_args()
     if not options.plain:
@@ -44,12 +58,7 @@ def main() -> int:
     import mutate
 
     target = targets.TARGETS[options.target]
-    seeds = target.seeds()
-    # Readers load libraries with the first file.
-    for seed in seeds:
-        target.run(seed)
-    limit_memory(options.memory << 20)
-    end = time.monotonic() + options.seconds
+    seeds = target.seeds() + kept(options.target)
     count = 0
 
     def one(data: bytes) -> None:
@@ -61,6 +70,11 @@ def main() -> int:
             Path(f"finding-{options.target}").write_bytes(data)
             raise
 
+    # Readers load libraries with the first file.
+    for seed in seeds:
+        one(seed)
+    limit_memory(options.memory << 20)
+    end = time.monotonic() + options.seconds
     if options.plain:
         for data in mutate.inputs(seeds, options.seed):
             one(data)
@@ -68,13 +82,13 @@ def main() -> int:
                 break
         print(f"{options.target}: {count} executions in {options.seconds:.0f} s, nothing found")
         return 0
-    corpus = targets.FOLDER / "corpus"
-    corpus.mkdir()
+    corpus = options.corpus or targets.FOLDER / "corpus"
+    corpus.mkdir(exist_ok=True)
     for number, seed in enumerate(seeds):
-        (corpus / str(number)).write_bytes(seed)
+        (corpus / f"seed-{number}").write_bytes(seed)
     arguments = [f"-max_total_time={options.seconds:.0f}", f"-seed={options.seed}"]
-    arguments += ["-rss_limit_mb=0", "-max_len=65536", str(corpus)]
-    atheris.Setup([sys.argv[0], *arguments], one)
+    arguments += ["-rss_limit_mb=0", "-max_len=65536", "-len_control=0", "-keep_seed=1"]
+    atheris.Setup([sys.argv[0], *arguments, str(corpus)], one)
     atheris.Fuzz()
     return 0
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import functools
 import json
 import struct
 import tempfile
@@ -17,6 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 import OpenImageIO
+import options
+import stores
 
 from vkbloom import ktx, pipeline_cache, skybox
 from vkbloom.gltf import load_mesh
@@ -169,12 +172,31 @@ def _pipeline_seeds() -> list[bytes]:
     return [pipeline_cache.MAGIC + pipeline_cache._digest(DRIVER, kept) + kept]
 
 
+@functools.cache
+def _stores() -> stores.Stores:
+    return stores.Stores(FOLDER)
+
+
+@functools.cache
+def _folders() -> stores.Folders:
+    return stores.Folders(FOLDER)
+
+
+@functools.cache
+def _options(suffix: str) -> options.Options:
+    return options.Options(FOLDER / f"options{suffix}")
+
+
 TARGETS = {
     "gltf": Target(_gltf, _gltf_seeds),
     "ktx": Target(_ktx, _ktx_seeds),
     "faces": Target(_faces, lambda: _image_seeds((4, 4, 3))),
     "equirectangular": Target(_equirectangular, lambda: _image_seeds((4, 8, 3))),
     "pipelines": Target(_pipelines, _pipeline_seeds),
+    "zarr": Target(lambda data: _stores().run(data), lambda: _stores().seeds()),
+    "images": Target(lambda data: _folders().run(data), lambda: _folders().seeds()),
+    "toml": Target(lambda data: _options(".toml").run(data), lambda: _options(".toml").seeds()),
+    "yaml": Target(lambda data: _options(".yaml").run(data), lambda: _options(".yaml").seeds()),
 }
 
 

@@ -27,7 +27,9 @@ REDUCTIONS: Final[Mapping[str, type[reductions.Reduction]]] = {
 }
 
 _RANGE_PARTS: Final = (3, 4)
-_MOST_VALUES: Final = 10_000_000
+_MOST_DIGITS: Final = 18
+# Of all axes together.
+_MOST_VALUES: Final = 1_000_000
 
 
 def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, Sequence[Any]]:
@@ -58,15 +60,18 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
             )
         if name not in types:
             raise click.UsageError(f"--axis {name}: the method {settings.method} has no such field")
-        found[name] = _values(word, text, types[name])
+        room = _MOST_VALUES - sum(map(len, found.values()))
+        found[name] = _values(word, text, types[name], room)
     return found
 
 
-def _values(word: str, text: str, annotation: object) -> Sequence[Any]:
+def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any]:
     parts = text.split(":")
     if len(parts) in _RANGE_PARTS and "," not in text and ";" not in text:
-        return _range(word, parts)
+        return _range(word, parts, room)
     values = [part for part in text.split(";" if ";" in text else ",") if part]
+    if not values:
+        raise click.UsageError(f"--axis {word}: it has no values")
     # The forms of options, one a value, so that a value is written as its option is.
     kind = click.BOOL if annotation is bool else fields.form_of(annotation)
     try:
@@ -75,7 +80,7 @@ def _values(word: str, text: str, annotation: object) -> Sequence[Any]:
         raise click.UsageError(f"--axis {word}: {error.message}") from error
 
 
-def _range(word: str, parts: Sequence[str]) -> Sequence[float]:
+def _range(word: str, parts: Sequence[str], room: int) -> Sequence[float]:
     try:
         first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
         is_log = len(parts) > 3
@@ -85,8 +90,8 @@ def _range(word: str, parts: Sequence[str]) -> Sequence[float]:
         raise click.UsageError(
             f"--axis {word}: not FIRST:LAST:COUNT or FIRST:LAST:COUNT:log"
         ) from None
-    if not 1 <= count <= _MOST_VALUES:
-        raise click.UsageError(f"--axis {word}: {count} values are out of range, from 1 on")
+    if not 1 <= count <= room:
+        raise click.UsageError(f"--axis {word}: {count} values are out of range, 1 to {room}")
     if is_log and not (first > 0 and last > 0):
         raise click.UsageError(f"--axis {word}: the ends of ratios must be above 0")
     spread = np.geomspace if is_log else np.linspace
@@ -98,7 +103,7 @@ def chunk_counts(words: Sequence[str]) -> dict[str, int] | None:
     found = {}
     for word in words:
         name, _, count = word.partition("=")
-        if not count.isdecimal():
+        if not count.isdecimal() or len(count) > _MOST_DIGITS:
             raise click.UsageError(f"--chunk {word}: NAME=COUNT is needed")
         found[name.replace("-", "_")] = int(count)
     return found or None

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +20,11 @@ FILE_OPTION: Final = "--from"
 _PLAIN_TABLES: Final = ("settings", "camera")
 _NAMED_TABLES: Final = {"axes": "--axis", "reduce": "--reduce", "chunks": "--chunk"}
 _ARGUMENTS: Final = "images"
+# Of a file's values: lists within lists, and letters.
+_MOST_DEPTH: Final = 64
+_MOST_LETTERS: Final = 1 << 22
+_MOST_BITS: Final = 64
+_TOO_MUCH: Final = "its values are too many, or hold each other"
 # Written as WIDTHxHEIGHT.
 _SIZES: Final = ("size", "bloom-size")
 
@@ -46,8 +52,13 @@ class CommandWithFile(click.Command):
                 if path is None:
                     raise click.UsageError(f"{FILE_OPTION} needs the name of a file", ctx)
                 # Before the others, which so replace them.
-                found = [*_words(_read(Path(path)), path), *found]
+                found = [*_words(_read(Path(path)), path, self._switches()), *found]
         return super().parse_args(ctx, found)
+
+    def _switches(self) -> set[str]:
+        """Return the flags that can only be given or left out."""
+        flags = (one for one in self.params if isinstance(one, click.Option) and one.is_flag)
+        return {name for flag in flags if not flag.secondary_opts for name in flag.opts}
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -58,42 +69,87 @@ def _read(path: Path) -> dict[str, Any]:
     OSError, ValueError
         It cannot be read; names the file.
     """
-    text = path.read_text(encoding="utf-8")
-    content: object
-    if path.suffix.lower() == ".toml":
-        try:
-            content = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise ValueError(f"{path}: {error}") from error
-    elif path.suffix.lower() in (".yaml", ".yml"):
-        yaml = import_extra("yaml", "cli", "Reading YAML")
-        try:
-            content = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise ValueError(f"{path}: {error}") from error
-    else:
+    suffix = path.suffix.lower()
+    if suffix not in (".toml", ".yaml", ".yml"):
         raise ValueError(f"{path}: its extension is none of .toml, .yaml, .yml")
-    if not isinstance(content, dict):
+    content = path.read_bytes()
+    try:
+        found = _toml(content) if suffix == ".toml" else _yaml(content)
+        _check_size(found, {})
+    except RecursionError:
+        raise ValueError(f"{path}: {_TOO_MUCH}") from None
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+    if not isinstance(found, dict):
         raise ValueError(f"{path}: names and values are needed")
-    return content
+    return found
 
 
-def _words(content: Mapping[str, Any], path: str) -> list[str]:
+def _toml(content: bytes) -> object:
+    return tomllib.loads(content.decode())
+
+
+def _yaml(content: bytes) -> object:
+    yaml = import_extra("yaml", "cli", "Reading YAML")
+    try:
+        return yaml.safe_load(content.decode())
+    except yaml.YAMLError as error:
+        raise ValueError(str(error)) from error
+    except (LookupError, AttributeError, TypeError) as error:
+        # Such as "!!bool 3".
+        raise ValueError(f"a value does not fit its tag ({error})") from error
+
+
+def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, int]:
+    """Return about as many letters as a value takes when it is spelled, and its lists in lists.
+
+    What a YAML file names several times is there once until then, and is looked at once here.
+
+    Raises
+    ------
+    ValueError
+        Either is too much, or a number has too many digits to be spelled.
+    """
+    if isinstance(value, str | bytes):
+        return len(value), 0
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        raise ValueError(f"a whole number of over {_MOST_BITS} bits is in it")
+    if not isinstance(value, dict | list | tuple | set):
+        return 1, 0
+    if id(value) not in known:
+        # What holds itself is met again before it is known.
+        known[id(value)] = 0, _MOST_DEPTH
+        inner = [*value, *value.values()] if isinstance(value, dict) else value
+        found = [_check_size(part, known) for part in inner]
+        letters = 1 + sum(1 + letters for letters, _ in found)
+        depth = 1 + max((depth for _, depth in found), default=0)
+        if letters > _MOST_LETTERS or depth > _MOST_DEPTH:
+            raise ValueError(_TOO_MUCH)
+        known[id(value)] = letters, depth
+    return known[id(value)]
+
+
+def _words(content: Mapping[str, Any], path: str, switches: Container[str]) -> list[str]:
     """Return what would stand on the command line."""
     words: list[str] = []
     arguments: list[str] = []
     for key, value in content.items():
         if key in _NAMED_TABLES:
             for name, inner in _table(value, key, path).items():
-                words += [_NAMED_TABLES[key], f"{name}={_values(name, inner)}"]
+                words += [_NAMED_TABLES[key], f"{name}={_values(str(name), inner)}"]
         elif key in _PLAIN_TABLES:
             prefix = "camera-" if key == "camera" else ""
             for name, inner in _table(value, key, path).items():
-                words += _option(f"{prefix}{name}", inner)
+                words += _option(_named(name, prefix, path), inner, switches)
         elif key == _ARGUMENTS:
-            arguments += [value] if isinstance(value, str) else [str(part) for part in value]
+            listed = [value] if isinstance(value, str) else value
+            if not isinstance(listed, list):
+                raise ValueError(f"{path}: {key} must be a list")
+            arguments += [str(part) for part in listed]
+        elif f"--{key}" == FILE_OPTION:
+            raise ValueError(f"{path}: {key} cannot stand in a file")
         else:
-            words += _option(str(key), value)
+            words += _option(_named(key, "", path), value, switches)
     return [*words, *arguments]
 
 
@@ -103,8 +159,17 @@ def _table(value: object, key: str, path: str) -> dict[str, Any]:
     return value
 
 
-def _option(name: str, value: Any) -> list[str]:
+def _named(key: object, prefix: str, path: str) -> str:
+    # Others would be taken for a value, or for the end of the options.
+    if not re.fullmatch(r"[\w-]+", str(key)):
+        raise ValueError(f"{path}: {key!r} cannot name an option")
+    return f"{prefix}{key}"
+
+
+def _option(name: str, value: Any, switches: Container[str]) -> list[str]:
     option = name.replace("_", "-")
+    if value is False and f"--{option}" in switches:
+        return []
     if isinstance(value, bool):
         return [f"--{option}" if value else f"--no-{option}"]
     return [f"--{option}", _spelled(value, "x" if option in _SIZES else ",:")]

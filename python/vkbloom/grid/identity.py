@@ -14,7 +14,7 @@ from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.reductions import Reduction
 from vkbloom.grid.sources import digest
 
-__all__ = ["FORMAT", "differences", "identity"]
+__all__ = ["FORMAT", "chunk_in", "differences", "identity", "short"]
 
 #: Of the stores' own layout; another number cannot be read.
 FORMAT: Final = 1
@@ -56,6 +56,25 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
     return plain
 
 
+def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
+    """Return the points of a block by axis that an identity tells, None where it tells none.
+
+    Parameters
+    ----------
+    stored : mapping
+        From a store, which may hold anything there.
+    shape : tuple of int
+        Of the grid; a block that is larger is none.
+    """
+    held = stored.get("chunk")
+    if stored.get("format") != FORMAT or not isinstance(held, list) or len(held) != len(shape):
+        return None
+    for count, size in zip(held, shape, strict=True):
+        if type(count) is not int or not 1 <= count <= max(size, 1):
+            return None
+    return tuple(held)
+
+
 def _reduction(reduction: Any) -> str:
     if not isinstance(reduction, Reduction):
         kind = reduction if hasattr(reduction, "__qualname__") else type(reduction)
@@ -89,17 +108,21 @@ def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
         for key in dict.fromkeys((*stored, *asked)):
             inner = f"{name}.{key}" if name else key
             if key not in stored:
-                yield f"{inner}: not in the store, {_short(asked[key])} asked for"
+                yield f"{inner}: not in the store, {short(asked[key])} asked for"
             elif key not in asked:
-                yield f"{inner}: {_short(stored[key])} in the store, not asked for"
+                yield f"{inner}: {short(stored[key])} in the store, not asked for"
             else:
                 yield from _differences(inner, stored[key], asked[key])
     elif stored != asked:
-        yield f"{name}: {_short(stored)} in the store, {_short(asked)} asked for"
+        yield f"{name}: {short(stored)} in the store, {short(asked)} asked for"
 
 
-def _short(value: Any) -> str:
-    text = json.dumps(value)
+def short(value: Any) -> str:
+    """Return a value of a store for a message, whatever it is."""
+    try:
+        text = json.dumps(value)
+    except RecursionError:
+        text = "lists in lists"
     if len(text) <= _LONGEST:
         return text
     return f"{text[: _LONGEST - 20]} ... {text[-12:]}"

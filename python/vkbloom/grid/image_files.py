@@ -175,7 +175,7 @@ class GridFiles:
             raise ValueError(
                 f"{files.folder}: there is no grid in it, but something else"
             ) from None
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise ValueError(f"{index}: damaged, {error}") from error
         if not resume:
             raise FileExistsError(

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from vkbloom.extras import import_extra
 from vkbloom.grid.axes import Axis
-from vkbloom.grid.identity import FORMAT, differences, identity
+from vkbloom.grid.chunks import check_summed
+from vkbloom.grid.identity import FORMAT, differences, identity, short
 from vkbloom.grid.keys import Keys
 from vkbloom.grid.order import Block, Index, blocks, default_chunk
 from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of
@@ -37,10 +38,16 @@ __all__ = [
     "ROOT",
     "GridStore",
     "GridWriter",
+    "add_array",
+    "add_coordinate",
     "chunk_key",
     "describe",
+    "done_chunk",
+    "read_array",
     "read_json",
+    "read_marks",
     "reason",
+    "stored_identity",
 ]
 
 ROOT: Final = "zarr.json"
@@ -94,20 +101,20 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     dims = tuple(axis.name for axis in grid.axes)
     mark = {"grid": hashlib.sha256(json.dumps(own).encode()).hexdigest()}
     for axis in grid.axes:
-        _add_coordinate(group, axis.name, axis.coordinate, axis.attributes)
+        add_coordinate(group, axis.name, axis.coordinate, axis.attributes)
     for name, (values, attrs) in layout.coordinates.items():
-        _add_coordinate(group, name, values, attrs)
-    _add_array(
+        add_coordinate(group, name, values, attrs)
+    add_array(
         group,
         DONE,
         Variable((), (), np.dtype(np.bool_), {"description": "Whether the point is there", **mark}),
-        (dims, grid.shape, default_chunk(grid.shape, range(len(dims)), _DONE_POINTS)),
+        (dims, grid.shape, done_chunk(grid.shape)),
     )
     for name, variable in layout.variables.items():
         marked = Variable(
             variable.dims, variable.shape, variable.dtype, {**variable.attributes, **mark}
         )
-        _add_array(group, name, marked, (dims, grid.shape, chunk))
+        add_array(group, name, marked, (dims, grid.shape, chunk))
     with warnings.catch_warnings():
         # Format 3 does not define consolidated metadata yet, and xarray wants it all the same.
         warnings.filterwarnings("ignore", message="Consolidated metadata")
@@ -117,9 +124,15 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     return {key: keys.read(key) or b"" for key in names}
 
 
-def _add_coordinate(
+def done_chunk(shape: Index) -> Index:
+    """Return the points in a chunk of the marks by axis."""
+    return default_chunk(shape, range(len(shape)), _DONE_POINTS)
+
+
+def add_coordinate(
     group: Any, name: str, values: NDArray[Any], attributes: Mapping[str, str]
 ) -> None:
+    """Add an array of one chunk, the values along a dimension, to a Zarr group."""
     is_text = values.dtype.kind == "U"
     array = group.create_array(
         name,
@@ -134,9 +147,13 @@ def _add_coordinate(
     array[...] = values.astype(object) if is_text else values
 
 
-def _add_array(
+def add_array(
     group: Any, name: str, variable: Variable, lattice: tuple[tuple[str, ...], Index, Index]
 ) -> None:
+    """Add a variable without its chunks to a Zarr group.
+
+    `lattice` is the names of the axes, their lengths, and a block's.
+    """
     codecs = import_extra("zarr.codecs", "grid", _PURPOSE)
     dims, shape, chunk = lattice
     group.create_array(
@@ -179,17 +196,6 @@ class GridWriter:
         """Write a block's variables."""
         for name, values in arrays.items():
             self._array(name)[block.slices] = values
-
-    def read(self, block: Block, name: str) -> NDArray[Any]:
-        """Read a block of a variable.
-
-        Raises
-        ------
-        Exception
-            Its chunk is damaged; what is raised depends on where.
-        """
-        values: NDArray[Any] = self._array(name)[block.slices]
-        return values
 
     def keys_of(self, block: Block) -> list[str]:
         """Return the keys that hold a block."""
@@ -285,20 +291,22 @@ class GridStore:
         asked = identity(self.grid, self.layout, self.chunk)
         root = read_json(self.keys.read(ROOT))
         if root is not None:
-            stored = root.get("attributes", {}).get(IDENTITY)
+            stored = stored_identity(root)
             if stored is None:
                 raise ValueError(f"{self.keys.name}: there is no grid in it, but something else")
             if stored.get("format") != FORMAT:
                 raise ValueError(
-                    f"{self.keys.name}: its format is {stored.get('format')!r}, {FORMAT} is known"
+                    f"{self.keys.name}: its format is {short(stored.get('format'))}, "
+                    f"{FORMAT} is known"
                 )
             found = differences(stored, asked)
             if found:
                 raise ValueError(f"{self.keys.name}: another grid is there; {'; '.join(found)}")
-            return
-        # The arrays tell which grid they belong to.
+        # The arrays tell which grid they belong to. A process that was killed early left none.
         marks = {_mark(self.keys.read(key)) for key in held if key.endswith(f"/{ROOT}")} - {None}
-        if marks != {_mark(expected[f"{DONE}/{ROOT}"])}:
+        own = _mark(expected[f"{DONE}/{ROOT}"])
+        is_other = marks != {own} if root is None else bool(marks) and own not in marks
+        if is_other:
             what = "another grid is there" if marks else "there is no grid in it"
             raise ValueError(f"{self.keys.name}: {what}, and its {ROOT} is missing or damaged")
 
@@ -307,10 +315,7 @@ class GridStore:
         for key, content in expected.items():
             found = self.keys.read(key)
             # The same in other letters is no damage.
-            is_same = found == content or (
-                key.endswith(ROOT) and read_json(found) == read_json(content)
-            )
-            if not is_same:
+            if found != content and not (key.endswith(ROOT) and _is_same_json(found, content)):
                 self.keys.write(key, content)
                 mended.append(f"{key} was {'missing' if found is None else 'damaged'}")
         self.keys.flush(expected)
@@ -319,10 +324,9 @@ class GridStore:
     def _find_done(self, held: set[str], *, verify: bool) -> list[str]:
         """Find the points that are there; take the marks of damaged ones away."""
         mended: list[str] = []
-        zarr = import_extra("zarr", "grid", _PURPOSE)
         try:
-            marked = zarr.open_array(self.keys.store, path=DONE, mode="r")[...]
-        except Exception as error:
+            marked = read_marks(self.keys, self.grid.shape)
+        except (ValueError, OSError) as error:
             mended.append(f"the marks in {DONE} were damaged ({reason(error)})")
             marked = np.zeros(self.grid.shape, np.bool_)
         for block in self.blocks():
@@ -343,9 +347,10 @@ class GridStore:
             if key not in held:
                 return f"{key} was missing"
             if verify:
+                size = math.prod(self.chunk) * self.layout.variables[name].size
                 try:
-                    self._chunks.read(block, name)
-                except Exception as error:
+                    check_summed(self.keys.read(key) or b"", size)
+                except (ValueError, OSError) as error:
                     return f"{key} was damaged ({reason(error)})"
         return None
 
@@ -370,6 +375,41 @@ class GridStore:
         self.keys.flush(written)
 
 
+def read_marks(keys: Keys, shape: Index) -> NDArray[np.bool_]:
+    """Read which points of a grid are marked as done.
+
+    Raises
+    ------
+    ValueError, OSError
+        The marks are damaged.
+    """
+    chunk = done_chunk(shape)
+    for part in blocks(shape, chunk, range(len(shape))):
+        content = keys.read(chunk_key(DONE, part, chunk, 0))
+        if content is not None:
+            check_summed(content, math.prod(chunk))
+    return read_array(keys, DONE)
+
+
+def read_array(keys: Keys, name: str) -> NDArray[Any]:
+    """Read an array whose chunks are known to be whole.
+
+    Raises
+    ------
+    ValueError, OSError
+        Its metadata are damaged.
+    """
+    zarr = import_extra("zarr", "grid", _PURPOSE)
+    try:
+        values: NDArray[Any] = zarr.open_array(keys.store, path=name, mode="r")[...]
+    except (MemoryError, OSError):
+        raise
+    except Exception as error:
+        # Zarr promises no class for what it cannot use.
+        raise ValueError(reason(error)) from error
+    return values
+
+
 def describe(axes: Iterable[Axis], block: Block) -> str:
     """Return the points of a block in words: the values along each axis, or the first and last."""
     parts = []
@@ -388,11 +428,32 @@ def read_json(content: bytes | None) -> dict[str, Any] | None:
     """Return the object that a key holds, None where it is missing or damaged."""
     try:
         found = None if content is None else json.loads(content)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
 
 
-def _mark(content: bytes | None) -> Any:
-    metadata = read_json(content)
-    return metadata.get("attributes", {}).get("grid") if metadata else None
+def _is_same_json(found: bytes | None, expected: bytes) -> bool:
+    # As text: 3.0 and true are equal to numbers that they cannot stand for.
+    try:
+        texts = [json.dumps(read_json(content), sort_keys=True) for content in (found, expected)]
+    except RecursionError:
+        return False
+    return texts[0] == texts[1]
+
+
+def stored_identity(root: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return what the group's metadata say of the grid, None where that is nothing."""
+    found = _attributes(root).get(IDENTITY)
+    return found if isinstance(found, dict) else None
+
+
+def _attributes(metadata: Mapping[str, Any]) -> Mapping[str, Any]:
+    found = metadata.get("attributes")
+    return found if isinstance(found, dict) else {}
+
+
+def _mark(content: bytes | None) -> str | None:
+    """Return the grid that an array's metadata name."""
+    found = _attributes(read_json(content) or {}).get("grid")
+    return found if isinstance(found, str) else None

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from vkbloom.extras import import_extra
 from vkbloom.frames import Frames
-from vkbloom.grid.identity import FORMAT
+from vkbloom.grid.identity import chunk_in
 from vkbloom.grid.keys import Keys, open_keys
 from vkbloom.grid.memory import chunk_of
 from vkbloom.grid.order import Index
 from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
-from vkbloom.grid.store import IDENTITY, ROOT, GridStore, read_json
+from vkbloom.grid.store import IDENTITY, ROOT, GridStore, read_json, stored_identity
 from vkbloom.renderer import Shading
 from vkbloom.settings import Settings
 
@@ -132,12 +132,9 @@ def grid_to_zarr(
 def _chunk(grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys) -> Index:
     """Return the points of a block by axis: as asked for, as in the store, or by default."""
     if chunks is None:
-        root = read_json(keys.read(ROOT)) or {}
-        stored = root.get("attributes", {}).get(IDENTITY) or {}
-        held = tuple(stored.get("chunk", ()))
-        if stored.get("format") == FORMAT and len(held) == len(grid.axes):
-            return held
-        return chunk_of(grid, layout)
+        stored = stored_identity(read_json(keys.read(ROOT)) or {})
+        held = None if stored is None else chunk_in(stored, grid.shape)
+        return chunk_of(grid, layout) if held is None else held
     if not isinstance(chunks, Mapping):
         raise TypeError(f"chunks: numbers of points by axis are needed, not {chunks!r}")
     names = [axis.name for axis in grid.axes]
