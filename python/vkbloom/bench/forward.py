@@ -31,10 +31,16 @@ def run(plan: Plan) -> Section:
     )
     scene = vkbloom.Scene.ufo()
     with ExitStack() as stack:
-        renderers = {form: stack.enter_context(plan.renderer(form)) for form in NAMES}
+        # Each has a renderer of its own: one that has drawn the scene with bloom would not draw it
+        # again without.
+        renderers = {
+            (form, bloom): stack.enter_context(plan.renderer(form))
+            for form in NAMES
+            for bloom in (True, False)
+        }
 
         def frame(form: str, turn: int, *, bloom: bool) -> vkbloom.Frames:
-            return renderers[form].render(
+            return renderers[form, bloom].render(
                 scene,
                 vkbloom.Separable(bloom=bloom),
                 size,
