@@ -7,7 +7,6 @@ framebuffer as a NumPy array.
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from vkbloom import reference
@@ -35,7 +34,8 @@ if TYPE_CHECKING:
     from vkbloom.grid.sheet import contact_sheet
     from vkbloom.grid.zarr_grid import grid_to_zarr
 
-__version__ = version("vkbloom")
+#: Of the installed package; looked up when it is asked for.
+__version__: str
 
 # Imported when they are asked for: who renders one frame shall not wait for grids.
 _LATE = {
@@ -84,6 +84,12 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        # A sixth of the time of the import is spared whoever does not ask.
+        from importlib.metadata import version  # noqa: PLC0415
+
+        globals()[name] = version("vkbloom")
+        return globals()[name]
     if name == "reductions":
         return import_module("vkbloom.grid.reductions")
     if name in _LATE:
