@@ -74,7 +74,8 @@ static bool add_output(const struct vkb_renderer *renderer, struct vkb_point *po
         .image = image,
         .channels = channels,
         .memory = view->buf,
-        .pages = vkb_array_pages(renderer, view->buf),
+        // (Whoever keeps many arrays shall not pay for each small one.)
+        .pages = view->len >= VKB_IMPORTED_BYTES ? vkb_array_pages(renderer, view->buf) : NULL,
     };
     if ((size_t)view->len == (size_t)row->width * row->height * channels * format->channel_size)
         return true;

@@ -68,21 +68,28 @@ static enum vkb_error_kind result_kind(VkResult result)
     }
 }
 
-// "device->vk.vkCreateImage(device->handle, ...)" is shown as "vkCreateImage".
+const char *vkb_call_name(const char *call_text, size_t *length)
+{
+    const char *end = call_text + strcspn(call_text, "("), *start = end;
+
+    while (start > call_text && start[-1] != '.' && start[-1] != '>')
+        --start;
+    *length = (size_t)(end - start);
+    return start;
+}
+
 bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text)
 {
     if (result == VK_SUCCESS)
         return true;
 
-    int length = (int)strcspn(call_text, "(");
-    const char *start = call_text + length;
-    while (start > call_text && start[-1] != '.' && start[-1] != '>')
-        --start;
-    length -= (int)(start - call_text);
+    size_t length;
+    const char *name = vkb_call_name(call_text, &length);
 
-    vkb_fail(error, result_kind(result), "%.*s failed with %s", length, start, result_name(result));
+    vkb_fail(error, result_kind(result), "%.*s failed with %s", (int)length, name,
+             result_name(result));
     error->result = result;
-    snprintf(error->call, sizeof error->call, "%.*s", length, start);
+    snprintf(error->call, sizeof error->call, "%.*s", (int)length, name);
     return false;
 }
 

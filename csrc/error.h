@@ -31,6 +31,10 @@ __attribute__((format(printf, 3, 4)))
 #endif
 bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...);
 
+// The function's name in a call's text: "vkCreateImage" of "device->vk.vkCreateImage(...)"; *length
+// is how long it is.
+const char *vkb_call_name(const char *call_text, size_t *length);
+
 // True where `result` is VK_SUCCESS; else fills `error` from the result and the call's source text.
 bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text);
 

@@ -14,13 +14,12 @@ static char among[256], failed[256];
 bool vkb_fault(const char *call_text)
 {
     char name[64] = "";
-    const char *end = call_text + strcspn(call_text, "("), *start = end;
+    size_t length;
+    const char *start = vkb_call_name(call_text, &length);
 
-    while (start > call_text && start[-1] != '.' && start[-1] != '>')
-        --start;
-    if (start == end || (size_t)(end - start) >= sizeof name)
+    if (length == 0 || length >= sizeof name)
         return false;
-    memcpy(name, start, (size_t)(end - start));
+    memcpy(name, start, length);
     if (*among && !strstr(among, name))
         return false;
     atomic_fetch_add(&passed, 1);

@@ -112,14 +112,6 @@ bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
     return vkb_graph_add_pass(graph, &row, error);
 }
 
-static bool add_loaded(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
-                       bool *fits, struct vkb_error *error)
-{
-    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
-         && (blends(&choice->plain, pass) || brightens(pass));
-    return !*fits || vkb_add_fullscreen(choice->forms, choice->graph, pass, error);
-}
-
 static bool add_pixels(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
                        bool *fits, struct vkb_error *error)
 {
@@ -148,7 +140,7 @@ static const struct form forms_table[] = {
     {VKB_FORMS_CPU, vkb_add_halved, 0},
     {VKB_FORMS_CPU, vkb_add_doubled, 0},
     {VKB_FORMS_CPU, vkb_add_doubled_final, 0},
-    {VKB_FORMS_CPU, add_loaded, 0},
+    {VKB_FORMS_CPU, add_pixels, 0},
     {VKB_FORMS_GPU, vkb_add_whole_taps, 0},
     {VKB_FORMS_GPU, vkb_add_enlarged, 0},
     {VKB_FORMS_GPU, vkb_add_from_lines, 0},

@@ -27,22 +27,21 @@ static void advise(const struct vkb_page_run *run)
 static struct vkb_page_run *create_run(const struct vkb_device *device, size_t size,
                                        struct vkb_error *error)
 {
-    size_t align = size >= LARGE_BYTES ? LARGE_PAGE : SMALL_PAGE;
-    if (device && device->import_alignment > align)
-        align = (size_t)device->import_alignment;
-    const size_t end = device && device->import_alignment > SMALL_PAGE
-                         ? (size_t)device->import_alignment
-                         : SMALL_PAGE;
+    const size_t page = device && device->import_alignment > SMALL_PAGE
+                          ? (size_t)device->import_alignment
+                          : SMALL_PAGE;
+    const size_t align = size >= LARGE_BYTES && LARGE_PAGE > page ? LARGE_PAGE : page;
     struct vkb_page_run *run = vkb_alloc(error, 1, sizeof *run);
 
     if (!run)
         return NULL;
-    if (size > SIZE_MAX - align - end || !(run->start = vkb_alloc(error, 1, size + align + end))) {
+    if (size > SIZE_MAX - align - page
+        || !(run->start = vkb_alloc(error, 1, size + align + page))) {
         vkb_free(run);
         return NULL;
     }
     run->memory = (void *)(((uintptr_t)run->start + align - 1) / align * align);
-    run->size = (size + end - 1) / end * end;
+    run->size = (size + page - 1) / page * page;
     advise(run);
     return run;
 }

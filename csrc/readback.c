@@ -4,12 +4,6 @@
 
 #define READBACK_USAGE VK_BUFFER_USAGE_TRANSFER_DST_BIT
 
-// From so many bytes on the device writes to the caller's memory itself. On lavapipe 22.3.6 (two
-// Zen 3 cores) both ways take the same time up to 256 KiB, and without the host's copy a frame of
-// 1 MiB takes 80 us instead of 102, one of 16 MiB 1.8 ms instead of 2.7. A GPU pays more for each
-// import than a CPU does.
-enum { IMPORTED_BYTES = 1 << 20 };
-
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback)
 {
     vkb_readback_release(device, readback);
@@ -59,7 +53,7 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     output->pixels = (size_t)width * height;
     output->imported = VK_NULL_HANDLE;
     const size_t size = output->pixels * vkb_pixel_size(format);
-    if (size >= IMPORTED_BYTES) {
+    if (size >= VKB_IMPORTED_BYTES) {
         if (!vkb_grow(error, (void **)&readback->imports, &readback->import_capacity,
                       readback->import_count + 1, sizeof *readback->imports))
             return false;

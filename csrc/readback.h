@@ -5,13 +5,20 @@
 
 #include "pages.h"
 
+// From so many bytes on the device writes to the caller's memory itself. On lavapipe 22.3.6 (two
+// Zen 3 cores) both ways take the same time up to 256 KiB, and without the host's copy a frame of
+// 1 MiB takes 80 us instead of 102, one of 16 MiB 1.8 ms instead of 2.7. A GPU pays more for each
+// import than a CPU does.
+enum { VKB_IMPORTED_BYTES = 1 << 20 };
+
 // One image wanted on the host: tightly packed rows, top row first, the first `channels` channels
 // of each pixel.
 struct vkb_output {
     uint32_t image;  // in the graph
     uint32_t channels;
     void *memory;
-    struct vkb_page_run *pages;  // that the memory is in; NULL: it is none of the renderer's
+    struct vkb_page_run
+        *pages;  // that the memory is in; NULL: none of the renderer's, or too little
     // What vkb_readback_plan decides.
     enum vkb_format format;
     size_t pixels;

@@ -38,25 +38,32 @@ vec4 fetch_clamped(sampler2D source, ivec2 texel)
     return TEXEL(texelFetch(source, clamp(texel, ivec2(0), textureSize(source, 0) - 1), 0));
 }
 
+// A texel and its neighbours to the right, below, and both.
+vec4[4] fetch_four(sampler2D source, ivec2 texel)
+{
+    return vec4[4](fetch_clamped(source, texel), fetch_clamped(source, texel + ivec2(1, 0)),
+                   fetch_clamped(source, texel + ivec2(0, 1)),
+                   fetch_clamped(source, texel + ivec2(1, 1)));
+}
+
 // Bilinear in full float precision: hardware filters have 8 bits of position, or fewer.
+vec4 bilinear(vec4 four[4], vec2 part)
+{
+    return mix(mix(four[0], four[1], part.x), mix(four[2], four[3], part.x), part.y);
+}
+
 vec4 fetch_bilinear(sampler2D source, ivec2 texel, vec2 part)
 {
-    vec4 top = mix(fetch_clamped(source, texel), fetch_clamped(source, texel + ivec2(1, 0)),
-                   part.x);
-    vec4 bottom = mix(fetch_clamped(source, texel + ivec2(0, 1)),
-                      fetch_clamped(source, texel + ivec2(1, 1)), part.x);
-    return mix(top, bottom, part.y);
+    return bilinear(fetch_four(source, texel), part);
 }
 
 // The same, never beyond its texels: rounding takes some pixels of a flat area off its value.
 vec4 fetch_within(sampler2D source, Place place)
 {
-    vec4 a = fetch_clamped(source, place.texel);
-    vec4 b = fetch_clamped(source, place.texel + ivec2(1, 0));
-    vec4 c = fetch_clamped(source, place.texel + ivec2(0, 1));
-    vec4 d = fetch_clamped(source, place.texel + ivec2(1, 1));
-    vec4 value = mix(mix(a, b, place.part.x), mix(c, d, place.part.x), place.part.y);
-    return clamp(value, min(min(a, b), min(c, d)), max(max(a, b), max(c, d)));
+    vec4 four[4] = fetch_four(source, place.texel);
+    vec4 low = min(min(four[0], four[1]), min(four[2], four[3]));
+    vec4 high = max(max(four[0], four[1]), max(four[2], four[3]));
+    return clamp(bilinear(four, place.part), low, high);
 }
 
 // The source at an offset, in texels, from a place.

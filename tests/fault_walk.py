@@ -15,7 +15,7 @@ import tempfile
 import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ SIZE = (24, 16)
 
 Arrays = Mapping[str, NDArray[Any]]
 Work = Callable[[Renderer], Arrays]
+Result = TypeVar("Result")
 core: Any = _core  # arm_fault and fault_state are in test builds only
 
 
@@ -200,12 +201,15 @@ class Walk:
         if error is not None:
             check_error(error, failed, result)
 
-    def renderer_at(self, n: int, result: int) -> bool:
-        """Opening a renderer with a fault at its n-th point; False: there are fewer."""
+    def _at(
+        self, n: int, result: int, names: str, call: Callable[[], Result]
+    ) -> tuple[Result | None, BaseException | None, bool]:
+        """Call with a fault at the n-th point: what is returned, raised, and whether it was met."""
+        value: Result | None = None
         error: BaseException | None = None
-        core.arm_fault(n, result, "")
+        core.arm_fault(n, result, names)
         try:
-            renderer = open_renderer()
+            value = call()
         except Exception as raised:
             # Without its frames, which hold the batch and this variable.
             error = raised.with_traceback(None)
@@ -213,52 +217,38 @@ class Walk:
         core.arm_fault(0, 0, "")
         if failed:
             self._fail(error, failed, result)
-        elif error:
+        self.points = max(self.points, passed)
+        return value, error, bool(failed)
+
+    def renderer_at(self, n: int, result: int) -> bool:
+        """Opening a renderer with a fault at its n-th point; False: there are fewer."""
+        renderer, error, failed = self._at(n, result, "", open_renderer)
+        if error is not None and not failed:
             raise error
-        if error is None:
+        if renderer is not None:
             renderer.close()
         with open_renderer() as again:
             assert not again.closed
-        self.points = max(self.points, passed)
-        return bool(failed)
+        return failed
 
     def close_at(self, n: int, result: int, names: str) -> bool:
         """Closing a renderer while the device is at work for it."""
-        error: BaseException | None = None
         renderer = open_renderer()
         frames = renderer.apply_many(picture((64, 64)), [vkbloom.Separable()] * 9)
         next(frames)
         next(frames)
-        core.arm_fault(n, result, names)
-        try:
-            renderer.close()
-        except Exception as raised:
-            error = raised.with_traceback(None)
-        passed, failed, *_ = core.fault_state()
-        core.arm_fault(0, 0, "")
-        if failed:
-            self._fail(error, failed, result)
+        _, _, failed = self._at(n, result, names, renderer.close)
         assert renderer.closed
-        self.points = max(self.points, passed)
-        return bool(failed)
+        return failed
 
     def work_at(self, n: int, right: Arrays, result: int, names: str) -> bool:
         """A workload in a new renderer; afterwards the same without a fault, if that can be."""
         assert self.work is not None
-        error: BaseException | None = None
-        renderer = open_renderer()
-        core.arm_fault(n, result, names)
-        try:
-            arrays = self.work(renderer)
-        except Exception as raised:
-            error = raised.with_traceback(None)
-        passed, failed, *_ = core.fault_state()
-        core.arm_fault(0, 0, "")
-        if failed:
-            self._fail(error, failed, result)
-        elif error:
+        work, renderer = self.work, open_renderer()
+        arrays, error, failed = self._at(n, result, names, lambda: work(renderer))
+        if error is not None and not failed:
             raise error
-        if error is None:
+        if arrays is not None:
             same(arrays, right)
         # A grid in a store has a renderer of its own, which is closed by now.
         if isinstance(error, vkbloom.DeviceLostError) and self.work is not grid_to_zarr:
@@ -272,8 +262,7 @@ class Walk:
         else:
             same(self.work(renderer), right)
         renderer.close()
-        self.points = max(self.points, passed)
-        return bool(failed)
+        return failed
 
 
 def walk(point: Callable[[int], bool], first: int, stride: int, before: dict[str, int]) -> None:
