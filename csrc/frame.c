@@ -1,24 +1,9 @@
 #include "frame.h"
 
 #include "plan.h"
+#include "record.h"
 
 #include <string.h>
-
-// The state of one submission, and of the point that is being recorded.
-struct run {
-    struct vkb_device *device;
-    struct vkb_frame *frame;
-    struct vkb_flight *flight;
-    struct vkb_point *point;
-    const struct vkb_graph *graph;  // the point's
-    struct vkb_slot **slots;        // by the graph's image index
-    bool *wanted;                   // by image
-    bool *needed, *current;         // by pass
-    struct vkb_slot *input;         // NULL: none
-    bool send_input;                // the device does not have it yet
-    unsigned char *recipe;
-    size_t recipe_size, recipe_capacity;
-};
 
 bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, size_t cache_size,
                       struct vkb_frame *frame, struct vkb_error *error)
@@ -38,7 +23,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     *frame = (struct vkb_frame){0};
 }
 
-static bool append(struct run *run, const void *bytes, size_t size, struct vkb_error *error)
+static bool append(struct vkb_run *run, const void *bytes, size_t size, struct vkb_error *error)
 {
     if (!vkb_grow(error, (void **)&run->recipe, &run->recipe_capacity, run->recipe_size + size, 1))
         return false;
@@ -49,7 +34,7 @@ static bool append(struct run *run, const void *bytes, size_t size, struct vkb_e
 
 // What passes first..end-1 make their targets from: their rows, with the versions of what they read
 // in place of the graph's indices.
-static bool write_recipe(struct run *run, uint32_t first, uint32_t end, struct vkb_error *error)
+static bool write_recipe(struct vkb_run *run, uint32_t first, uint32_t end, struct vkb_error *error)
 {
     run->recipe_size = 0;
     for (uint32_t i = first; i < end; ++i) {
@@ -71,7 +56,7 @@ static bool write_recipe(struct run *run, uint32_t first, uint32_t end, struct v
 }
 
 // Whether the image is there and holds what a pass before `end` would make.
-static bool is_current(const struct run *run, uint32_t image, uint32_t end)
+static bool is_current(const struct vkb_run *run, uint32_t image, uint32_t end)
 {
     bool current = run->graph->images[image].input;
 
@@ -81,7 +66,7 @@ static bool is_current(const struct run *run, uint32_t image, uint32_t end)
 }
 
 // The slots of a pass's targets, the depth last; returns how many.
-static uint32_t target_slots(const struct run *run, const struct vkb_pass_row *pass,
+static uint32_t target_slots(const struct vkb_run *run, const struct vkb_pass_row *pass,
                              struct vkb_slot **slots)
 {
     uint32_t count = 0;
@@ -93,331 +78,9 @@ static uint32_t target_slots(const struct run *run, const struct vkb_pass_row *p
     return count;
 }
 
-// Copies the pass's parameters to the uniform buffer; returns where they lie in it.
-static VkDeviceSize write_params(struct run *run, const struct vkb_pass_row *pass)
-{
-    const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
-    const VkDeviceSize offset = run->flight->uniform_used;
-    const size_t size = vkb_block_sizes[pass->block];
-
-    memcpy((char *)run->flight->uniforms.mapped + offset, &pass->params, size);
-    run->flight->uniform_used = (offset + size + align - 1) / align * align;
-    return offset;
-}
-
-// What the pass reads at binding index + 1; `surface` is whose textures those are, if any.
-static VkDescriptorImageInfo read_image(const struct run *run, const struct vkb_pass_row *pass,
-                                        const struct vkb_surface *surface, uint32_t index)
-{
-    const struct vkb_scene *scene = &run->frame->scene;
-    const struct vkb_image *image;
-    VkSampler sampler = run->frame->pipelines.sampler;
-
-    if (surface) {
-        const struct vkb_texture *texture =
-            &scene->textures[index == 0 ? surface->base : surface->emission];
-        image = &texture->image;
-        sampler = texture->sampler;
-    } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
-        image = &scene->sky;
-    } else {
-        image = &run->slots[pass->reads[index]]->image;
-    }
-    return (VkDescriptorImageInfo){
-        .sampler = sampler,
-        .imageView = image->view,
-        .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
-    };
-}
-
-// A descriptor set with the pass's parameters, which lie at that offset, and what it reads.
-static bool bind_descriptors(struct run *run, const struct vkb_pass_row *pass,
-                             VkDeviceSize params_offset, const struct vkb_surface *surface,
-                             struct vkb_error *error)
-{
-    const struct VolkDeviceTable *vk = &run->device->vk;
-    const struct vkb_pipelines *pipelines = &run->frame->pipelines;
-    const VkDescriptorSetLayout layout = vkb_pipelines_set_layout(pipelines, pass);
-    const uint32_t image_count = vkb_pass_descriptor_images(pass);
-    VkDescriptorImageInfo images[VKB_MAX_READS + 1];
-    VkWriteDescriptorSet writes[VKB_MAX_READS + 2];
-    uint32_t write_count = 0;
-    VkDescriptorSet set;
-
-    if (!VK(error, vk->vkAllocateDescriptorSets(
-                       run->device->handle,
-                       &(VkDescriptorSetAllocateInfo){
-                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                           .descriptorPool = run->flight->descriptors,
-                           .descriptorSetCount = 1,
-                           .pSetLayouts = &layout,
-                       },
-                       &set)))
-        return false;
-    VkDescriptorBufferInfo params = {
-        .buffer = run->flight->uniforms.handle,
-        .offset = params_offset,
-        .range = vkb_block_sizes[pass->block],
-    };
-    if (pass->block != VKB_BLOCK_NONE)
-        writes[write_count++] = (VkWriteDescriptorSet){
-            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = set,
-            .dstBinding = 0,
-            .descriptorCount = 1,
-            .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
-            .pBufferInfo = &params,
-        };
-    for (uint32_t i = 0; i < image_count; ++i) {
-        images[i] = read_image(run, pass, surface, i);
-        writes[write_count++] = (VkWriteDescriptorSet){
-            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = set,
-            .dstBinding = i + 1,
-            .descriptorCount = 1,
-            .descriptorType = pass->loads ? VK_DESCRIPTOR_TYPE_STORAGE_IMAGE
-                                          : VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-            .pImageInfo = &images[i],
-        };
-    }
-    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
-        const struct vkb_image *target = &run->slots[pass->targets[0]]->image;
-        images[image_count] = (VkDescriptorImageInfo){
-            .imageView = target->view,
-            .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
-        };
-        writes[write_count++] = (VkWriteDescriptorSet){
-            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = set,
-            .dstBinding = image_count + 1,
-            .descriptorCount = 1,
-            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-            .pImageInfo = &images[image_count],
-        };
-    }
-    vk->vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
-    vk->vkCmdBindDescriptorSets(run->flight->commands.buffer, vkb_pass_bind_point(pass),
-                                vkb_pipelines_layout(pipelines, pass), 0, 1, &set, 0, NULL);
-    return true;
-}
-
-static void bind_mesh(const struct run *run, const struct vkb_mesh *mesh, bool textured)
-{
-    const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->flight->commands.buffer;
-
-    vk->vkCmdBindVertexBuffers(commands, 0, 1, &mesh->vertices.handle, &(VkDeviceSize){0});
-    if (textured)
-        vk->vkCmdBindVertexBuffers(commands, 1, 1, &mesh->texcoords.handle, &(VkDeviceSize){0});
-    vk->vkCmdBindIndexBuffer(commands, mesh->indices.handle, 0, VK_INDEX_TYPE_UINT32);
-}
-
-// A draw for each surface, with its textures.
-static bool draw_surfaces(struct run *run, const struct vkb_pass_row *pass,
-                          const struct vkb_mesh *mesh, VkDeviceSize params, struct vkb_error *error)
-{
-    uint32_t first = mesh->plain_count;
-
-    bind_mesh(run, mesh, true);
-    for (uint32_t i = 0; i < mesh->surface_count; ++i) {
-        const struct vkb_surface *surface = &mesh->surfaces[i];
-        if (!bind_descriptors(run, pass, params, surface, error))
-            return false;
-        run->device->vk.vkCmdDrawIndexed(run->flight->commands.buffer, surface->index_count, 1,
-                                         first, 0, 0);
-        first += surface->index_count;
-    }
-    return true;
-}
-
-static void dispatch(const struct run *run, const struct vkb_pass_row *pass)
-{
-    const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
-
-    run->device->vk.vkCmdDispatch(
-        run->flight->commands.buffer, (target->width + pass->block_width - 1) / pass->block_width,
-        (target->height + pass->block_height - 1) / pass->block_height, 1);
-}
-
-static bool draw(struct run *run, const struct vkb_pass_row *pass, VkDeviceSize params,
-                 struct vkb_error *error)
-{
-    const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->flight->commands.buffer;
-    const struct vkb_scene *scene = &run->frame->scene;
-    const struct vkb_mesh *mesh = pass->geometry == VKB_GEOMETRY_GLOW ? &scene->glow : &scene->body;
-
-    if (pass->textured)
-        return draw_surfaces(run, pass, mesh, params, error);
-    if (!bind_descriptors(run, pass, params, NULL, error))
-        return false;
-    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
-        dispatch(run, pass);
-    } else if (!vkb_is_mesh(pass->geometry)) {
-        vk->vkCmdDraw(commands, pass->geometry == VKB_GEOMETRY_SKYBOX ? 36 : 3, 1, 0, 0);
-    } else if (mesh->plain_count > 0) {
-        bind_mesh(run, mesh, false);
-        vk->vkCmdDrawIndexed(commands, mesh->plain_count, 1, 0, 0, 0);
-    }
-    return true;
-}
-
-static bool record_pass(struct run *run, uint32_t index, VkRenderPass render_pass,
-                        struct vkb_error *error)
-{
-    const struct vkb_pass_row *pass = &run->graph->passes[index];
-    VkPipeline pipeline;
-
-    if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
-                           error))
-        return false;
-    run->device->vk.vkCmdBindPipeline(run->flight->commands.buffer, vkb_pass_bind_point(pass),
-                                      pipeline);
-    return draw(run, pass, write_params(run, pass), error);
-}
-
-static void transition_reads(struct run *run, uint32_t first, uint32_t end)
-{
-    for (uint32_t i = first; i < end; ++i) {
-        const struct vkb_pass_row *pass = &run->graph->passes[i];
-        for (uint32_t read = 0; read < pass->read_count; ++read)
-            vkb_image_transition(run->device, run->flight->commands.buffer,
-                                 &run->slots[pass->reads[read]]->image, vkb_pass_reads_as(pass));
-    }
-}
-
-// What the passes read, and the targets in the state that the render pass's dependencies go on
-// from.
-static void transition_images(struct run *run, uint32_t first, uint32_t end)
-{
-    VkCommandBuffer commands = run->flight->commands.buffer;
-    const struct vkb_pass_row *pass = &run->graph->passes[first];
-    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
-    const uint32_t use_count = vkb_graph_target_uses(run->graph, first, end, uses);
-    const uint32_t depth_uses = use_count - pass->target_count;
-
-    transition_reads(run, first, end);
-    for (uint32_t i = 0; i < use_count; ++i) {
-        uint32_t target = i < depth_uses ? pass->depth : pass->targets[i - depth_uses];
-        struct vkb_image *image = &run->slots[target]->image;
-        // A new image has nothing to wait for; any other must be where its graph lets it rest.
-        if (image->access != VKB_ACCESS_NONE && image->access != uses[i].before)
-            vkb_image_transition(run->device, commands, image, uses[i].before);
-        image->access = uses[i].after == VKB_ACCESS_NONE ? uses[i].during : uses[i].after;
-    }
-}
-
-static void begin_render_pass(const struct run *run, VkRenderPass render_pass,
-                              VkFramebuffer framebuffer, const struct vkb_pass_row *pass,
-                              VkExtent2D extent)
-{
-    const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->flight->commands.buffer;
-    VkClearValue clears[VKB_MAX_TARGETS + 1];
-
-    for (uint32_t i = 0; i < pass->target_count; ++i)
-        clears[i] = (VkClearValue){.color = {.float32 = {0.0f, 0.0f, 0.0f, 1.0f}}};
-    clears[pass->target_count] = (VkClearValue){.depthStencil = {.depth = 1.0f}};
-    vk->vkCmdBeginRenderPass(commands,
-                             &(VkRenderPassBeginInfo){
-                                 .sType = VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO,
-                                 .renderPass = render_pass,
-                                 .framebuffer = framebuffer,
-                                 .renderArea = {.extent = extent},
-                                 .clearValueCount = pass->target_count + 1,
-                                 .pClearValues = clears,
-                             },
-                             VK_SUBPASS_CONTENTS_INLINE);
-    vk->vkCmdSetViewport(commands, 0, 1,
-                         &(VkViewport){
-                             .width = (float)extent.width,
-                             .height = (float)extent.height,
-                             .maxDepth = 1.0f,
-                         });
-    vk->vkCmdSetScissor(commands, 0, 1, &(VkRect2D){.extent = extent});
-}
-
-// The render pass just recorded goes by the name of the image that it writes, a dispatch by its
-// own.
-static void add_timing(struct run *run, uint32_t first)
-{
-    const struct vkb_pass_row *pass = &run->graph->passes[first];
-    struct vkb_timing *timing = &run->point->timings[run->point->timing_count++];
-
-    memcpy(timing->name,
-           pass->geometry == VKB_GEOMETRY_DISPATCH ? pass->name
-                                                   : run->graph->images[pass->targets[0]].name,
-           sizeof timing->name);
-}
-
-static bool record_dispatch(struct run *run, uint32_t index, struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_flight *flight = run->flight;
-    VkCommandBuffer commands = flight->commands.buffer;
-
-    // Started before the barriers: on lavapipe a timestamp is taken at the next barrier.
-    vkb_timer_start(device, commands, &flight->timer);
-    transition_reads(run, index, index + 1);
-    vkb_image_transition(device, commands, &run->slots[run->graph->passes[index].targets[0]]->image,
-                         VKB_ACCESS_DISPATCH_STORED);
-    if (!record_pass(run, index, VK_NULL_HANDLE, error))
-        return false;
-    vkb_timer_stop(device, commands, &flight->timer);
-    return true;
-}
-
-// Passes first..end-1 in one render pass, timed as one: within a render pass tiling devices and
-// lavapipe do not keep the order that single draws could be timed by.
-static bool record_render_pass(struct run *run, uint32_t first, uint32_t end,
-                               struct vkb_slot **targets, uint32_t target_count,
-                               struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_frame *frame = run->frame;
-    struct vkb_flight *flight = run->flight;
-    VkCommandBuffer commands = flight->commands.buffer;
-    VkRenderPass render_pass;
-    VkFramebuffer framebuffer;
-
-    if (!vkb_pipelines_render_pass(device, &frame->pipelines, run->graph, first, end, &render_pass,
-                                   error)
-        || !vkb_slots_framebuffer(device, &frame->slots, targets, target_count, render_pass,
-                                  &framebuffer, error))
-        return false;
-    transition_images(run, first, end);
-    vkb_timer_start(device, commands, &flight->timer);
-    begin_render_pass(run, render_pass, framebuffer, &run->graph->passes[first],
-                      (VkExtent2D){targets[0]->image.width, targets[0]->image.height});
-    for (uint32_t i = first; i < end; ++i)
-        if (!record_pass(run, i, render_pass, error))
-            return false;
-    device->vk.vkCmdEndRenderPass(commands);
-    vkb_timer_stop(device, commands, &flight->timer);
-    return true;
-}
-
-static bool record_group(struct run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
-                         uint32_t target_count, struct vkb_error *error)
-{
-    const bool is_dispatch = run->graph->passes[first].geometry == VKB_GEOMETRY_DISPATCH;
-
-    for (uint32_t i = 0; i < target_count; ++i)
-        if (!vkb_slot_begin_writing(&run->frame->slots, targets[i], run->recipe, run->recipe_size,
-                                    error))
-            return false;
-    if (is_dispatch ? !record_dispatch(run, first, error)
-                    : !record_render_pass(run, first, end, targets, target_count, error))
-        return false;
-    add_timing(run, first);
-    for (uint32_t i = 0; i < target_count; ++i)
-        targets[i]->valid = true;
-    return true;
-}
-
 // Finds out which passes have nothing to do, from the first to the last: their targets hold what
 // the recipe says, and all that they read is so too.
-static bool mark_current(struct run *run, struct vkb_error *error)
+static bool mark_current(struct vkb_run *run, struct vkb_error *error)
 {
     const struct vkb_graph *graph = run->graph;
 
@@ -445,7 +108,7 @@ static bool mark_current(struct run *run, struct vkb_error *error)
     return true;
 }
 
-static bool record_passes(struct run *run, struct vkb_error *error)
+static bool record_passes(struct vkb_run *run, struct vkb_error *error)
 {
     const struct vkb_graph *graph = run->graph;
 
@@ -463,13 +126,13 @@ static bool record_passes(struct run *run, struct vkb_error *error)
         target_count = target_slots(run, &graph->passes[first], targets);
         for (uint32_t i = 0; i < target_count; ++i)
             current = current && vkb_slot_up_to_date(targets[i], run->recipe, run->recipe_size);
-        if (!current && !record_group(run, first, end, targets, target_count, error))
+        if (!current && !vkb_record_group(run, first, end, targets, target_count, error))
             return false;
     }
     return true;
 }
 
-static bool reserve_descriptors(struct run *run, uint32_t sets, struct vkb_error *error)
+static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
     struct vkb_flight *flight = run->flight;
@@ -500,7 +163,7 @@ static bool reserve_descriptors(struct run *run, uint32_t sets, struct vkb_error
 }
 
 // Room for all that the points can need.
-static bool reserve(struct run *run, struct vkb_point *points, uint32_t point_count,
+static bool reserve(struct vkb_run *run, struct vkb_point *points, uint32_t point_count,
                     struct vkb_error *error)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
@@ -529,7 +192,7 @@ static bool reserve(struct run *run, struct vkb_point *points, uint32_t point_co
 
 // The slot of the graph's image. One that other commands may still use is replaced only when those
 // have run; the points of this flight have the same images.
-static bool resolve(struct run *run, uint32_t image, struct vkb_error *error)
+static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
 {
     const struct vkb_image_row *row = &run->graph->images[image];
     struct vkb_slots *slots = &run->frame->slots;
@@ -539,7 +202,8 @@ static bool resolve(struct run *run, uint32_t image, struct vkb_error *error)
         && vkb_slots_resolve(run->device, slots, row, &run->slots[image], error);
 }
 
-static bool load_scene(struct run *run, const struct vkb_scene_data *data, struct vkb_error *error)
+static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
+                       struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
     struct vkb_flight *flight = run->flight;
@@ -557,7 +221,7 @@ static bool load_scene(struct run *run, const struct vkb_scene_data *data, struc
 }
 
 // Stages the image and finds out whether the device has it already.
-static bool stage_input(struct run *run, const struct vkb_input *input, struct vkb_error *error)
+static bool stage_input(struct vkb_run *run, const struct vkb_input *input, struct vkb_error *error)
 {
     bool changed;
 
@@ -578,7 +242,7 @@ static bool stage_input(struct run *run, const struct vkb_input *input, struct v
         || vkb_slot_begin_writing(&run->frame->slots, run->input, NULL, 0, error);
 }
 
-static void record_input(struct run *run)
+static void record_input(struct vkb_run *run)
 {
     if (!run->input->image.mapped)
         vkb_upload_record(run->device, run->flight->commands.buffer, &run->frame->upload,
@@ -586,13 +250,13 @@ static void record_input(struct run *run)
     run->input->valid = true;
 }
 
-static uint64_t source_version(const struct run *run)
+static uint64_t source_version(const struct vkb_run *run)
 {
     return run->input ? run->input->version : run->frame->scene.serial;
 }
 
 // A copy of the point's passes, for it may be gone when the next one comes.
-static bool keep_previous(struct run *run, struct vkb_error *error)
+static bool keep_previous(struct vkb_run *run, struct vkb_error *error)
 {
     struct vkb_previous *previous = &run->frame->previous;
     struct vkb_graph *graph = &previous->graph;
@@ -608,7 +272,7 @@ static bool keep_previous(struct run *run, struct vkb_error *error)
 }
 
 // `next` is the point after it, NULL after the last.
-static bool record_point(struct run *run, struct vkb_point *point, const struct vkb_point *next,
+static bool record_point(struct vkb_run *run, struct vkb_point *point, const struct vkb_point *next,
                          struct vkb_error *error)
 {
     struct vkb_flight *flight = run->flight;
@@ -638,7 +302,7 @@ static bool record_point(struct run *run, struct vkb_point *point, const struct 
     return true;
 }
 
-static bool record_and_submit(struct run *run, struct vkb_point *points, uint32_t point_count,
+static bool record_and_submit(struct vkb_run *run, struct vkb_point *points, uint32_t point_count,
                               struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
@@ -658,8 +322,8 @@ static bool record_and_submit(struct run *run, struct vkb_point *points, uint32_
         && vkb_flight_submit(device, flight, error);
 }
 
-static bool submit(struct run *run, const struct vkb_frame_source *source, struct vkb_point *points,
-                   uint32_t point_count, struct vkb_error *error)
+static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
+                   struct vkb_point *points, uint32_t point_count, struct vkb_error *error)
 {
     run->graph = &points[0].graph;
     return (!source->scene || load_scene(run, source->scene, error))
@@ -694,7 +358,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
                       const struct vkb_frame_source *source, struct vkb_point *points,
                       uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error)
 {
-    struct run run = {.device = device, .frame = frame};
+    struct vkb_run run = {.device = device, .frame = frame};
     const uint32_t image_count = points[0].graph.image_count;
     uint32_t pass_count = 0;
     bool done;
