@@ -20,7 +20,7 @@ import vkbloom
 from vkbloom.explorer.server import Server
 from vkbloom.explorer.viewer import Viewer
 
-_PATIENCE = 60.0  # seconds, for JupyterLab on a busy machine
+PATIENCE = 60.0  # seconds: waiting costs nothing where a busy machine answers at last
 
 
 @contextmanager
@@ -36,7 +36,7 @@ def served(new_viewer: Callable[[], Viewer]) -> Iterator[str]:
 
     thread = threading.Thread(target=lambda: asyncio.run(main()))
     thread.start()
-    url, loop, stopped = started.get(timeout=10)
+    url, loop, stopped = started.get(timeout=PATIENCE)
     try:
         yield url
     finally:
@@ -101,7 +101,7 @@ def jupyterlab(folder: Path, cells: Sequence[str], environment: Mapping[str, str
             stderr=output,
         )
     try:
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + PATIENCE
         while not (found := re.search(r"http://127\.0\.0\.1:\d+/", log.read_text())):
             assert process.poll() is None, log.read_text()
             assert time.monotonic() < deadline, log.read_text()
@@ -109,4 +109,4 @@ def jupyterlab(folder: Path, cells: Sequence[str], environment: Mapping[str, str
         yield f"{found[0]}lab/tree/bloom.ipynb?reset&token={token}"
     finally:
         process.terminate()
-        process.wait(_PATIENCE)
+        process.wait(PATIENCE)

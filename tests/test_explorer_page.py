@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from explorer_hosts import jupyterlab, served
+from explorer_hosts import PATIENCE, jupyterlab, served
 from framebuffers import decode
 from numpy.typing import NDArray
 
@@ -71,7 +71,7 @@ def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
     page.on("console", lambda message: complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.goto(url)
-    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=20_000)
+    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=1000 * PATIENCE)
     yield page
     page.close()
     assert complaints == []
@@ -107,7 +107,7 @@ def wait_for_code(page: Page, code: str) -> None:
     from playwright.sync_api import expect
 
     # It changes with the picture that it is of.
-    expect(page.locator(".vkb-foot code")).to_have_text(code, timeout=10_000)
+    expect(page.locator(".vkb-foot code")).to_have_text(code, timeout=1000 * PATIENCE)
 
 
 def size_of(picture: NDArray[Any]) -> tuple[int, int]:
@@ -152,7 +152,7 @@ def drive(page: Page, renderer: Renderer, scene: Scene, shown: Callable[[], Any]
     left = round(0.52 * box[0])
     expected = renderer.render(scene, settings, box)["final"][:, :, :3].copy()
     expected[:, left:] = renderer.render(scene, Separable(bloom=False), box)["final"][:, left:, :3]
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + PATIENCE
     while not np.array_equal(shown(), expected):
         # B's picture comes on its own.
         assert time.monotonic() < deadline
@@ -215,7 +215,9 @@ def test_the_pointer_reads_values(
         page.locator(".vkb-status", has_text=str(expected[name].dtype)).wait_for()
         page.locator("canvas").hover(position={"x": 123, "y": 45})
         values = "  ".join(str(value) for value in np.atleast_1d(expected[name][45, 123]))
-        page.get_by_text(f"{name}[45, 123] = {values}", exact=True).wait_for(timeout=5000)
+        page.get_by_text(f"{name}[45, 123] = {values}", exact=True).wait_for(
+            timeout=1000 * PATIENCE
+        )
     page.mouse.move(1, 1)
     page.get_by_text("Point at the picture").wait_for()
     # It comes to the picture while another framebuffer is on its way, which takes long.
@@ -232,7 +234,7 @@ def test_the_pointer_reads_values(
     page.locator("canvas").hover(position={"x": 123, "y": 45})
     page.locator(".vkb-status", has_text="uint8").wait_for()
     values = "  ".join(str(value) for value in expected["final"][45, 123])
-    page.get_by_text(f"final[45, 123] = {values}", exact=True).wait_for(timeout=5000)
+    page.get_by_text(f"final[45, 123] = {values}", exact=True).wait_for(timeout=1000 * PATIENCE)
 
 
 def test_time_plays_and_pauses(
@@ -250,7 +252,7 @@ def test_time_plays_and_pauses(
     assert not np.array_equal(see(page, tmp_path), still)
     slider.fill("0.25")
     expected = renderer.render(scene, None, size_of(still), time=0.25)["final"]
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + PATIENCE
     while not np.array_equal(see(page, tmp_path), expected[:, :, :3]):
         assert time.monotonic() < deadline
 
@@ -319,7 +321,7 @@ def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Pa
         assert np.array_equal(np.array(values, np.float32), expected[33, 7])
         dark = see(page, tmp_path).mean()
         page.get_by_label("view exposure").fill("3")
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + PATIENCE
         while see(page, tmp_path).mean() < 1.2 * dark:
             assert time.monotonic() < deadline
 
@@ -382,10 +384,10 @@ def run_cell(browser: Browser, lab: str, theme: Any) -> Page:
     page = browser.new_page(viewport={"width": 1280, "height": 900}, color_scheme=theme)
     page.on("pageerror", lambda error: pytest.fail(str(error)))
     page.goto(lab)
-    page.get_by_text("Python 3 (ipykernel) | Idle").wait_for(timeout=60_000)
+    page.get_by_text("Python 3 (ipykernel) | Idle").wait_for(timeout=1000 * PATIENCE)
     page.locator(".jp-CodeCell .cm-content").first.click()
     page.keyboard.press("Shift+Enter")
-    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=60_000)
+    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=1000 * PATIENCE)
     return page
 
 

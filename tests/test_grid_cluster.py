@@ -159,7 +159,7 @@ def test_a_worker_that_is_killed(client: Any, tmp_path: Path, undisturbed: Path)
     assert made["done"].values.all()
     np.testing.assert_array_equal(made["final"].values, xr.open_zarr(undisturbed)["final"].values)
     assert check_grid(tmp_path / "a.zarr").complete
-    client.wait_for_workers(2, timeout=30)
+    client.wait_for_workers(2, timeout=120)
 
 
 class Failing:

@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -291,41 +290,39 @@ def test_close_while_other_threads_render(scene: Scene) -> None:
     with ThreadPoolExecutor(3) as pool:
         results = [pool.submit(work) for _ in range(3)]
         for _ in range(6):
-            assert started.acquire(timeout=30)
+            assert started.acquire(timeout=120)
         renderer.close()
         counts = [result.result() for result in results]
     assert min(counts) >= 0
     assert sum(counts) >= 6
 
 
-def longest_pause(work: Callable[[], object]) -> tuple[float, float]:
-    """Return how long the work took, and the longest pause of another Python thread meanwhile."""
+def ticks_during(work: Callable[[], object]) -> int:
+    """Return how often another Python thread came round, a millisecond apart, during the work."""
     stop = threading.Event()
     ticking = threading.Event()
-    pauses: list[float] = []
+    ticks = 0
 
     def tick() -> None:
-        last = time.perf_counter()
+        nonlocal ticks
         while not stop.wait(0.001):
-            now = time.perf_counter()
-            pauses.append(now - last)
-            last = now
+            ticks += 1
             ticking.set()
-        pauses.append(time.perf_counter() - last)
 
     thread = threading.Thread(target=tick)
     thread.start()
     ticking.wait()
-    begin = time.perf_counter()
+    before = ticks
     work()
-    elapsed = time.perf_counter() - begin
+    during = ticks - before
     stop.set()
     thread.join()
-    return elapsed, max(pauses)
+    return during
 
 
 def test_python_goes_on_while_the_device_works(scene: Scene) -> None:
-    # 65 x 65 taps a pixel, filtered by hand: a second or so of one core.
+    # 65 x 65 taps a pixel, filtered by hand: a second or so of one core. With the lock held the
+    # other thread would come round once before the work takes it, and once after.
     settings = Separable(
         weights=gaussian_weights(10.0, 32),
         blur_scale=0.5,
@@ -335,7 +332,4 @@ def test_python_goes_on_while_the_device_works(scene: Scene) -> None:
     )
     with Renderer("software") as renderer:
         renderer.render(scene, settings, (4, 4))
-        elapsed, pause = longest_pause(lambda: renderer.render(scene, settings, (300, 200)))
-        assert elapsed > 0.2
-        # With the lock held the pause would be as long as the work.
-        assert pause < elapsed / 2
+        assert ticks_during(lambda: renderer.render(scene, settings, (300, 200))) > 10

@@ -345,9 +345,9 @@ def test_timings_are_times_of_the_device(renderer: Renderer, scene: Scene) -> No
 
 
 def test_the_time_of_a_pass_follows_its_work(renderer: Renderer, scene: Scene) -> None:
-    # 15 times the pixels and 13 times the taps; a time that does not follow would be another's.
-    small = Separable(weights=(1.0,), bloom_size=(64, 64), format="rgba32float")
-    large = small.replace(weights=(0.02,) * 13, bloom_size=(250, 250), blur_scale=1.5)
+    # 4,096 times the pixels and 33 times the taps: a time that is of the same order is another's.
+    small = Separable(weights=(1.0,), bloom_size=(16, 16), format="rgba32float")
+    large = small.replace(weights=(0.02,) * 33, bloom_size=(1024, 1024), blur_scale=1.5)
     quick, slow = (
         min(
             renderer.render(scene, settings, SIZE, time=turns).timings["blur_vertical"]
