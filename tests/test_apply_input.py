@@ -446,7 +446,7 @@ def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
 
 def test_framebuffers_outlive_the_renderer() -> None:
     image = picture(9, 12, 3, "float16", seed=14)
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         frames = renderer.apply(image)
     assert_matches_reference(frames, image, Separable())
 
@@ -624,7 +624,7 @@ def test_settings_of_the_wrong_type(renderer: Renderer, settings: Any) -> None:
 
 def test_closed_renderer() -> None:
     image = picture(4, 4, 3, "uint8")
-    renderer = vkbloom.Renderer("software")
+    renderer = vkbloom.Renderer()
     frames = renderer.apply_many(image, [Separable(), Separable()])
     next(frames)
     renderer.close()

@@ -25,7 +25,7 @@ xr = pytest.importorskip("xarray")
 
 
 def run(*arguments: Any) -> Result:
-    words = ["grid", *(str(argument) for argument in arguments), "--adapter", "software"]
+    words = ["grid", *(str(argument) for argument in arguments)]
     return CliRunner().invoke(program, words)
 
 
@@ -205,8 +205,6 @@ class TestImageFiles:
                 str(tmp_path / "one.png"),
                 "--exposure",
                 "-1",
-                "--adapter",
-                "software",
             ],
         )
         np.testing.assert_array_equal(
@@ -344,7 +342,7 @@ class TestOptionFiles:
         assert found["final"].chunks[1] == (2,)
         assert {"mean", "energy"} <= set(found)
         image = load(picture).pixels
-        with Renderer("software") as renderer:
+        with Renderer() as renderer:
             expected = renderer.apply(
                 image,
                 Pyramid(

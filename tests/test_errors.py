@@ -17,7 +17,7 @@ SIZE = (32, 24)
 
 @pytest.fixture(scope="module")
 def right(scene: Scene) -> Frames:
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         return renderer.render(scene, None, SIZE)
 
 
@@ -201,7 +201,7 @@ def test_out_is_a_mapping(renderer: Renderer, scene: Scene, out: Any) -> None:
 
 
 def test_use_after_close(scene: Scene) -> None:
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     renderer.close()
     for _ in range(2):
         with pytest.raises(ValueError, match="closed"):
@@ -212,7 +212,7 @@ def test_use_after_close(scene: Scene) -> None:
 
 
 def test_a_mistake_before_the_first_frame(scene: Scene) -> None:
-    with Renderer("software", validation=True) as renderer:
+    with Renderer(validation=True) as renderer:
         with pytest.raises(ValueError, match="attachments"):
             renderer.render(scene, None, SIZE, attachments="nope")
         assert renderer.render(scene, None, SIZE)["final"].any()

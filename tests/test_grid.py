@@ -59,7 +59,7 @@ class TestValues:
         )
         assert dataset["final"].dims == (*AXES, "y", "x", "channel")
         assert dataset["bloom"].dims == (*AXES, "y", "x", "bloom_channel")
-        with Renderer("software") as single:
+        with Renderer() as single:
             for place in np.ndindex(2, 3, 2, 3):
                 values = {name: AXES[name][i] for (name, i) in zip(AXES, place, strict=True)}
                 expected = single.apply(image, Separable(intensity=0.7).replace(**values))

@@ -46,7 +46,6 @@ def source() -> Any:
 
 def make(store: Any, **changes: Any) -> Any:
     arguments: dict[str, Any] = {
-        "adapter": "software",
         "chunks": CHUNKS,
         "reduce": REDUCE,
         "attachments": ("final", "bloom"),
@@ -647,7 +646,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
         "import numpy as np, vkbloom\n"
         "image = np.random.default_rng(1).integers(0, 256, (256, 256, 3), dtype=np.uint8)\n"
         "vkbloom.grid_to_zarr(image, None, {'intensity': [0, 1]}, sys.argv[1],\n"
-        "                     adapter='software', chunks={'intensity': 2})\n"
+        "                     chunks={'intensity': 2})\n"
     )
     store = tmp_path / "a.zarr"
     ended = subprocess.run(

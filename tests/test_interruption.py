@@ -60,7 +60,7 @@ def long_work(renderer: Renderer, side: int = 256) -> None:
 
 def check(renderer: Renderer, scene: Scene) -> None:
     """The renderer gives the exact pictures of a new one."""
-    with Renderer("software") as new:
+    with Renderer() as new:
         for settings in (SHORT, Separable(bloom_size=(7, 5))):
             expected = new.render(scene, settings, RIGHT_SIZE)
             frames = renderer.render(scene, settings, RIGHT_SIZE)
@@ -172,7 +172,6 @@ def test_an_interrupted_store_is_gone_on_with(
             tmp_path / "grid",
             chunks={"blur_strength": 2},
             reduce={"mean": stopper},
-            adapter="software",
             validation=True,
             progress=False,
         )
@@ -263,13 +262,13 @@ def test_a_handler_that_uses_the_renderer_gets_an_error(
 def test_limits_that_are_none(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     monkeypatch.setenv("VKBLOOM_TIMEOUT", text)
     with pytest.raises(ValueError, match=f"VKBLOOM_TIMEOUT: '{text}' is not"):
-        Renderer("software")
+        Renderer()
 
 
 @LEAVES_BEHIND
 def test_a_device_that_takes_too_long(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
     monkeypatch.setenv("VKBLOOM_TIMEOUT", "0.1")
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     with pytest.raises(
         DeviceLostError, match=r"not finished within 0.1 s.*VKBLOOM_TIMEOUT"
     ) as hung:
@@ -293,7 +292,7 @@ import numpy as np
 import vkbloom
 
 image = np.random.default_rng(3).random((16, 24, 3), dtype=np.float32)
-renderer = vkbloom.Renderer("software", validation=True)
+renderer = vkbloom.Renderer(validation=True)
 right = renderer.apply(image)["final"]
 batches = renderer.apply_many(image, [vkbloom.Separable()] * 9)
 next(batches); next(batches)
@@ -313,7 +312,7 @@ if child == 0:
             else:
                 raise AssertionError("the child used its parent's device")
         assert not renderer.closed
-        with vkbloom.Renderer("software", validation=True) as own:
+        with vkbloom.Renderer(validation=True) as own:
             np.testing.assert_array_equal(own.apply(image)["final"], right)
         if sys.argv[1] == "close":
             renderer.close()
