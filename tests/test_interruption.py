@@ -384,3 +384,22 @@ def test_a_forked_process(how: str, tmp_path: Path) -> None:
         0,
         ["child done", "parent done", ""],
     ), done.stdout + done.stderr
+
+
+def test_a_driver_that_does_not_survive_forks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise vkbloom.Error("vkCreateDevice failed with VK_ERROR_INITIALIZATION_FAILED")
+
+    def notes() -> list[str]:
+        with pytest.raises(vkbloom.Error, match="vkCreateDevice failed") as refused:
+            Renderer()
+        return getattr(refused.value, "__notes__", [])
+
+    Renderer().close()
+    monkeypatch.setattr(vkbloom._core, "Renderer", refuse)
+    assert notes() == []
+    here = os.getpid()
+    monkeypatch.setattr(os, "getpid", lambda: here + 1)
+    (note,) = notes()
+    assert "forked" in note
+    assert '"spawn"' in note
