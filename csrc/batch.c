@@ -281,13 +281,18 @@ static void dealloc(PyObject *object)
 static bool build_graph(const struct batch *self, const struct vkb_settings *settings,
                         struct vkb_graph *graph, struct vkb_error *error)
 {
+    const uint32_t max_side = self->renderer->device.limits.maxFramebufferWidth;
+
     const bool built =
-        self->of_scene ? vkb_build_scene(self->shading, settings, &self->scene_source, graph, error)
-                       : vkb_build_image(settings, &self->image_source, graph, error);
+        self->of_scene
+            ? vkb_check_sizes(settings, "size", self->scene_source.size, max_side, error)
+                  && vkb_build_scene(self->shading, settings, &self->scene_source, graph, error)
+            : vkb_check_sizes(settings, "image", self->image_source.size, max_side, error)
+                  && vkb_build_image(settings, &self->image_source, graph, error);
 
     return built
         && vkb_forms_choose(self->renderer->forms, &self->renderer->device.limits, graph, error)
-        && vkb_graph_check(graph, self->renderer->device.limits.maxFramebufferWidth, error);
+        && vkb_graph_check(graph, max_side, error);
 }
 
 static bool require_filling(const struct batch *self)

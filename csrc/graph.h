@@ -17,6 +17,9 @@ enum {
 
 #define VKB_NO_IMAGE UINT32_MAX
 
+// No side of an image is longer: so far the whole numbers of sampling.glsl keep to 32 bits.
+enum { VKB_MAX_SIDE = 32768 };
+
 // An image is written by one run of passes that follow each other, or is the input; so what it
 // holds stays right until that run is out of date.
 struct vkb_image_row {
@@ -87,7 +90,11 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error);
 
 // Every rule that the rows must keep, so that nothing but a right graph reaches Vulkan.
-bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_size, struct vkb_error *error);
+bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error);
+
+// Whether both sides are within 1 and max_side; `name` is what the message calls them.
+bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
+                    struct vkb_error *error);
 
 // Whether both have the same images, in the same order; their passes may differ.
 bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b);
