@@ -38,9 +38,9 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
 
     Node transforms are baked: positions are transformed, normals multiplied by the 3x3 part and
     normalized again. Colours are COLOR_0 times the material's base colour factor, either being 1
-    where there is none. The y of positions and normals is negated. Where a material emits, the
-    mesh's `emission` is the emissive factor times its strength
-    (KHR_materials_emissive_strength).
+    where there is none; what is negative in COLOR_0 counts as 0. The y of positions and normals is
+    negated. Where a material emits, the mesh's `emission` is the emissive factor times its
+    strength (KHR_materials_emissive_strength).
 
     Textures of the base colour and of the emission are read from PNG and JPEG images, decoded by
     the sRGB curve (3.9.2, 3.9.3) and sampled as their sampler says; one that says nothing of its
@@ -197,8 +197,11 @@ class _Loader:
                     f"damaged: {what} has both a matrix and a translation, rotation or scale"
                 )
             matrix = self._file.floats(node.matrix, f"{what}.matrix", 16).reshape(4, 4).T
-            if not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
+            affine_row = (0.0, 0.0, 0.0, 1.0)
+            # Exporters multiply in single precision, so that the row may be rounded.
+            if not np.allclose(matrix[3], affine_row, rtol=0.0, atol=1e-5):
                 self._file.fail(f"damaged: {what}.matrix is not affine")
+            matrix[3] = affine_row
             return matrix
         if node.rotation is not None:
             rotation = self._file.floats(node.rotation, f"{what}.rotation", 4)
@@ -329,7 +332,8 @@ class _Loader:
         colours = np.broadcast_to(material.factor, (count, 3))
         if attribute["COLOR_0"] is not None:
             read = self._file.vectors(attribute["COLOR_0"], f"{what}.COLOR_0", count)
-            colours = material.factor * read
+            # 3.7.2.1 asks for 0..1; what is brighter than 1 serves the deferred system.
+            colours = material.factor * np.maximum(read, 0.0)
         if primitive.indices is None:
             corners = np.arange(count, dtype=np.int64)
         else:
