@@ -339,7 +339,7 @@ def test_glb_and_outer_buffers_give_the_same_mesh(tmp_path: Path) -> None:
         np.testing.assert_array_equal(mesh.indices, expected.indices)
 
 
-def test_the_default_scene_or_all_roots(tmp_path: Path) -> None:
+def test_the_default_scene_or_the_first_or_all_roots(tmp_path: Path) -> None:
     document = triangle()
     document.json["nodes"] = [
         {"mesh": 0},
@@ -352,6 +352,8 @@ def test_the_default_scene_or_all_roots(tmp_path: Path) -> None:
     first_corners = corners(document.load(tmp_path))[:, 0].tolist()
     assert first_corners == [[1, 0, 7], [6, 0, 0]]
     del document.json["scene"]
+    assert corners(document.load(tmp_path))[:, 0].tolist() == [[1, 0, 0]]
+    del document.json["scenes"]
     first_corners = corners(document.load(tmp_path))[:, 0].tolist()
     assert first_corners == [[1, 0, 0], [6, 0, 0], [1, 0, 7]]
 

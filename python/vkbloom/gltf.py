@@ -48,11 +48,11 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     of an emission whose factor is 0 is not read, for it changes nothing. A base colour's alpha is
     ignored.
 
-    Nodes of the file's default scene are used, or all root nodes where it names none. Triangles,
-    strips and fans, indexed or not, are read; where there are no normals, flat ones are computed
-    (3.7.2.1). Under a transform of negative determinant the winding is reversed (3.7.4). A normal
-    without length becomes the mesh's y axis, as a shader would make NaN of it. Cameras of the file
-    and `doubleSided` are ignored.
+    Nodes of the file's default scene are used, or of its first where it names none, or all root
+    nodes where it has no scenes. Triangles, strips and fans, indexed or not, are read; where there
+    are no normals, flat ones are computed (3.7.2.1). Under a transform of negative determinant the
+    winding is reversed (3.7.4). A normal without length becomes the mesh's y axis, as a shader
+    would make NaN of it. Cameras of the file and `doubleSided` are ignored.
 
     Parameters
     ----------
@@ -157,9 +157,13 @@ class _Loader:
             self._file.fail(f"damaged: the nodes form a cycle, at or above node {stray}")
 
         starts = roots
-        if self._file.root.scene is not None:
-            scene = self._file.item("scenes", self._file.root.scene, "scene")
-            starts = self._node_list(scene.nodes, f"scenes[{self._file.root.scene}].nodes")
+        shown = self._file.root.scene
+        if shown is None and self._file.items("scenes"):
+            # Scenes are alternatives: all of them at once would be what no viewer shows.
+            shown = 0
+        if shown is not None:
+            scene = self._file.item("scenes", shown, "scene")
+            starts = self._node_list(scene.nodes, f"scenes[{shown}].nodes")
             for start in starts:
                 if start in parents:
                     self._file.fail(f"damaged: the scene lists node {start}, which has a parent")
