@@ -251,6 +251,28 @@ class TestLoad:
         with pytest.raises(ValueError, match=r"a\.tif: holds numbers of int16"):
             load(path)
 
+    @pytest.mark.parametrize("folder", ["", "caf\udce9/"], ids=["file", "folder"])
+    def test_names_that_are_not_utf8(self, tmp_path: Path, folder: str) -> None:
+        path = store(tmp_path / "a.png", noise(2, 3, 3, numbers="uint8"), "uint8")
+        other = tmp_path / f"{folder}b\udce9.png"
+        other.parent.mkdir(exist_ok=True)
+        other.write_bytes(path.read_bytes())
+        for call in (lambda: load(other), lambda: save(decode(load(path)), other)):
+            with pytest.raises(ValueError, match=r"b\\udce9\.png': names .* must be UTF-8"):
+                call()
+        assert other.read_bytes() == path.read_bytes()
+
+    def test_damage_whose_message_is_no_text(self, tmp_path: Path) -> None:
+        path = store(tmp_path / "a.exr", noise(4, 4, 3, numbers="half"), "half")
+        # OpenEXR's message holds the type of the attribute.
+        content = path.read_bytes()
+        assert content.count(b"compression\0compression\0") == 1
+        path.write_bytes(
+            content.replace(b"compression\0compression\0", b"compression\0c\xe9mpression\0")
+        )
+        with pytest.raises(ValueError, match=r"a\.exr: .*c\ufffdmpression"):
+            load(path)
+
     def test_deep_images(self, tmp_path: Path) -> None:
         path = tmp_path / "a.exr"
         spec = oiio.ImageSpec(2, 2, 1, "float")

@@ -20,6 +20,8 @@ from vkbloom.images import (
     Encoding,
     Picture,
     StoredImage,
+    check_name,
+    failure_of,
 )
 from vkbloom.srgb import decode_srgb
 
@@ -59,12 +61,13 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     OSError
         The file is not there, or cannot be opened; it names the file.
     ValueError
-        The file is no image; it names the file.
+        The file is no image, or its name not UTF-8; it names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
     oiio = import_extra("OpenImageIO", "images", purpose)
     name = os.fspath(path)
+    check_name(name)
     # OpenImageIO says the same of missing and of damaged files; this has the system's own reason.
     with open(name, "rb"):
         pass
@@ -73,13 +76,12 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     plain.attribute("oiio:UnassociatedAlpha", 1)
     reader = oiio.ImageInput.open(name, plain)
     if reader is None:
-        reason = oiio.geterror().strip() or "unknown format"
+        reason = failure_of(oiio) or "unknown format"
         raise ValueError(f"{name}: not an image that can be read: {reason}")
     try:
         yield reader
     finally:
-        # An error that nobody asked for would be printed when the reader is gone.
-        reader.geterror()
+        failure_of(reader)
         reader.close()
 
 
@@ -112,8 +114,8 @@ def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     OSError
         The file is not there, or cannot be opened; it names the file.
     ValueError
-        The file is damaged or no image, has no such part, or is no flat image of 8 or 16 bit
-        integers or floats; it names the file.
+        The file is damaged or no image, has no such part, is no flat image of 8 or 16 bit
+        integers or floats, or its name is not UTF-8; it names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
@@ -147,7 +149,7 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
     wanted = stored_as if stored_as != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
     # Of a JPEG that was cut off there are pixels, and an error.
-    reason = reader.geterror().strip()
+    reason = failure_of(reader)
     if data is None or reason:
         raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
     pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
