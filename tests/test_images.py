@@ -203,6 +203,7 @@ class TestLoad:
         assert writer.close()
         assert np.array_equal(load(path).pixels, parts[0])
         assert np.array_equal(load(path, 2).pixels, parts[2])
+        assert load(path).parts == load(path, 2).parts == ("part 0", "part 1", "part 2")
         for wrong in (3, -1):
             with pytest.raises(ValueError, match=f"a.exr: there is no part {wrong}, only 0 to 2"):
                 load(path, wrong)

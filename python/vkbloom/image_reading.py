@@ -38,6 +38,8 @@ _LARGEST_AREA: Final = 1 << 28
 # have, makes 1032 bytes of one at the most (RFC 1951: 258 of two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
+# That are listed. Some files have thousands, and each takes time.
+_MOST_PARTS: Final = 100
 
 
 @contextmanager
@@ -177,7 +179,15 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
             for attribute in spec.extra_attribs
             if attribute.name in (*KEPT_ATTRIBUTES, "ICCProfile")
         },
+        parts=tuple(_parts(reader)),
     )
+
+
+def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
+    for index in range(_MOST_PARTS):
+        if not reader.seek_subimage(index, 0):
+            return
+        yield reader.spec().get_string_attribute("oiio:subimagename")
 
 
 def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:

@@ -85,6 +85,9 @@ class StoredImage:
         OpenImageIO's name of the colour space that the file gives, else "".
     attributes : mapping of str to (OpenImageIO.TypeDesc, value)
         The attributes that `save` keeps.
+    parts : tuple of str
+        The names of the file's parts, of which the pixels are one; "" where it gives none. Of
+        more than 100 the first.
     """
 
     pixels: NDArray[Any]
@@ -95,6 +98,7 @@ class StoredImage:
     associated: bool
     space: str
     attributes: Mapping[str, tuple[Any, Any]]
+    parts: tuple[str, ...] = ("",)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
