@@ -578,6 +578,16 @@ def test_image_of_the_wrong_shape(renderer: Renderer, dtype: str, shape: tuple[i
     assert_matches_reference(renderer.apply(image), image, Separable())
 
 
+def test_masked_images(renderer: Renderer) -> None:
+    """What lies under a mask is not to be seen."""
+    image = picture(6, 5, 3, "float32")
+    masked = np.ma.masked_greater(image, float(np.median(image)))
+    with pytest.raises(ValueError, match=r"^image: some of it is masked"):
+        renderer.apply(masked)
+    assert_same(renderer.apply(masked.filled(0)), renderer.apply(np.where(masked.mask, 0, image)))
+    assert_same(renderer.apply(np.ma.masked_invalid(image)), renderer.apply(image))
+
+
 def largest_side(renderer: Renderer) -> int:
     """Return the limit that the error of a far too large image names."""
     with pytest.raises(ValueError, match=r"40000000 x 1 is out of .* range, 1 to") as caught:

@@ -528,11 +528,14 @@ def test_importing_the_entry_point_is_quick() -> None:
     assert not {"click", "rich", "tqdm", "OpenImageIO", "pygltflib"} & set(listed)
 
 
-def test_text_survives_a_plain_terminal(tmp_path: Path) -> None:
-    out = str(tmp_path / "out.exr")
-    ended = python(*("-m", "vkbloom.cli", "render", "-o", out, *SMALL), PYTHONIOENCODING="ascii")
+@pytest.mark.parametrize(("encoding", "name"), [("ascii", "\u2600"), ("latin-1", r"\u2600")])
+def test_text_survives_a_plain_terminal(tmp_path: Path, encoding: str, name: str) -> None:
+    out = str(tmp_path / "\u2600.exr")
+    ended = python(*("-m", "vkbloom.cli", "render", "-o", out, *SMALL), PYTHONIOENCODING=encoding)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "ms on the CPU" in ended.stdout
+    # To click, ASCII is a terminal that does not say what it is: it gets UTF-8.
+    assert ended.stdout.endswith(f"{name}.exr\n")
 
 
 def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:

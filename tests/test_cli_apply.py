@@ -215,9 +215,11 @@ class TestFormats:
         frames.save(tmp_path / "a.exr")
         names = list(frames)
         last = names.index("final")
-        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", "--subimage", str(last))
+        chosen = ("--subimage", str(last))
+        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", *chosen)
         assert np.array_equal(pixels(tmp_path / "b.exr"), frames["final"])
-        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
+        result = run(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
+        assert "a.exr: the first of its parts 0 glow, 1 blur_vertical, " in result.stderr
         assert np.array_equal(pixels(tmp_path / "b.exr"), frames[names[0]])
 
     def test_in_place(self, tmp_path: Path) -> None:

@@ -138,7 +138,9 @@ def test_the_edges_of_a_range_are_in_it(name: str, low: Any, high: Any) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, _, _ in EDGES] + ["bloom", "direct", "dither"])
-@pytest.mark.parametrize("value", ["1", 1j, [1.0], (), object()])
+@pytest.mark.parametrize(
+    "value", ["1", 1j, [1.0], (), object(), np.ones(1), np.ones(2), np.ones((1, 2), int)], ids=repr
+)
 def test_a_number_is_needed(name: str, value: object) -> None:
     with pytest.raises(TypeError, match=rf"^{name}: "):
         make(**{name: value})
@@ -152,7 +154,9 @@ def test_a_whole_number_is_needed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["composite", "tonemap", "encoding", "texel", "format"])
-@pytest.mark.parametrize("value", ["None", "ADD", "", 0, ["add"], b"add"])
+@pytest.mark.parametrize(
+    "value", ["None", "ADD", "", 0, ["add"], b"add", np.array(["add", "add"]), np.ones(2)], ids=repr
+)
 def test_a_name_is_one_of_a_list(name: str, value: object) -> None:
     with pytest.raises((TypeError, ValueError), match=rf"^{name}: ") as caught:
         make(**{name: value})
@@ -266,6 +270,7 @@ def test_gaussian_weights() -> None:
     ("sigma", "radius", "count"),
     [
         (0.1, None, 2),
+        (1e-300, None, 2),
         (1.0, None, 4),
         (21.3, None, 65),
         (1000.0, None, 65),
@@ -302,6 +307,9 @@ def test_gaussian_weights_of_another_type() -> None:
         gaussian_weights(wrong)
     with pytest.raises(TypeError, match=r"^radius: "):
         gaussian_weights(1.0, wrong)
+    wrong = np.ones(2)
+    with pytest.raises(TypeError, match=r"^sigma: "):
+        gaussian_weights(wrong)
     wrong = 2.5
     with pytest.raises(TypeError, match=r"^radius: "):
         gaussian_weights(1.0, wrong)

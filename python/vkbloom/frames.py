@@ -186,7 +186,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         Raises
         ------
         ValueError
-            If the extension is unknown, or there is no framebuffer.
+            If the extension is unknown, the name not UTF-8, or there is no framebuffer.
         OSError
             If a file cannot be written; it names the file, and no half file is left.
         ModuleNotFoundError

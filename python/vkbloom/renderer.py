@@ -63,6 +63,8 @@ def _check_image(image: object) -> NDArray[Any]:
     """Return the image, in this machine's byte order, if the core can take it."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"image: an array is needed, not {type(image).__name__}")
+    if type(image) is not np.ndarray and np.ma.is_masked(image):
+        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
     if image.dtype not in _DTYPES:
         if image.dtype.name not in ("uint8", "float16", "float32"):
             raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
@@ -338,8 +340,8 @@ class Renderer:
         Raises
         ------
         ValueError
-            The image has another shape or is larger than the adapter allows, an argument is out
-            of range, an array of `out` does not fit, or the renderer is closed.
+            The image has another shape, masked values or more pixels than the adapter allows, an
+            argument is out of range, an array of `out` does not fit, or the renderer is closed.
         TypeError
             The image has another dtype, or an argument another type.
         OutOfMemoryError, DeviceLostError, ValidationError, Error

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.images import check_name
+
 if TYPE_CHECKING:
     import OpenImageIO
 
@@ -83,9 +85,12 @@ def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
 
     Raises
     ------
+    ValueError
+        The name is not UTF-8.
     OSError
         It cannot be made or the disk is full; it names `file`, and nothing is left.
     """
+    check_name(file)
     temporary = file.with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
     try:
         with temporary.open("xb") as stream:

@@ -46,10 +46,17 @@ def _choice(name: str) -> Any:
     return dataclasses.field(default=_core.CHOICES[name][0])
 
 
+def _check_is_number(name: str, value: object) -> None:
+    """Raise TypeError, naming the field, unless a value is one number."""
+    # Arrays have __float__, whatever their shape.
+    is_one = hasattr(value, "__float__") and getattr(value, "ndim", 0) == 0
+    if isinstance(value, str) or not is_one:
+        raise TypeError(f"{name}: a number is needed, not {value!r}")
+
+
 def check_number(name: str, value: float, low: float, high: float) -> None:
     """Raise ValueError, naming the field and its range, unless ``low <= value <= high``."""
-    if isinstance(value, str) or not hasattr(value, "__float__"):
-        raise TypeError(f"{name}: a number is needed, not {value!r}")
+    _check_is_number(name, value)
     if not low <= value <= high:
         raise ValueError(f"{name}: {value!r} is out of range, {low:g} to {high:g}")
 
@@ -147,10 +154,10 @@ class Settings:
             optional = str(field.type).endswith("None")
             if field.name in _core.VALUES and not (value is None and optional):
                 self._check_value(field, value)
-            elif field.name in _core.CHOICES and value not in _core.CHOICES[field.name]:
+            elif field.name in _core.CHOICES and not _is_one_of(value, _core.CHOICES[field.name]):
                 names = ", ".join(_core.CHOICES[field.name])
                 raise ValueError(f"{field.name}: {value!r} is not one of {names}")
-        if self.format is not None and self.format not in BLOOM_FORMATS:
+        if self.format is not None and not _is_one_of(self.format, BLOOM_FORMATS):
             raise ValueError(f"format: {self.format!r} is not one of {', '.join(BLOOM_FORMATS)}")
         if self.bloom_size is not None:
             object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
@@ -183,6 +190,11 @@ class Settings:
         from vkbloom import display  # noqa: PLC0415
 
         return display.settings_html(self)
+
+
+def _is_one_of(value: object, names: Iterable[str]) -> bool:
+    # An array compares with a name element by element.
+    return isinstance(value, str) and value in names
 
 
 def check_size(name: str, size: Any) -> tuple[int, int]:
@@ -357,8 +369,7 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
         `sigma` is no number, or `radius` no integer.
     """
     limit = _core.MAX_WEIGHTS - 1
-    if isinstance(sigma, str) or not hasattr(sigma, "__float__"):
-        raise TypeError(f"sigma: a number is needed, not {sigma!r}")
+    _check_is_number("sigma", sigma)
     if not (sigma > 0 and math.isfinite(sigma)):
         raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
     if radius is None:
@@ -369,6 +380,8 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
         raise TypeError(f"radius: a whole number is needed, not {radius!r}") from None
     if not 0 <= radius <= limit:
         raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
-    weights = [math.exp(-0.5 * (tap / sigma) ** 2) for tap in range(radius + 1)]
+    distances = [tap / sigma for tap in range(radius + 1)]
+    # Not by **, which raises where a tiny sigma makes a square infinite; its weight is 0.
+    weights = [math.exp(-0.5 * distance * distance) for distance in distances]
     total = weights[0] + 2 * sum(weights[1:])
     return tuple(weight / total for weight in weights)
