@@ -188,7 +188,7 @@ def tiny() -> None:
     with (
         folder() as path,
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None, protocol="tcp"
+            n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", protocol="tcp"
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -242,7 +242,7 @@ def workers() -> None:
             with (
                 folder() as path,
                 distributed.LocalCluster(
-                    n_workers=count, threads_per_worker=1, dashboard_address=None
+                    n_workers=count, threads_per_worker=1, dashboard_address="127.0.0.1:0"
                 ) as cluster,
                 distributed.Client(cluster) as client,
             ):

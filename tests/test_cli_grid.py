@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import socket
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -146,7 +148,12 @@ class TestStores:
 
     def test_workers(self, tmp_path: Path, picture: Path) -> None:
         words = [picture, "--axis", "exposure=0:1:4"]
-        told = done(*words, "-o", tmp_path / "a.zarr", "--workers", "1")
+        # Dask's own port is often taken, by a notebook's cluster or another grid.
+        with socket.socket() as other:
+            with contextlib.suppress(OSError):
+                other.bind(("", 8787))
+                other.listen()
+            told = done(*words, "-o", tmp_path / "a.zarr", "--workers", "1")
         assert "4 points" in told
         done(*words, "-o", tmp_path / "b.zarr")
         found, expected = (xr.open_zarr(tmp_path / name) for name in ("a.zarr", "b.zarr"))

@@ -6,6 +6,8 @@ import dataclasses
 import json
 import math
 import pickle
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -109,6 +111,21 @@ def test_as_dict_is_plain() -> None:
     assert hash(settings) == hash(make(**again))
 
 
+@pytest.mark.parametrize(
+    "value", [Fraction(1, 3), Decimal("0.1"), np.longdouble("0.1"), np.array(0.5), np.float16(0.1)]
+)
+def test_every_kind_of_real_number_is_stored_as_a_float(value: Any) -> None:
+    settings = make(intensity=value, weights=(value,))
+    assert type(settings.intensity) is float
+    assert settings.intensity == settings.weights[0] == float(value)
+
+
+def test_names_of_numpy_are_stored_as_plain_ones() -> None:
+    settings = make(tonemap=np.array(["aces"])[0], format=np.str_("rgba16float"))
+    assert [type(name) for name in (settings.tonemap, settings.format)] == [str, str]
+    assert eval(repr(settings), {"Separable": Separable}) == settings
+
+
 # Ranges
 
 EDGES: list[tuple[str, Any, Any]] = [
@@ -139,7 +156,23 @@ def test_the_edges_of_a_range_are_in_it(name: str, low: Any, high: Any) -> None:
 
 @pytest.mark.parametrize("name", [name for name, _, _ in EDGES] + ["bloom", "direct", "dither"])
 @pytest.mark.parametrize(
-    "value", ["1", 1j, [1.0], (), object(), np.ones(1), np.ones(2), np.ones((1, 2), int)], ids=repr
+    "value",
+    [
+        "1",
+        b"1",
+        1j,
+        np.complex64(1),
+        [1.0],
+        (),
+        object(),
+        int,
+        np.array([0.5]),
+        np.array([0.5, 0.5]),
+        np.array([]),
+        np.array("a"),
+        Decimal("sNaN"),
+    ],
+    ids=repr,
 )
 def test_a_number_is_needed(name: str, value: object) -> None:
     with pytest.raises(TypeError, match=rf"^{name}: "):
@@ -155,7 +188,9 @@ def test_a_whole_number_is_needed(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["composite", "tonemap", "encoding", "texel", "format"])
 @pytest.mark.parametrize(
-    "value", ["None", "ADD", "", 0, ["add"], b"add", np.array(["add", "add"]), np.ones(2)], ids=repr
+    "value",
+    ["None", "ADD", "", 0, ["add"], b"add", np.array("add"), np.array(["add"]), np.zeros(2)],
+    ids=repr,
 )
 def test_a_name_is_one_of_a_list(name: str, value: object) -> None:
     with pytest.raises((TypeError, ValueError), match=rf"^{name}: ") as caught:
@@ -276,6 +311,11 @@ def test_gaussian_weights() -> None:
         (1000.0, None, 65),
         (5.0, 0, 1),
         (2, 64, 65),
+        # Their squares and multiples are beyond all floats.
+        (1e-200, None, 2),
+        (5e-324, 3, 4),
+        (1.7e308, None, 65),
+        (Fraction(1, 2), None, 3),
     ],
 )
 def test_the_radius_of_gaussian_weights(sigma: float, radius: int | None, count: int) -> None:
@@ -292,6 +332,7 @@ def test_the_radius_of_gaussian_weights(sigma: float, radius: int | None, count:
         (-1.0, None, "sigma"),
         (math.nan, None, "sigma"),
         (math.inf, None, "sigma"),
+        pytest.param(10**400, None, "sigma", id="huge"),
         (1.0, -1, "radius"),
         (1.0, 65, "radius"),
     ],
@@ -302,9 +343,11 @@ def test_wrong_gaussian_weights(sigma: float, radius: int | None, name: str) -> 
 
 
 def test_gaussian_weights_of_another_type() -> None:
-    wrong: Any = "a"
-    with pytest.raises(TypeError, match=r"^sigma: "):
-        gaussian_weights(wrong)
+    wrong: Any
+    for wrong in ("a", np.array([1.0, 2.0]), 1j):
+        with pytest.raises(TypeError, match=r"^sigma: "):
+            gaussian_weights(wrong)
+    wrong = "a"
     with pytest.raises(TypeError, match=r"^radius: "):
         gaussian_weights(1.0, wrong)
     wrong = np.ones(2)

@@ -12,6 +12,8 @@ import operator
 from collections.abc import Iterable
 from typing import Any, ClassVar, Literal, Self
 
+import numpy as np
+
 from vkbloom import _core
 
 Composite = Literal["add", "mix", "screen"]
@@ -46,30 +48,38 @@ def _choice(name: str) -> Any:
     return dataclasses.field(default=_core.CHOICES[name][0])
 
 
-def _check_is_number(name: str, value: object) -> None:
-    """Raise TypeError, naming the field, unless a value is one number."""
-    # Arrays have __float__, whatever their shape.
-    is_one = hasattr(value, "__float__") and getattr(value, "ndim", 0) == 0
-    if isinstance(value, str) or not is_one:
-        raise TypeError(f"{name}: a number is needed, not {value!r}")
+def _as_float(name: str, value: Any) -> float:
+    """Return a real number as a float, one beyond all floats as infinity, or raise TypeError."""
+    try:
+        # All of these float() would take, the arrays and complex numbers with a warning.
+        no_number = isinstance(value, str | bytes | np.complexfloating)
+        if no_number or getattr(value, "ndim", 0) != 0:
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: a number is needed, not {value!r}") from None
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
-def check_number(name: str, value: float, low: float, high: float) -> None:
-    """Raise ValueError, naming the field and its range, unless ``low <= value <= high``."""
-    _check_is_number(name, value)
-    if not low <= value <= high:
+def check_number(name: str, value: float, low: float, high: float) -> float:
+    """Return the value as a float if ``low <= value <= high``.
+
+    Else raise ValueError, naming the field and its range, or TypeError where it is no number.
+    """
+    number = _as_float(name, value)
+    if not low <= number <= high:
         raise ValueError(f"{name}: {value!r} is out of range, {low:g} to {high:g}")
+    return number
 
 
 def _finite_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
     try:
         if isinstance(values, str):
             raise TypeError
-        numbers = tuple(float(value) for value in values)
-    except (TypeError, ValueError):
+        numbers = tuple(_as_float(name, value) for value in values)
+    except TypeError:
         raise TypeError(f"{name}: a sequence of numbers is needed, not {values!r}") from None
-    except OverflowError:
-        raise ValueError(f"{name}: {values!r} has a number out of range") from None
     for number in numbers:
         # The device has 32 bits, of which this is the largest number.
         if not abs(number) <= FLT_MAX:
@@ -154,27 +164,31 @@ class Settings:
             optional = str(field.type).endswith("None")
             if field.name in _core.VALUES and not (value is None and optional):
                 self._check_value(field, value)
-            elif field.name in _core.CHOICES and not _is_one_of(value, _core.CHOICES[field.name]):
-                names = ", ".join(_core.CHOICES[field.name])
-                raise ValueError(f"{field.name}: {value!r} is not one of {names}")
-        if self.format is not None and not _is_one_of(self.format, BLOOM_FORMATS):
-            raise ValueError(f"format: {self.format!r} is not one of {', '.join(BLOOM_FORMATS)}")
+            elif field.name in _core.CHOICES:
+                self._check_name(field.name, _core.CHOICES[field.name])
+        if self.format is not None:
+            self._check_name("format", BLOOM_FORMATS)
         if self.bloom_size is not None:
             object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
         """Check a number and store it as what it is: NumPy's scalars hash and print otherwise."""
         _, low, high = _core.VALUES[field.name]
-        check_number(field.name, value, low, high)
-        if isinstance(field.default, bool):
-            number: float = bool(value)
-        elif isinstance(field.default, int):
-            number = int(value)
-        else:
-            number = float(value)
-        if number != value:
-            raise ValueError(f"{field.name}: {value!r} is not a whole number")
+        number = check_number(field.name, value, low, high)
+        if isinstance(field.default, int):
+            whole = int(number)
+            if whole != value:
+                raise ValueError(f"{field.name}: {value!r} is not a whole number")
+            # A flag as a bool.
+            number = type(field.default)(whole)
         object.__setattr__(self, field.name, number)
+
+    def _check_name(self, field: str, names: tuple[str, ...]) -> None:
+        """Check a name and store it as a plain str, of whatever class it is."""
+        value = getattr(self, field)
+        if not isinstance(value, str) or value not in names:
+            raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}")
+        object.__setattr__(self, field, str(value))
 
     def replace(self, **changes: Any) -> Self:
         """Return the same settings with some fields changed, as `dataclasses.replace`."""
@@ -369,19 +383,19 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
         `sigma` is no number, or `radius` no integer.
     """
     limit = _core.MAX_WEIGHTS - 1
-    _check_is_number("sigma", sigma)
-    if not (sigma > 0 and math.isfinite(sigma)):
+    deviation = _as_float("sigma", sigma)
+    if not 0 < deviation < math.inf:
         raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
     if radius is None:
-        radius = min(math.ceil(3 * sigma), limit)
+        radius = math.ceil(min(3 * deviation, limit))
     try:
         radius = operator.index(radius)
     except TypeError:
         raise TypeError(f"radius: a whole number is needed, not {radius!r}") from None
     if not 0 <= radius <= limit:
         raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
-    distances = [tap / sigma for tap in range(radius + 1)]
-    # Not by **, which raises where a tiny sigma makes a square infinite; its weight is 0.
+    # Products, because a power beyond all floats would raise OverflowError.
+    distances = [tap / deviation for tap in range(radius + 1)]
     weights = [math.exp(-0.5 * distance * distance) for distance in distances]
     total = weights[0] + 2 * sum(weights[1:])
     return tuple(weight / total for weight in weights)

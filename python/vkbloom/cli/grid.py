@@ -241,7 +241,8 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
         distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
-            dashboard_address=None,
+            # None would still serve at Dask's own port, and warn where that is taken.
+            dashboard_address="127.0.0.1:0",
             silence_logs=logging.ERROR,
         ) as cluster,
         distributed.Client(cluster) as client,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,8 @@ __all__ = ["apply", "blur", "gain", "passes"]
 class Settings(CompositeSettings, Protocol):
     """What the reference reads of any settings; each method reads its own fields beside it."""
 
-    @property
-    def method(self) -> str: ...
+    method: ClassVar[str]
+
     @property
     def threshold(self) -> float | None: ...
     @property
