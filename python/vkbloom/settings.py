@@ -186,9 +186,11 @@ class Settings:
     def _check_name(self, field: str, names: tuple[str, ...]) -> None:
         """Check a name and store it as a plain str, of whatever class it is."""
         value = getattr(self, field)
+        # An array compares with a name element by element.
         if not isinstance(value, str) or value not in names:
             raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}")
-        object.__setattr__(self, field, str(value))
+        # Not by str(), which gives an enum's own name.
+        object.__setattr__(self, field, names[names.index(value)])
 
     def replace(self, **changes: Any) -> Self:
         """Return the same settings with some fields changed, as `dataclasses.replace`."""
@@ -204,11 +206,6 @@ class Settings:
         from vkbloom import display  # noqa: PLC0415
 
         return display.settings_html(self)
-
-
-def _is_one_of(value: object, names: Iterable[str]) -> bool:
-    # An array compares with a name element by element.
-    return isinstance(value, str) and value in names
 
 
 def check_size(name: str, size: Any) -> tuple[int, int]:
