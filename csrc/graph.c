@@ -79,6 +79,15 @@ bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
     return pass->depth == image;
 }
 
+bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].blend != VKB_BLEND_NONE && graph->passes[i].depth != image
+            && vkb_pass_writes(&graph->passes[i], image))
+            return true;
+    return false;
+}
+
 enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
 {
     if (pass->geometry != VKB_GEOMETRY_DISPATCH)
@@ -206,7 +215,8 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
 {
     const struct vkb_pass_row *pass = &graph->passes[index];
 
-    if (pass->target_count > VKB_MAX_TARGETS || pass->read_count > VKB_MAX_READS
+    if (pass->target_count > VKB_MAX_TARGETS
+        || pass->read_count > (pass->loads ? VKB_MAX_LOADS : VKB_MAX_READS)
         || pass->constant_count > VKB_MAX_CONSTANTS
         || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
         || (pass->geometry == VKB_GEOMETRY_DISPATCH

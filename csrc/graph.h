@@ -11,14 +11,13 @@
 enum {
     VKB_NAME_SIZE = 32,
     VKB_MAX_READS = GATHERED_LEVELS,
+    // As storage images. With the target one less than the four that every device can bind.
+    VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
     VKB_MAX_CONSTANTS = 7,
 };
 
 #define VKB_NO_IMAGE UINT32_MAX
-
-// No side of an image is longer: so far the whole numbers of sampling.glsl keep to 32 bits.
-enum { VKB_MAX_SIDE = 32768 };
 
 // An image is written by one run of passes that follow each other, or is the input; so what it
 // holds stays right until that run is out of date.
@@ -103,6 +102,9 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 
 bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
+
+// Whether a pass blends what it draws with what the image holds.
+bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image);
 
 // How a pass reads its images.
 enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass);
