@@ -296,6 +296,16 @@ class TestWriteErrors:
         assert names_in(tmp_path) == [file.name]
         assert file.read_text() == "the one before"
 
+    def test_disk_is_full_of_bytes(self, tmp_path: Path) -> None:
+        file = tmp_path / "sheet.png"
+        safe_writing.write_whole(file, b"the one before, and longer")
+        safe_writing.write_whole(file, b"the one before")
+        with small_files_only(), pytest.raises(OSError, match=r"sheet\.png") as caught:
+            safe_writing.write_whole(file, bytes(1 << 20))
+        assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
+        assert names_in(tmp_path) == [file.name]
+        assert file.read_bytes() == b"the one before"
+
     # Without JPEG and WebP, whose writers would end the process or never return.
     @pytest.mark.parametrize("extension", ["exr", "png", "tif", "tga", "bmp"])
     def test_disk_fills_up_during_the_writing(

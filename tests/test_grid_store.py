@@ -107,6 +107,15 @@ class TestWhole:
         assert report.complete
         assert str(report) == f"{POINTS} of {POINTS} points are done"
 
+    @pytest.mark.parametrize("url", ["file://{}/a.zarr", "memory://{}/a.zarr"])
+    def test_in_the_store_of_an_url(self, tmp_path: Path, undisturbed: Path, url: str) -> None:
+        store = url.format(tmp_path)
+        make(store)
+        assert check_grid(store).complete
+        xr.testing.assert_identical(xr.open_zarr(store), xr.open_zarr(undisturbed))
+        if store.startswith("file:"):
+            assert contents(tmp_path / "a.zarr") == contents(undisturbed)
+
     def test_counts_are_of_this_call(self, copy: Path) -> None:
         again = make(copy)
         assert again.attrs["passes_run"] == 0

@@ -34,6 +34,7 @@ __all__ = [
     "put_in_place",
     "reserve",
     "write_error",
+    "write_whole",
 ]
 
 # Formats of OpenImageIO that throw the picture away or print it on the terminal.
@@ -193,6 +194,30 @@ def put_in_place(temporary: Path, file: Path) -> None:
         temporary.replace(file)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(file)) from error
+
+
+def write_whole(file: Path, content: bytes) -> None:
+    """Write a file at once, in place of what is there.
+
+    Parameters
+    ----------
+    file : Path
+    content : bytes
+
+    Raises
+    ------
+    OSError
+        It cannot be written; it names `file`, which is as it was.
+    """
+    temporary = reserve(file, [np.frombuffer(content, np.uint8)])
+    try:
+        # Into the room that is there by now.
+        with temporary.open("r+b") as stream:
+            stream.write(content)
+            stream.truncate()
+        put_in_place(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def _is_readable(oiio: ModuleType, file: Path) -> bool:

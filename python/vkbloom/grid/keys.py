@@ -121,7 +121,12 @@ def open_keys(store: Any) -> Keys:
     if isinstance(store, zarr.abc.store.Store):
         return Keys(store)
     if isinstance(store, str) and "://" in store:
-        return Keys(zarr.storage.FsspecStore.from_url(store))
+        system, path = import_extra("fsspec.core", "grid", "Grids on disk").url_to_fs(store)
+        local = import_extra("fsspec.implementations.local", "grid", "Grids on disk")
+        if not isinstance(system, local.LocalFileSystem):
+            return Keys(zarr.storage.FsspecStore.from_url(store))
+        # A folder of this machine: what is promised of those holds for it, too.
+        store = path
     if isinstance(store, str | os.PathLike):
         return Keys(zarr.storage.LocalStore(Path(store).absolute()))
     raise TypeError(f"store: a folder, an URL or a Zarr store is needed, not {store!r}")
