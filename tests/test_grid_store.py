@@ -662,7 +662,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
     ended = subprocess.run(
         [sys.executable, "-c", code, str(store)], capture_output=True, text=True, check=False
     )
-    assert "OSError: [Errno 27] File too large" in ended.stderr
+    assert f"OSError: [Errno 27] File too large: '{store}/" in ended.stderr
     assert not list(store.rglob("*.partial"))
     assert check_grid(store).done == 0
     assert not check_grid(store).problems

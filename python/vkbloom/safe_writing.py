@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
@@ -92,7 +93,7 @@ def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
         It cannot be made or the disk is full; it names `file`, and nothing is left.
     """
     check_name(file)
-    temporary = file.with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
+    temporary = _meant(file).with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
     try:
         with temporary.open("xb") as stream:
             stream.write(bytes(_LARGEST_HEADER))
@@ -178,20 +179,23 @@ def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
 
 
 def put_in_place(temporary: Path, file: Path) -> None:
-    """Give a temporary file its name, in place of what is there.
+    """Give a temporary file its name, in place of what is there, and the permissions of that.
 
     Parameters
     ----------
     temporary, file : Path
-        In one folder.
+        From `reserve`, and what it was given.
 
     Raises
     ------
     OSError
         It cannot be done, for example because a folder is there; it names `file`.
     """
+    meant = _meant(file)
+    with contextlib.suppress(OSError):
+        shutil.copymode(meant, temporary)
     try:
-        temporary.replace(file)
+        temporary.replace(meant)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(file)) from error
 
@@ -218,6 +222,11 @@ def write_whole(file: Path, content: bytes) -> None:
         put_in_place(temporary, file)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _meant(file: Path) -> Path:
+    """Return the file that a name stands for: links are written through, not replaced."""
+    return Path(os.path.realpath(file))
 
 
 def _is_readable(oiio: ModuleType, file: Path) -> bool:
