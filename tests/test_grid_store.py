@@ -106,6 +106,15 @@ class TestWhole:
         assert report.complete
         assert str(report) == f"{POINTS} of {POINTS} points are done"
 
+    @pytest.mark.parametrize("url", ["file://{}/a.zarr", "memory://{}/a.zarr"])
+    def test_in_the_store_of_an_url(self, tmp_path: Path, undisturbed: Path, url: str) -> None:
+        store = url.format(tmp_path)
+        make(store)
+        assert check_grid(store).complete
+        xr.testing.assert_identical(xr.open_zarr(store), xr.open_zarr(undisturbed))
+        if store.startswith("file:"):
+            assert contents(tmp_path / "a.zarr") == contents(undisturbed)
+
     def test_counts_are_of_this_call(self, copy: Path) -> None:
         again = make(copy)
         assert again.attrs["passes_run"] == 0
@@ -652,7 +661,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
     ended = subprocess.run(
         [sys.executable, "-c", code, str(store)], capture_output=True, text=True, check=False
     )
-    assert "OSError: [Errno 27] File too large" in ended.stderr
+    assert f"OSError: [Errno 27] File too large: '{store}/" in ended.stderr
     assert not list(store.rglob("*.partial"))
     assert check_grid(store).done == 0
     assert not check_grid(store).problems

@@ -175,8 +175,8 @@ class Frames(Mapping[str, NDArray[Any]]):
         ----------
         path : str or path-like
             A file name with an extension that OpenImageIO writes, or a folder. What is
-            already there is replaced. All files are written under temporary names first
-            and renamed when all are complete.
+            already there is replaced, and links are written through. All files are written
+            under temporary names first and renamed when all are complete.
 
         Returns
         -------
