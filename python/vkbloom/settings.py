@@ -191,11 +191,35 @@ class Settings:
         object.__setattr__(self, field, str(value))
 
     def replace(self, **changes: Any) -> Self:
-        """Return the same settings with some fields changed, as `dataclasses.replace`."""
+        """Return the same settings with some fields changed, as `dataclasses.replace`.
+
+        Parameters
+        ----------
+        **changes
+            New values by field.
+
+        Returns
+        -------
+        Settings
+            Of the same method.
+
+        Raises
+        ------
+        ValueError
+            A value is out of its field's range.
+        TypeError
+            There is no such field, or a value has the wrong type.
+        """
         return dataclasses.replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the fields by name, and ``method``; plain values that JSON can hold."""
+        """Return the fields by name, and ``method``.
+
+        Returns
+        -------
+        dict
+            Plain values that JSON can hold, tuples as its lists.
+        """
         return {"method": self.method, **dataclasses.asdict(self)}
 
     def _repr_html_(self) -> str:

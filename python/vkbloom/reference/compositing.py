@@ -57,7 +57,7 @@ def composite(
         uint8 (read as value / 255), float16, float32 or float64.
     bloom : ndarray, shape (H, W, 3) or (H, W, 4), or None
         Of the same types, finite. Not read where ``settings.bloom`` is off.
-    settings : vkbloom.Separable, Pyramid or DualKawase
+    settings : vkbloom.Settings
     dtype : dtype, optional
         Of the final image; the scene's by default. The result is clamped to what it holds.
 

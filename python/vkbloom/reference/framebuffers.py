@@ -74,7 +74,7 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
         uint8 (read as value / 255), float16, float32 or float64. The format of the bloom
         buffers follows from it unless ``settings.format`` names one; that of float64 is
         "rgba32float".
-    settings : vkbloom.Separable, Pyramid or DualKawase
+    settings : vkbloom.Settings
 
     Returns
     -------
@@ -121,7 +121,7 @@ def passes(
         What the bloom buffers begin with, at their size: uint8 (read as value / 255), float16,
         float32 or float64. A fourth channel of four is alpha and comes out as 1; otherwise
         each channel is blurred by itself. NaN and infinity count as 0.
-    settings : vkbloom.Separable, Pyramid or DualKawase
+    settings : vkbloom.Settings
         Those of the blur are used, and `format`.
     size : (int, int), optional
         Width and height of the final image, at whose pixels the last pass is evaluated; by
@@ -187,11 +187,11 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
 
     Parameters
     ----------
-    settings : vkbloom.Separable, Pyramid or DualKawase
+    settings : vkbloom.Settings
         A threshold that they set has its effect: a flat image of 1 passes through it first.
     size : (int, int), optional
         Width and height of the image. Counts with `vkbloom.KinoBloom`, which adds more levels
-        the higher the image is.
+        the higher the image is, and in the eighth digit with `vkbloom.UrpBloom`.
 
     Returns
     -------
