@@ -242,6 +242,14 @@ def check_size(name: str, size: Any) -> tuple[int, int]:
     return whole
 
 
+def check_time(time: Any) -> float:
+    """Return a time of a scene as a float, else raise TypeError or ValueError."""
+    turns = _as_float("time", time)
+    if not math.isfinite(turns):
+        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+    return turns
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Separable(Settings):
     """A blur by a symmetric kernel, vertical then horizontal: the forward and deferred systems'.
