@@ -14,8 +14,11 @@ vec3 composite(vec3 s, vec3 b)
 {
     if (COMPOSITE == COMPOSITE_MIX)
         return s + (b - s) * params.intensity;
-    if (COMPOSITE == COMPOSITE_SCREEN)
-        return 1.0 - (1.0 - clamp(s, 0.0, 1.0)) * (1.0 - clamp(params.intensity * b, 0.0, 1.0));
+    if (COMPOSITE == COMPOSITE_SCREEN) {
+        // 1 - (1 - s)(1 - b) without the differences of ones, in which dark values are lost.
+        s = clamp(s, 0.0, 1.0);
+        return s + (1.0 - s) * clamp(params.intensity * b, 0.0, 1.0);
+    }
     if (COMPOSITE == COMPOSITE_ADD)
         return s + params.intensity * b;
     return s;

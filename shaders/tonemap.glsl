@@ -16,7 +16,9 @@ vec3 tonemap_aces(vec3 c)
 
 vec3 tonemap_exponential(vec3 c)
 {
-    return 1.0 - exp(-c);
+    // Near 0 the first terms of the series: in the difference of two ones dark values are lost.
+    vec3 dark = c * (1.0 - c * (1.0 / 2.0 - c * (1.0 / 6.0 - c * (1.0 / 24.0))));
+    return mix(1.0 - exp(-c), dark, lessThan(abs(c), vec3(1.0 / 32.0)));
 }
 
 // Khronos PBR Neutral tone mapper, specification 1.0.
@@ -25,7 +27,8 @@ vec3 tonemap_khronos_neutral(vec3 c)
     const float F90 = 0.04;
     const float COMPRESSION_START = 0.8 - F90;
     const float DESATURATION = 0.15;
-    float low = min(c.r, min(c.g, c.b));
+    // Below this the result is 1 for long, and the square would overflow.
+    float low = max(min(c.r, min(c.g, c.b)), -1e15);
     float offset = low < 2.0 * F90 ? low - low * low / (4.0 * F90) : F90;
     c -= offset;
     float peak = max(c.r, max(c.g, c.b));

@@ -319,6 +319,30 @@ def test_huge_colours(
     assert_composite_without_bloom(renderer, image, settings)
 
 
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("value", [-1000.0, -65504.0, -1e12, -1e25, -float(np.finfo("f4").max)])
+def test_huge_negative_colours(
+    renderer: Renderer, value: float, tonemap: Any, encoding: Any
+) -> None:
+    image = colours(value, "float32")
+    settings = Separable(bloom=False, tonemap=tonemap, encoding=encoding)
+    assert_composite_without_bloom(renderer, image, settings)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
+def test_dark_colours(renderer: Renderer, composite: Any, tonemap: Any, encoding: Any) -> None:
+    # An encoding spreads the dark, and with it what a difference of two ones has lost there.
+    values = np.geomspace(1e-9, 1e-3, 3 * 120).reshape(1, 120, 3)
+    image = np.random.default_rng(3).permuted(values, axis=1).astype(np.float32)
+    settings = Separable(
+        intensity=0.5, composite=composite, tonemap=tonemap, encoding=encoding, blur_strength=0.3
+    )
+    assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
 @pytest.mark.parametrize("tonemap", TONEMAPS)
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
 def test_huge_exposure(renderer: Renderer, dtype: str, tonemap: Any) -> None:

@@ -14,7 +14,7 @@ from vkbloom import _core, batches, pipeline_cache
 from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
 from vkbloom.frames import Frames
-from vkbloom.settings import Separable, Settings, check_size
+from vkbloom.settings import Separable, Settings, check_size, check_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -575,12 +575,7 @@ def _render_arguments(
     """Return what the core renders, checked."""
     if shading not in SHADINGS:
         raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-    try:
-        finite = math.isfinite(time)
-    except (TypeError, OverflowError):
-        raise TypeError(f"time: a number is needed, not {time!r}") from None
-    if not finite:
-        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+    turns = check_time(time)
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     if not isinstance(scene, Scene):
@@ -592,7 +587,7 @@ def _render_arguments(
         check_size("size", size),
         shading,
         # Whole turns change nothing; without them large times keep their precision.
-        math.fmod(time, 1.0),
+        math.fmod(turns, 1.0),
         scene.glow_intensity,
         _check_attachments(attachments),
     )

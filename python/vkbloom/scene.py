@@ -125,14 +125,14 @@ class Camera:
 
     Parameters
     ----------
-    position
+    position : (float, float, float)
         Translation xyz of the world in view space, in scene units. The camera looks along -z and
         y points down.
-    rotation
+    rotation : (float, float, float)
         Degrees about x, y and z.
-    fov
+    fov : float
         Vertical field of view in degrees, over 0 and under 180.
-    near, far
+        near, far : float
         Distances of the clip planes in scene units, 0 < near < far. They do not cut the sky.
 
     Raises
@@ -174,15 +174,15 @@ class Scene:
 
     Parameters
     ----------
-    body
+    body : Mesh
         The mesh that is lit.
-    glow
+    glow : Mesh or None
         The mesh that glows, or None.
-    skybox
+    skybox : Cubemap or None
         The sky, or None for black.
-    camera
+    camera : Camera
         Where it is seen from.
-    glow_intensity
+    glow_intensity : float
         Factor of the glow mesh's colour as emitted radiance in the deferred system, 0 or more.
 
     Attributes
@@ -261,17 +261,17 @@ class Scene:
 
         Parameters
         ----------
-        base
+        base : str or path-like
             File of the mesh that is lit; see `vkbloom.gltf.load_mesh` for what is read.
-        glow
+        glow : str or path-like, optional
             File of the mesh that glows, or None.
-        skybox
+        skybox : str, path-like, sequence of these, ndarray or Cubemap, optional
             A path to a KTX 1 cubemap or to an equirectangular image, six paths to face images
             (+x, -x, +y, -y, +z, -z), an array ``(6, N, N, C)`` of uint8, float16 or float32 with C
             3 or 4, a Cubemap, or None.
-        glow_intensity
+        glow_intensity : float
             Factor of the glow mesh's colour in the deferred system, 0 or more.
-        camera
+        camera : Camera, optional
             None: ``Camera()``.
 
         Returns
@@ -307,6 +307,19 @@ class Scene:
         """Return a scene that shares everything with this one but the camera.
 
         `dataclasses.replace` does the same for any field.
+
+        Parameters
+        ----------
+        camera : Camera
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        TypeError
+            `camera` is none.
         """
         return dataclasses.replace(self, camera=camera)
 

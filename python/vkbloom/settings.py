@@ -193,11 +193,35 @@ class Settings:
         object.__setattr__(self, field, names[names.index(value)])
 
     def replace(self, **changes: Any) -> Self:
-        """Return the same settings with some fields changed, as `dataclasses.replace`."""
+        """Return the same settings with some fields changed, as `dataclasses.replace`.
+
+        Parameters
+        ----------
+        **changes
+            New values by field.
+
+        Returns
+        -------
+        Settings
+            Of the same method.
+
+        Raises
+        ------
+        ValueError
+            A value is out of its field's range.
+        TypeError
+            There is no such field, or a value has the wrong type.
+        """
         return dataclasses.replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the fields by name, and ``method``; plain values that JSON can hold."""
+        """Return the fields by name, and ``method``.
+
+        Returns
+        -------
+        dict
+            Plain values that JSON can hold, tuples as its lists.
+        """
         return {"method": self.method, **dataclasses.asdict(self)}
 
     def _repr_html_(self) -> str:
@@ -218,6 +242,14 @@ def check_size(name: str, size: Any) -> tuple[int, int]:
     if whole != (width, height) or min(whole) < 1 or max(whole) >= 2**31:
         raise ValueError(f"{name}: {size!r} is out of range, whole numbers from 1 on")
     return whole
+
+
+def check_time(time: Any) -> float:
+    """Return a time of a scene as a float, else raise TypeError or ValueError."""
+    turns = _as_float("time", time)
+    if not math.isfinite(turns):
+        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+    return turns
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.descriptions import described_parameters
-from vkbloom.settings import Settings
+from vkbloom.settings import Settings, check_time
 
 __all__ = ["Axis", "image_axis", "read_axes", "unit_and_description"]
 
@@ -112,16 +112,6 @@ def _sequence(name: str, values: object) -> list[Any]:
     return listed
 
 
-def _time(value: object) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise TypeError(f"time: a number is needed, not {value!r}") from None
-    if not math.isfinite(number):
-        raise ValueError(f"time: {value!r} is out of range, a finite number of turns")
-    return number
-
-
 def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) -> tuple[Axis, ...]:
     """Check the axes that were asked for.
 
@@ -150,7 +140,7 @@ def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) ->
     found: list[Axis] = []
     for name, values in axes.items():
         if name == "time" and has_time:
-            times = tuple(_time(value) for value in _sequence(name, values))
+            times = tuple(check_time(value) for value in _sequence(name, values))
             found.append(Axis(name, times, "time", "turn", _TIME_DESCRIPTION))
             continue
         if name not in fields:

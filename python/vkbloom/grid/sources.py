@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import hashlib
 import itertools
-import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
-from vkbloom.settings import Settings, check_size
+from vkbloom.settings import Settings, check_size, check_time
 
 if TYPE_CHECKING:
     from vkbloom.renderer import Renderer, Shading
@@ -216,11 +215,8 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     if isinstance(source, Scene):
         if shading not in SHADINGS:
             raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-        if not isinstance(time, int | float | np.number):
-            raise TypeError(f"time: a number is needed, not {time!r}")
-        if not math.isfinite(time):
-            raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
-        return SceneSource(source, check_size("size", size or _SCENE_SIZE), shading, float(time))
+        frame = check_size("size", size or _SCENE_SIZE)
+        return SceneSource(source, frame, shading, check_time(time))
     for name, is_given in (
         ("size", size is not None),
         ("shading", shading != "forward"),

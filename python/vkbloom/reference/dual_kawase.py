@@ -1,6 +1,6 @@
 """The dual Kawase blur: five taps down, eight taps up.
 
-From Martin, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
+From Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
 """
 
 from __future__ import annotations

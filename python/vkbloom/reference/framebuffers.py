@@ -192,7 +192,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
         A threshold that they set has its effect: a flat image of 1 passes through it first.
     size : (int, int), optional
         Width and height of the image. Counts with `vkbloom.KinoBloom`, which adds more levels
-        the higher the image is.
+        the higher the image is, and in the eighth digit with `vkbloom.UrpBloom`.
 
     Returns
     -------

@@ -32,7 +32,8 @@ def _aces(rgb: Array) -> Array:
 
 def _exponential(rgb: Array) -> Array:
     """Return 1 - exp(-c)."""
-    return -np.expm1(-rgb)
+    with np.errstate(over="ignore"):
+        return -np.expm1(-rgb)
 
 
 def _khronos_neutral(rgb: Array) -> Array:

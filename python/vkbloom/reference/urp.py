@@ -19,7 +19,7 @@ from .upsampling import combine, flat_gain, linear
 
 __all__ = ["gain", "passes"]
 
-# As printed in the shader; their sum is 1 - 2e-8.
+# As printed in the shader; their sum is 1 - 1e-8.
 _WEIGHTS = (0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622)
 
 
