@@ -33,8 +33,9 @@ struct batch {
     struct vkb_point *points;
     struct held_arrays *held;
     size_t count, point_capacity, held_capacity;
-    size_t size;  // bytes of all arrays
-    bool submitted;
+    size_t size;                // bytes of all arrays
+    bool filling;               // a point is on its way in, while Python's code allocates
+    bool submitted;             // for good
     struct vkb_flight *flight;  // NULL: not in the air
     struct batch_cargo *cargo;  // from the submission on
     struct vkb_specials specials;
@@ -166,6 +167,8 @@ static void release_source(struct batch *self)
 
 static struct batch *new_batch(PyObject *renderer, PyObject *names)
 {
+    if (names != Py_None && !vkb_require_tuple(names, "attachments"))
+        return NULL;
     PyTypeObject *type = (PyTypeObject *)state_of(renderer)->batch_type;
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     struct batch *self = (struct batch *)allocate(type, 0);
@@ -294,11 +297,14 @@ static bool build_graph(const struct batch *self, const struct vkb_settings *set
         && vkb_graph_check(graph, device->max_side, error) && vkb_slots_check(device, graph, error);
 }
 
-static bool require_filling(const struct batch *self)
+// Whether points can be added and the batch submitted; else with an exception set.
+static bool require_fillable(const struct batch *self)
 {
     if (self->submitted)
         PyErr_SetString(PyExc_RuntimeError, "the batch was submitted before");
-    return !self->submitted;
+    else if (self->filling)
+        PyErr_SetString(PyExc_RuntimeError, "a point is being added to the batch");
+    return !self->submitted && !self->filling;
 }
 
 static PyObject *add(PyObject *object, PyObject *arguments)
@@ -310,9 +316,10 @@ static PyObject *add(PyObject *object, PyObject *arguments)
     struct vkb_point point = {0};
     struct held_arrays held = {0};
 
-    if (!require_filling(self)
-        || !PyArg_ParseTuple(arguments, "OO:add", &settings_object, &allocate)
-        || !vkb_read_settings(state_of(object), settings_object, &settings))
+    // Reading settings runs Python's code, so what that may have done is asked after it.
+    if (!PyArg_ParseTuple(arguments, "OO:add", &settings_object, &allocate)
+        || !vkb_read_settings(state_of(object), settings_object, &settings)
+        || !require_fillable(self))
         return NULL;
     if (!vkb_require_open(self->renderer, &error)
         || !vkb_grow(&error, (void **)&self->points, &self->point_capacity, self->count + 1,
@@ -327,7 +334,10 @@ static PyObject *add(PyObject *object, PyObject *arguments)
         vkb_graph_destroy(&point.graph);
         Py_RETURN_FALSE;
     }
-    if (!hold_outputs(self->renderer, &point, &held, self->names, allocate)) {
+    self->filling = true;
+    const bool done = hold_outputs(self->renderer, &point, &held, self->names, allocate);
+    self->filling = false;
+    if (!done) {
         release_point(&point, &held);
         return NULL;
     }
@@ -350,7 +360,7 @@ static PyObject *submit(PyObject *object, PyObject *unused)
     bool done;
 
     (void)unused;
-    if (!require_filling(self))
+    if (!require_fillable(self))
         return NULL;
     if (self->count == 0) {
         PyErr_SetString(PyExc_RuntimeError, "a batch without points cannot be submitted");
@@ -406,22 +416,32 @@ static PyObject *results(const struct batch *self)
     return list;
 }
 
+static PyObject *refuse_to_collect(void)
+{
+    PyErr_SetString(PyExc_RuntimeError, "a batch is collected once, after its submission");
+    return NULL;
+}
+
 static PyObject *collect(PyObject *object, PyObject *unused)
 {
     struct batch *self = (struct batch *)object;
     struct vkb_renderer *renderer = self->renderer;
-    struct vkb_flight *flight = self->flight;
+    struct vkb_flight *flight;
     struct vkb_error error = {0};
     bool done, over = true;
 
     (void)unused;
-    if (!flight) {
-        PyErr_SetString(PyExc_RuntimeError, "a batch is collected once, after its submission");
-        return NULL;
-    }
+    if (!self->flight)
+        return refuse_to_collect();
     if (!vkb_renderer_enter(renderer, &error))
         return vkb_raise(state_of(object), &error);
+    // Another thread may have had it since it was asked for.
+    flight = self->flight;
     self->flight = NULL;
+    if (!flight) {
+        vkb_renderer_leave(renderer);
+        return refuse_to_collect();
+    }
     // A closed renderer has no flights.
     done = renderer->open
              ? vkb_frame_collect(&renderer->device, &renderer->frame, flight, &over, &error)

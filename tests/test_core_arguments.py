@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,77 @@ def test_arrays_of_the_wrong_size(renderer: Renderer) -> None:
         batch.submit()
     with pytest.raises(RuntimeError, match="collected once"):
         batch.collect()
+
+
+def _filled(name: str, shape: tuple[int, ...], dtype: str) -> np.ndarray[Any, Any]:
+    return np.empty(shape, dtype)
+
+
+@pytest.mark.parametrize("names", [["final"], "final", 5], ids=str)
+def test_names_that_are_no_tuple(renderer: Renderer, names: Any) -> None:
+    with pytest.raises(TypeError, match="attachments: a tuple is needed"):
+        renderer._core.apply(np.zeros((4, 4, 3), np.uint8), names)
+
+
+@pytest.mark.parametrize("points", [0, 1, 8])
+def test_a_batch_is_not_filled_from_its_own_allocations(renderer: Renderer, points: int) -> None:
+    """Once the points were written past the end of their memory."""
+    batch = renderer._core.apply(np.zeros((4, 4, 3), np.uint8), None)
+
+    def allocate(name: str, shape: tuple[int, ...], dtype: str) -> np.ndarray[Any, Any]:
+        with pytest.raises(RuntimeError, match="a point is being added"):
+            batch.add(Separable(bloom=False), _filled)
+        with pytest.raises(RuntimeError, match="a point is being added"):
+            batch.submit()
+        return np.empty(shape, dtype)
+
+    for exposure in range(points):
+        batch.add(Separable(exposure=exposure), _filled)
+    batch.add(Separable(), allocate)
+    batch.submit()
+    assert len(batch.collect()) == points + 1
+
+
+def test_settings_that_submit_the_batch(renderer: Renderer) -> None:
+    batch = renderer._core.apply(np.zeros((4, 4, 3), np.uint8), None)
+    batch.add(Separable(), _filled)
+
+    class Given:
+        method = "separable"
+
+        @property
+        def exposure(self) -> float:
+            batch.submit()
+            return 0.0
+
+    with pytest.raises(RuntimeError, match="submitted before"):
+        batch.add(Given(), _filled)
+    assert len(batch.collect()) == 1
+
+
+def test_a_batch_is_collected_by_one_thread(renderer: Renderer) -> None:
+    image = np.random.default_rng(3).random((80, 80, 4), np.float32)
+    # So that all threads wait for the renderer at once: 65 x 65 taps a pixel take a while.
+    slow = Separable(weights=(1 / 65,) * 33, direct=True, blur_scale=0.5)
+
+    def collect(batch: _core.Batch, counts: list[int]) -> None:
+        try:
+            counts.append(len(batch.collect()))
+        except RuntimeError:
+            counts.append(0)
+
+    for exposure in range(2):
+        batch = renderer._core.apply(image, None)
+        batch.add(Separable(exposure=exposure), _filled)
+        batch.submit()
+        counts: list[int] = []
+        threads = [threading.Thread(target=renderer.apply, args=(image + exposure, slow))]
+        threads += [threading.Thread(target=collect, args=(batch, counts)) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert sorted(counts) == [0, 0, 1]
 
 
 def test_scenes(renderer: Renderer, scene: Scene) -> None:
