@@ -3,6 +3,8 @@
 
 #include "params.h"
 
+#include <string.h>
+
 struct vkb_module_state *vkb_module_state(PyObject *module)
 {
     return PyModule_GetState(module);
@@ -23,11 +25,16 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
     if (error->kind == VKB_ERROR_INTERRUPTED)
         return NULL;
     PyObject *type = state->errors[error->kind];
+    // Where a long message is cut, a character may be, too.
+    PyObject *message =
+        PyUnicode_DecodeUTF8(error->message, (Py_ssize_t)strlen(error->message), "replace");
     if (error->kind == VKB_ERROR_VALUE) {
-        PyErr_SetString(type, error->message);
+        if (message)
+            PyErr_SetObject(type, message);
+        Py_XDECREF(message);
         return NULL;
     }
-    PyObject *exception = PyObject_CallFunction(type, "s", error->message);
+    PyObject *exception = message ? PyObject_CallFunctionObjArgs(type, message, NULL) : NULL;
     const bool from_vulkan = error->call[0] != '\0';
     if (exception
         && set_steal(exception, "vk_call",
@@ -36,6 +43,7 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
                      from_vulkan ? PyLong_FromLong(error->result) : Py_NewRef(Py_None)))
         PyErr_SetObject(type, exception);
     Py_XDECREF(exception);
+    Py_XDECREF(message);
     return NULL;
 }
 

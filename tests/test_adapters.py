@@ -115,6 +115,19 @@ def test_a_name_is_text_and_no_format() -> None:
         Renderer("lav\0apipe")
 
 
+@pytest.mark.parametrize("start", ["", "x"])
+def test_a_message_is_cut_between_or_in_characters(
+    monkeypatch: pytest.MonkeyPatch, start: str
+) -> None:
+    name = start + "\xe9" * 2000
+    with pytest.raises(AdapterNotFoundError, match=r"no Vulkan adapter for .*\xe9\xe9"):
+        Renderer(name)
+    monkeypatch.setenv("VKBLOOM_FORM", name)
+    with pytest.raises(ValueError, match=r"VKBLOOM_FORM: .*\xe9\xe9") as caught:
+        Renderer("software")
+    assert type(caught.value) is ValueError
+
+
 @pytest.mark.parametrize("adapter", [None, 0, b"software", ["software"]])
 def test_an_adapter_is_a_name(adapter: Any) -> None:
     with pytest.raises(TypeError, match=r"^adapter: "):
