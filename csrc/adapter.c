@@ -159,7 +159,7 @@ bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct 
     if (!validation)
         return true;
 
-    // Taken per instance, as below, and named as errors are to name it.
+    // Taken per instance, as below, and named as errors are to name it: it hides volk's global.
     PFN_vkCreateDebugUtilsMessengerEXT vkCreateDebugUtilsMessengerEXT =
         (PFN_vkCreateDebugUtilsMessengerEXT)vkGetInstanceProcAddr(instance->handle,
                                                                   "vkCreateDebugUtilsMessengerEXT");

@@ -1,4 +1,4 @@
-// What the user asked for, in C: filled by renderer.c, read by methods.c.
+// What the user asked for, in C: filled by arguments.c, read by what makes rows.
 #ifndef VKB_SETTINGS_H
 #define VKB_SETTINGS_H
 
