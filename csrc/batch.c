@@ -322,10 +322,9 @@ static PyObject *add(PyObject *object, PyObject *arguments)
         || !require_fillable(self))
         return NULL;
     if (!vkb_require_open(self->renderer, &error)
-        || !vkb_grow(&error, (void **)&self->points, &self->point_capacity, self->count + 1,
+        || !vkb_grow(&error, &self->points, &self->point_capacity, self->count + 1,
                      sizeof *self->points)
-        || !vkb_grow(&error, (void **)&self->held, &self->held_capacity, self->count + 1,
-                     sizeof *self->held)
+        || !vkb_grow(&error, &self->held, &self->held_capacity, self->count + 1, sizeof *self->held)
         || !build_graph(self, &settings, &point.graph, &error)) {
         vkb_graph_destroy(&point.graph);
         return vkb_raise(state_of(object), &error);

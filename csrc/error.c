@@ -119,19 +119,22 @@ void *vkb_alloc(struct vkb_error *error, size_t count, size_t size)
     return memory;
 }
 
-bool vkb_grow(struct vkb_error *error, void **array, size_t *capacity, size_t needed, size_t size)
+bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t needed, size_t size)
 {
     if (needed <= *capacity)
         return true;
 
     size_t grown = *capacity ? *capacity : 8;
+    void *before;
+    // Byte by byte, for the caller's pointer is none to void.
+    memcpy(&before, array, sizeof before);
     while (grown < needed)
         grown *= 2;
-    void *memory = grown > SIZE_MAX / size || REFUSED() ? NULL : realloc(*array, grown * size);
+    void *memory = grown > SIZE_MAX / size || REFUSED() ? NULL : realloc(before, grown * size);
     if (!memory)
         return fail_memory(error, grown, size);
-    COUNT_BLOCKS(*array == NULL);
-    *array = memory;
+    COUNT_BLOCKS(before == NULL);
+    memcpy(array, &memory, sizeof memory);
     *capacity = grown;
     return true;
 }

@@ -52,7 +52,8 @@ bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text);
 // none.
 void *vkb_alloc(struct vkb_error *error, size_t count, size_t size);
 // Grows an array to at least `needed` objects of `size` bytes; keeps it as it was on failure.
-bool vkb_grow(struct vkb_error *error, void **array, size_t *capacity, size_t needed, size_t size);
+// `array` is where the pointer to the first one lies, of whatever type.
+bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t needed, size_t size);
 void vkb_free(void *memory);
 
 #endif

@@ -37,7 +37,7 @@ static struct vkb_flight *add_flight(struct vkb_flights *flights, struct vkb_err
 {
     struct vkb_flight *flight;
 
-    if (!vkb_grow(error, (void **)&flights->flights, &flights->capacity, flights->count + 1,
+    if (!vkb_grow(error, &flights->flights, &flights->capacity, flights->count + 1,
                   sizeof(struct vkb_flight *))
         || !(flight = vkb_alloc(error, 1, sizeof *flight)))
         return NULL;

@@ -25,7 +25,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 
 static bool append(struct vkb_run *run, const void *bytes, size_t size, struct vkb_error *error)
 {
-    if (!vkb_grow(error, (void **)&run->recipe, &run->recipe_capacity, run->recipe_size + size, 1))
+    if (!vkb_grow(error, &run->recipe, &run->recipe_capacity, run->recipe_size + size, 1))
         return false;
     memcpy(run->recipe + run->recipe_size, bytes, size);
     run->recipe_size += size;
@@ -262,7 +262,7 @@ static bool keep_previous(struct vkb_run *run, struct vkb_error *error)
     struct vkb_graph *graph = &previous->graph;
 
     graph->pass_count = 0;
-    if (!vkb_grow(error, (void **)&graph->passes, &graph->pass_capacity, run->graph->pass_count,
+    if (!vkb_grow(error, &graph->passes, &graph->pass_capacity, run->graph->pass_count,
                   sizeof *graph->passes))
         return false;
     memcpy(graph->passes, run->graph->passes, run->graph->pass_count * sizeof *graph->passes);

@@ -12,7 +12,7 @@ void vkb_graph_destroy(struct vkb_graph *graph)
 bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *row, uint32_t *index,
                          struct vkb_error *error)
 {
-    if (!vkb_grow(error, (void **)&graph->images, &graph->image_capacity, graph->image_count + 1,
+    if (!vkb_grow(error, &graph->images, &graph->image_capacity, graph->image_count + 1,
                   sizeof *graph->images))
         return false;
     graph->images[graph->image_count] = *row;
@@ -25,7 +25,7 @@ bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *ro
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error)
 {
-    if (!vkb_grow(error, (void **)&graph->passes, &graph->pass_capacity, graph->pass_count + 1,
+    if (!vkb_grow(error, &graph->passes, &graph->pass_capacity, graph->pass_count + 1,
                   sizeof *graph->passes))
         return false;
     // Rows are compared byte by byte to find what is out of date, so padding is copied too.

@@ -295,7 +295,7 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
             *render_pass = pipelines->render_passes[i].handle;
             return true;
         }
-    if (!vkb_grow(error, (void **)&pipelines->render_passes, &pipelines->render_pass_capacity,
+    if (!vkb_grow(error, &pipelines->render_passes, &pipelines->render_pass_capacity,
                   pipelines->render_pass_count + 1, sizeof *pipelines->render_passes)
         || !create_render_pass(device, &key, render_pass, error))
         return false;
@@ -506,7 +506,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
             *pipeline = pipelines->entries[i].handle;
             return true;
         }
-    if (!vkb_grow(error, (void **)&pipelines->entries, &pipelines->entry_capacity,
+    if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
                   pipelines->entry_count + 1, sizeof *pipelines->entries)
         || !create_pipeline(device, pipelines, pass, render_pass, pipeline, error))
         return false;

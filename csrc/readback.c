@@ -54,7 +54,7 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     output->imported = VK_NULL_HANDLE;
     const size_t size = output->pixels * vkb_pixel_size(format);
     if (size >= VKB_IMPORTED_BYTES) {
-        if (!vkb_grow(error, (void **)&readback->imports, &readback->import_capacity,
+        if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
                       readback->import_count + 1, sizeof *readback->imports))
             return false;
         if (import(device, readback, size, output))
@@ -109,10 +109,10 @@ static inline void drop_alpha(unsigned char *to, const unsigned char *from, size
 void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
 {
     const struct vkb_format_info *format = &vkb_formats[output->format];
-    const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
 
     if (output->imported)
         return;
+    const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
     if (output->channels == format->channels) {
         memcpy(output->memory, from, output->pixels * vkb_pixel_size(output->format));
         return;

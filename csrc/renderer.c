@@ -121,7 +121,7 @@ static bool create(struct vkb_renderer *self, const char *adapter, bool validati
                    const char *forms, PyObject *read_cache, struct vkb_error *error)
 {
     bool done;
-    const void *data = NULL;
+    char *data = NULL;
     Py_ssize_t size = 0;
 
     Py_BEGIN_ALLOW_THREADS
@@ -137,7 +137,7 @@ static bool create(struct vkb_renderer *self, const char *adapter, bool validati
     }
     PyObject *cache = PyObject_CallFunction(read_cache, "y#", self->device.adapter.driver_uuid,
                                             (Py_ssize_t)VK_UUID_SIZE);
-    if (cache && cache != Py_None && PyBytes_AsStringAndSize(cache, (char **)&data, &size) < 0)
+    if (cache && cache != Py_None && PyBytes_AsStringAndSize(cache, &data, &size) < 0)
         Py_CLEAR(cache);
     if (!cache) {
         vkb_device_destroy(&self->device);

@@ -107,7 +107,7 @@ static struct vkb_slot *add_slot(struct vkb_slots *slots, const char *name, stru
 {
     struct vkb_slot *slot;
 
-    if (!vkb_grow(error, (void **)&slots->slots, &slots->capacity, slots->count + 1,
+    if (!vkb_grow(error, &slots->slots, &slots->capacity, slots->count + 1,
                   sizeof(struct vkb_slot *))
         || !(slot = vkb_alloc(error, 1, sizeof *slot)))
         return NULL;
@@ -174,7 +174,7 @@ bool vkb_slot_begin_writing(struct vkb_slots *slots, struct vkb_slot *slot, cons
 {
     slot->valid = false;
     slot->version = ++slots->clock;
-    if (!vkb_grow(error, (void **)&slot->recipe, &slot->recipe_capacity, size, 1))
+    if (!vkb_grow(error, &slot->recipe, &slot->recipe_capacity, size, 1))
         return false;
     if (size)
         memcpy(slot->recipe, recipe, size);
@@ -201,7 +201,7 @@ bool vkb_slots_framebuffer(const struct vkb_device *device, struct vkb_slots *sl
             *framebuffer = slots->framebuffers[i].handle;
             return true;
         }
-    if (!vkb_grow(error, (void **)&slots->framebuffers, &slots->framebuffer_capacity,
+    if (!vkb_grow(error, &slots->framebuffers, &slots->framebuffer_capacity,
                   slots->framebuffer_count + 1, sizeof *slots->framebuffers)
         || !VK(error, device->vk.vkCreateFramebuffer(
                           device->handle,

@@ -163,9 +163,8 @@ static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
     const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
 
     vkb_upload_forget(upload);
-    if (!vkb_grow(error, (void **)&upload->rows, &upload->row_capacity, input->height,
-                  sizeof *upload->rows)
-        || !vkb_grow(error, (void **)&upload->packed, &upload->packed_capacity, row_size, 1))
+    if (!vkb_grow(error, &upload->rows, &upload->row_capacity, input->height, sizeof *upload->rows)
+        || !vkb_grow(error, &upload->packed, &upload->packed_capacity, row_size, 1))
         return false;
     // Cached memory: it is compared with the next image.
     if (!image->mapped
