@@ -98,9 +98,8 @@ static bool validation_available(void)
     return false;
 }
 
-bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct vkb_error *error)
+static bool check_loader(bool validation, struct vkb_error *error)
 {
-    *instance = (struct vkb_instance){.validation = validation};
     if (!open_loader(error))
         return false;
     if (vkEnumerateInstanceVersion == NULL)
@@ -113,18 +112,18 @@ bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct 
                         "validation was asked for, but %s is not installed. "
                         "On Debian or Ubuntu: apt install vulkan-validationlayers",
                         VALIDATION_LAYER);
+    return true;
+}
 
-    VkDebugUtilsMessengerCreateInfoEXT messenger = {
-        .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
-        .messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT
-                         | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
-        .messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
-        .pfnUserCallback = on_message,
-        .pUserData = instance,
-    };
+// The messenger hears what the instance's own creation and end lead to as well.
+static bool create_handle(struct vkb_instance *instance,
+                          const VkDebugUtilsMessengerCreateInfoEXT *messenger,
+                          struct vkb_error *error)
+{
+    const bool validation = instance->validation;
     VkValidationFeaturesEXT features = {
         .sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT,
-        .pNext = &messenger,
+        .pNext = messenger,
         .enabledValidationFeatureCount = 1,
         .pEnabledValidationFeatures =
             (VkValidationFeatureEnableEXT[]){
@@ -153,7 +152,22 @@ bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct 
         snprintf(error->call, sizeof error->call, "vkCreateInstance");
         return false;
     }
-    if (!vkb_check(error, result, "vkCreateInstance"))
+    return vkb_check(error, result, "vkCreateInstance");
+}
+
+bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct vkb_error *error)
+{
+    const VkDebugUtilsMessengerCreateInfoEXT messenger = {
+        .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
+        .messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT
+                         | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
+        .messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
+        .pfnUserCallback = on_message,
+        .pUserData = instance,
+    };
+
+    *instance = (struct vkb_instance){.validation = validation};
+    if (!check_loader(validation, error) || !create_handle(instance, &messenger, error))
         return false;
     load_functions(instance->handle);
     if (!validation)

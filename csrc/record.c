@@ -39,30 +39,16 @@ static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct 
     };
 }
 
-// A descriptor set with the pass's parameters, which lie at that offset, and what it reads.
-static bool bind_descriptors(struct vkb_run *run, const struct vkb_pass_row *pass,
-                             VkDeviceSize params_offset, const struct vkb_surface *surface,
-                             struct vkb_error *error)
+// Fills the set with the pass's parameters, which lie at that offset, what it reads, and the target
+// of a dispatch.
+static void write_descriptors(const struct vkb_run *run, const struct vkb_pass_row *pass,
+                              VkDeviceSize params_offset, const struct vkb_surface *surface,
+                              VkDescriptorSet set)
 {
-    const struct VolkDeviceTable *vk = &run->device->vk;
-    const struct vkb_pipelines *pipelines = &run->frame->pipelines;
-    const VkDescriptorSetLayout layout = vkb_pipelines_set_layout(pipelines, pass);
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
     VkDescriptorImageInfo images[VKB_MAX_READS + 1];
     VkWriteDescriptorSet writes[VKB_MAX_READS + 2];
     uint32_t write_count = 0;
-    VkDescriptorSet set;
-
-    if (!VK(error, vk->vkAllocateDescriptorSets(
-                       run->device->handle,
-                       &(VkDescriptorSetAllocateInfo){
-                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                           .descriptorPool = run->flight->descriptors,
-                           .descriptorSetCount = 1,
-                           .pSetLayouts = &layout,
-                       },
-                       &set)))
-        return false;
     VkDescriptorBufferInfo params = {
         .buffer = run->flight->uniforms.handle,
         .offset = params_offset,
@@ -104,7 +90,29 @@ static bool bind_descriptors(struct vkb_run *run, const struct vkb_pass_row *pas
             .pImageInfo = &images[image_count],
         };
     }
-    vk->vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
+    run->device->vk.vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
+}
+
+static bool bind_descriptors(struct vkb_run *run, const struct vkb_pass_row *pass,
+                             VkDeviceSize params_offset, const struct vkb_surface *surface,
+                             struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &run->device->vk;
+    const struct vkb_pipelines *pipelines = &run->frame->pipelines;
+    const VkDescriptorSetLayout layout = vkb_pipelines_set_layout(pipelines, pass);
+    VkDescriptorSet set;
+
+    if (!VK(error, vk->vkAllocateDescriptorSets(
+                       run->device->handle,
+                       &(VkDescriptorSetAllocateInfo){
+                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
+                           .descriptorPool = run->flight->descriptors,
+                           .descriptorSetCount = 1,
+                           .pSetLayouts = &layout,
+                       },
+                       &set)))
+        return false;
+    write_descriptors(run, pass, params_offset, surface, set);
     vk->vkCmdBindDescriptorSets(run->flight->commands.buffer, vkb_pass_bind_point(pass),
                                 vkb_pipelines_layout(pipelines, pass), 0, 1, &set, 0, NULL);
     return true;
