@@ -18,6 +18,19 @@ static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, cons
     return NULL;
 }
 
+// How many of those sizes the array holds; false with an exception set where 32 bits do not.
+static bool count_elements(const Py_buffer *view, size_t size, const char *what, uint32_t *number)
+{
+    const size_t found = (size_t)view->len / size;
+
+    *number = (uint32_t)found;
+    if (found <= UINT32_MAX)
+        return true;
+    PyErr_Format(PyExc_ValueError, "scene: %zu %s are out of range, %u at the most", found, what,
+                 UINT32_MAX);
+    return false;
+}
+
 // As vkb_alloc, with the exception set.
 static void *allocate(size_t count, size_t size)
 {
@@ -91,14 +104,11 @@ static bool read_mesh(struct vkb_held_scene *scene, PyObject *tuple, struct vkb_
     if (!index_view)
         return false;
 
-    *mesh = (struct vkb_mesh_data){
-        .vertices = vertex_view->buf,
-        .indices = index_view->buf,
-        .vertex_count =
-            (uint32_t)((size_t)vertex_view->len / (VKB_GIVEN_FLOATS * sizeof *mesh->vertices)),
-        .index_count = (uint32_t)((size_t)index_view->len / sizeof *mesh->indices),
-    };
-    if (!read_rows(scene, emission, "emission", 3, mesh, &mesh->emission)
+    *mesh = (struct vkb_mesh_data){.vertices = vertex_view->buf, .indices = index_view->buf};
+    if (!count_elements(vertex_view, VKB_GIVEN_FLOATS * sizeof *mesh->vertices, "vertices",
+                        &mesh->vertex_count)
+        || !count_elements(index_view, sizeof *mesh->indices, "indices", &mesh->index_count)
+        || !read_rows(scene, emission, "emission", 3, mesh, &mesh->emission)
         || !read_rows(scene, texcoords, "texcoords", VKB_TEXCOORDS, mesh, &mesh->texcoords)
         || !read_surfaces(surfaces, scene->data.texture_count, mesh))
         return false;

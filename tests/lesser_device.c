@@ -100,9 +100,12 @@ static void change_properties(VkPhysicalDeviceProperties *properties)
 {
     if (lacks("limits"))
         lower_limits(&properties->limits);
-    // Less than any device may have: the validation layer must object.
+    // Less than any device may have: to the first the validation layer must object, the second is
+    // for a mesh of few vertices.
     if (lacks("bindings"))
         properties->limits.maxPerStageDescriptorStorageImages = 0;
+    if (lacks("indices"))
+        properties->limits.maxDrawIndexedIndexValue = 9;
     if (lacks("wide"))
         lower(&properties->limits.maxImageDimension2D, 5000);
     if (lacks("high"))

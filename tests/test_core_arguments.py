@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -186,6 +187,15 @@ def test_scenes(renderer: Renderer, scene: Scene) -> None:
     for given in wrong:
         with pytest.raises((TypeError, ValueError)):
             renderer._core.render(given, *rest)
+
+
+def test_more_indices_than_32_bits_count(renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
+    arrays, *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+    serial, body, glow, sky, textures = arrays
+    # A file of a hole takes no room. In 32 bits there would be three indices.
+    indices = np.memmap(tmp_path / "indices", np.uint32, "w+", shape=(2**32 + 3,))
+    with pytest.raises(ValueError, match="scene: 4294967299 indices are out of range"):
+        renderer._core.render((serial, (body[0], indices, *body[2:]), glow, sky, textures), *rest)
 
 
 def test_a_renderer_takes_no_keywords() -> None:

@@ -141,6 +141,16 @@ def test_no_depth(layer: Path, name: str) -> None:
         )
 
 
+def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
+    done = run(layer, name, "indices")
+    assert done.returncode == 0, done.stderr
+    wrong: dict[str, str] = json.loads(done.stdout)["wrong"]
+    words = r"^ValueError: scene: index \d+ is beyond this adapter's limit of 9$"
+    assert re.search(words, wrong["whole forward"])
+    assert re.search(words, wrong["whole deferred"])
+    assert "whole uint8" not in wrong
+
+
 def test_a_form_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
     done = run(layer, name, "storage", VKBLOOM_FORM="tiles")
     assert "ValueError: VKBLOOM_FORM: tiles is not one of auto" in done.stderr
