@@ -70,7 +70,8 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     memset(&row.constants, 0, sizeof row.constants);
     memset(&row.params, 0, sizeof row.params);
     vkb_make_dispatch(&row, line_shaders[graph->images[blur->reads[0]].format],
-                      vertical ? 8 : 8 * LINE_OUTPUTS, vertical ? LINE_OUTPUTS : 1);
+                      vertical ? ROW_INVOCATIONS : ROW_INVOCATIONS * LINE_OUTPUTS,
+                      vertical ? LINE_OUTPUTS : 1);
     row.loads = true;
     row.targets[0] = target;
     row.constants[0] = blur->constants[0];
@@ -250,7 +251,7 @@ bool vkb_add_strips(const struct vkb_form_choice *choice, const struct vkb_pass_
         return true;
     struct vkb_pass_row row = whole_row(&choice->plain, &chain);
     vkb_make_dispatch(&row, strip_shaders[choice->plain.images[pass->reads[0]].format],
-                      8 * STRIP_COLUMNS, STRIP_ROWS);
+                      ROW_INVOCATIONS * STRIP_COLUMNS, STRIP_ROWS);
     row.loads = true;
     return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);

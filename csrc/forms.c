@@ -89,7 +89,7 @@ static bool brightens(const struct vkb_pass_row *pass)
 // A pass that needs the texels at each pixel's own place alone, by a shader that loads them.
 static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t constants)
 {
-    vkb_make_dispatch(row, shader, 8 * TEXEL_COLUMNS, TEXEL_ROWS);
+    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * TEXEL_COLUMNS, TEXEL_ROWS);
     row->loads = true;
     memset(&row->constants[constants], 0,
            (VKB_MAX_CONSTANTS - constants) * sizeof row->constants[0]);
@@ -104,7 +104,8 @@ bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
 
     memcpy(&row, pass, sizeof row);
     if (forms == VKB_FORMS_GPU)
-        vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, 8, 8);
+        vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
+                          PIXEL_INVOCATIONS);
     else if (blends(graph, pass))
         load_texels(&row, blend_shaders[format], 4);
     else if (brightens(pass))

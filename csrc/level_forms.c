@@ -18,7 +18,7 @@ static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t sma
 static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
                            uint32_t rows)
 {
-    vkb_make_dispatch(row, shader, 8 * columns, rows);
+    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
     row->loads = true;
     memset(row->constants, 0, sizeof row->constants);
     row->constant_count = 0;
@@ -133,7 +133,7 @@ bool vkb_add_doubled_final(const struct vkb_form_choice *choice, const struct vk
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
     vkb_make_dispatch(&row, double_final_shaders[plain->images[up->reads[0]].format],
-                      8 * DOUBLE_COLUMNS, DOUBLE_ROWS);
+                      ROW_INVOCATIONS * DOUBLE_COLUMNS, DOUBLE_ROWS);
     row.loads = true;
     row.alternative = true;
     row.reads[0] = up->reads[0];

@@ -8,7 +8,7 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "storage.glsl"
 #include "composite.glsl"
 
-layout(local_size_x = 8) in;
+layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D scene;
 layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D bloom;
 layout(set = 0, binding = 3) uniform writeonly image2D target;

@@ -11,7 +11,7 @@ UNIFORM_BLOCK(EXTRACT_BLOCK);
 
 layout(constant_id = 0) const int THRESHOLD_MODE = 0;
 
-layout(local_size_x = 8) in;
+layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
 layout(set = 0, binding = 2) uniform writeonly image2D target;
 

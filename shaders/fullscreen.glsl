@@ -6,7 +6,7 @@ vec4 shade();
 
 #ifdef DISPATCH
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 #define PIXEL ivec2(gl_GlobalInvocationID.xy)

@@ -162,6 +162,11 @@
 #define MAX_WEIGHTS 65
 #define MAX_LAYERS 8
 
+// Invocations of a workgroup: in a row, of shaders that write several pixels each; a side, of those
+// that write one.
+#define ROW_INVOCATIONS 8
+#define PIXEL_INVOCATIONS 8
+
 // Kernels on whole texels, w0.. in vec4s: the longest half-kernel of a line, and of the whole bloom
 // in one pass. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
 #define LINE_RADIUS 64

@@ -4,7 +4,7 @@
 // strip, with the vertical sums of the rows to come in registers.
 #include "whole.glsl"
 
-layout(local_size_x = 8) in;
+layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
 layout(set = 0, binding = 2) uniform writeonly image2D target;
 
