@@ -1,5 +1,6 @@
 // What the files that speak Python share: module.c, renderer.c, batch.c, array_memory.c,
-// arguments.c, scene_arguments.c, describe.c. The only header of the core that includes Python.h.
+// arguments.c, scene_arguments.c, describe.c, and faults.c in test builds. The only header of the
+// core that includes Python.h.
 #ifndef VKB_MODULE_H
 #define VKB_MODULE_H
 
