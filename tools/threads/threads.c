@@ -219,9 +219,8 @@ static bool build_graph(const struct job *job, const struct vkb_settings *settin
                          : vkb_build_scene(job->source == SOURCE_FORWARD ? "forward" : "deferred",
                                            settings, &scene, graph, error);
 
-    return built
-        && vkb_forms_choose(job->renderer->forms, &job->renderer->device.limits, graph, error)
-        && vkb_graph_check(graph, job->renderer->device.limits.maxFramebufferWidth, error);
+    return built && vkb_forms_choose(job->renderer->forms, &job->renderer->device, graph, error)
+        && vkb_graph_check(graph, job->renderer->device.max_side, error);
 }
 
 // The final picture of a point, in the renderer's pages where it is large. With the GIL.
