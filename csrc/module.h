@@ -58,7 +58,8 @@ bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *err
 
 // Takes the renderer's lock and gives the GIL back, and the other way round. Waiting for the lock
 // can be interrupted by a signal; then, and where a signal's handler asks for what the thread that
-// it interrupted has, the first one fails, with the GIL. What is adrift and over is given up.
+// it interrupted has, the first one fails, with the GIL. The second one gives up what is adrift and
+// over.
 bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
 void vkb_renderer_leave(struct vkb_renderer *renderer);
 

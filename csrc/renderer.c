@@ -59,8 +59,8 @@ static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
     return true;
 }
 
-// With the lock and the GIL.
-static void release_adrift(struct vkb_renderer *self)
+// Takes out of what is adrift what is over. With the lock and the GIL, or without a device.
+static struct vkb_cargo *take_over(struct vkb_renderer *self)
 {
     struct vkb_cargo **link = &self->adrift, *over = NULL;
 
@@ -76,12 +76,24 @@ static void release_adrift(struct vkb_renderer *self)
         cargo->next = over;
         over = cargo;
     }
-    // Releasing runs Python's code, which may set more adrift.
+    return over;
+}
+
+// With the GIL, without the lock: it runs Python's code, which may wait for another thread that
+// waits for the renderer. An exception that is set stays.
+static void release_all(struct vkb_cargo *over)
+{
+    PyObject *type, *value, *traceback;
+
+    if (!over)
+        return;
+    PyErr_Fetch(&type, &value, &traceback);
     while (over) {
         struct vkb_cargo *next = over->next;
         over->release(over);
         over = next;
     }
+    PyErr_Restore(type, value, traceback);
 }
 
 void vkb_renderer_set_adrift(struct vkb_renderer *self, struct vkb_cargo *cargo)
@@ -101,7 +113,6 @@ bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
     if (!acquire_lock(self, error))
         return false;
     self->holder = PyThread_get_thread_ident();
-    release_adrift(self);
     self->thread = PyEval_SaveThread();
     return true;
 }
@@ -111,8 +122,10 @@ void vkb_renderer_leave(struct vkb_renderer *self)
     PyEval_RestoreThread(self->thread);
     if (self->open)
         self->pipeline_count = self->frame.pipelines.entry_count;
+    struct vkb_cargo *over = take_over(self);
     self->holder = 0;
     PyThread_release_lock(self->lock);
+    release_all(over);
 }
 
 // create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
@@ -237,7 +250,7 @@ static void dealloc(PyObject *object)
     // still use: what is adrift, and this object, to which the messenger brings its messages.
     if (self->device.handle)
         return;
-    release_adrift(self);
+    release_all(take_over(self));
     Py_CLEAR(self->array_context);
     Py_CLEAR(self->array_memory);
     if (self->lock)
@@ -278,8 +291,6 @@ static PyObject *close_renderer(PyObject *object, PyObject *unused)
     if (done)
         done = destroy(self, &error);
     vkb_renderer_leave(self);
-    if (!self->open && !self->device.handle)
-        release_adrift(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
 }
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -125,6 +126,34 @@ def test_an_interrupted_frame_keeps_its_arrays(
     again = renderer.apply(image, LONG, attachments="final")["final"]
     np.testing.assert_array_equal(again, expected)
     assert not any(other.any() for other in others)
+
+
+@UNIX
+def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
+    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], large: NDArray[np.float32]
+) -> None:
+    """Once the array of an interrupted call was given up with the renderer's lock held."""
+    renderer = new_renderer()
+    renderer.apply(noise(8), LONG)
+    finished: list[bool] = []
+
+    def use_elsewhere() -> None:
+        thread = threading.Thread(target=renderer.apply, args=(noise(8), SHORT), daemon=True)
+        thread.start()
+        thread.join(20.0)
+        finished.append(not thread.is_alive())
+
+    array = np.zeros_like(large)
+    weakref.finalize(array, use_elsewhere)
+    alarm(0.1)
+    with pytest.raises(Alarm):
+        renderer.apply(large, LONG, attachments="final", out={"final": array})
+    del array
+    gc.collect()
+    assert not finished
+    # The next flight waits for the one that nobody wants any more, which is over then.
+    renderer.apply(noise(9), SHORT)
+    assert finished == [True]
 
 
 @UNIX
