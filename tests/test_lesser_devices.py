@@ -79,11 +79,12 @@ def name() -> str:
 def run(
     layer: Path, name: str, lesser: str, **environment: str
 ) -> subprocess.CompletedProcess[str]:
+    folders = (os.environ.get("VK_LAYER_PATH"), *EXPLICIT_LAYERS)
     return subprocess.run(
         [sys.executable, str(TESTS / "lesser_work.py")],
         env={
             **os.environ,
-            "VK_LAYER_PATH": os.pathsep.join((*EXPLICIT_LAYERS, str(layer))),
+            "VK_LAYER_PATH": os.pathsep.join(filter(None, (*folders, str(layer)))),
             "VK_INSTANCE_LAYERS": os.pathsep.join(
                 ("VK_LAYER_KHRONOS_validation", "VK_LAYER_VKBLOOM_lesser_device")
             ),

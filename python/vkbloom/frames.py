@@ -40,7 +40,8 @@ class Frames(Mapping[str, NDArray[Any]]):
         Images of shape (H, W, 3) or (H, W, 4) and dtype uint8, float16 or float32; depth of
         shape (H, W) and dtype float32. Top row first. They are kept, not copied.
     timings : mapping of str to float
-        Seconds on the device by pass name, for the passes that ran.
+        Seconds on the device by pass name, for the passes that ran; NaN where the device's queue
+        has no timestamps.
     settings : Settings
         What the frames were made with.
     info : mapping of str to object
@@ -69,7 +70,10 @@ class Frames(Mapping[str, NDArray[Any]]):
 
     @property
     def timings(self) -> Mapping[str, float]:
-        """Seconds on the device by pass name, for the passes that ran; read-only."""
+        """Seconds on the device by pass name, for the passes that ran; read-only.
+
+        NaN where the device's queue has no timestamps.
+        """
         return MappingProxyType(self._timings)
 
     @property
