@@ -69,8 +69,9 @@ static bool check_format(const struct vkb_device *device, const struct vkb_graph
     if (vkb_graph_blends(graph, image)
         && !vkb_device_supports(device, format, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT))
         return vkb_fail(error, VKB_ERROR_GENERAL,
-                        "the adapter %s cannot add up layers in %s images", device->adapter.name,
-                        vkb_formats[format].name);
+                        "the adapter %s cannot add up layers in %s images, but in %s it can",
+                        device->adapter.name, vkb_formats[format].name,
+                        vkb_formats[VKB_FORMAT_RGBA16_FLOAT].name);
     return true;
 }
 
