@@ -78,12 +78,15 @@ def name() -> str:
         return renderer.info.name
 
 
+WORK = (str(TESTS / "lesser_work.py"),)
+
+
 def run(
-    layer: Path, name: str, lesser: str, **environment: str
+    layer: Path, name: str, lesser: str, program: tuple[str, ...] = WORK, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     folders = (os.environ.get("VK_LAYER_PATH"), *EXPLICIT_LAYERS)
     return subprocess.run(
-        [sys.executable, str(TESTS / "lesser_work.py")],
+        [sys.executable, *program],
         env={
             **os.environ,
             "VK_LAYER_PATH": os.pathsep.join(filter(None, (*folders, str(layer)))),
@@ -157,6 +160,15 @@ def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
 def test_a_form_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
     done = run(layer, name, "storage", VKBLOOM_FORM="tiles")
     assert "ValueError: VKBLOOM_FORM: tiles is not one of auto" in done.stderr
+
+
+def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> None:
+    done = run(layer, name, "timestamps,storage", ("-m", "vkbloom.cli", "doctor", "--json"))
+    findings = {finding["topic"]: finding for finding in json.loads(done.stdout)["findings"]}
+    render = findings["test render"]
+    assert render["status"] == "ok"
+    assert "it does not time its passes" in render["found"]
+    assert findings["validation layer"]["status"] == "ok"
 
 
 def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:

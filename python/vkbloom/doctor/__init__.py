@@ -7,6 +7,7 @@ that crashes becomes a finding as well.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -186,12 +187,15 @@ def _test_render(name: str, answer: child.Answer) -> Finding:
             "Update its driver, or use another adapter; its framebuffers can't be trusted.",
         )
     milliseconds = 1e3 * sum(answer.value["timings"].values())
+    passes = f"{milliseconds:.2f} ms in its passes"
+    if math.isnan(milliseconds):
+        passes = "it does not time its passes"
     whole = 1e3 * answer.value["seconds"]
     return Finding(
         topic,
         "ok",
         f"{name} renders right: its framebuffers agree with the figures that they must have "
-        f"({milliseconds:.2f} ms in its passes, {whole:.0f} ms with setting up)",
+        f"({passes}, {whole:.0f} ms with setting up)",
     )
 
 
