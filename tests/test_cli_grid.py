@@ -418,6 +418,8 @@ class TestOptionFiles:
             # Found by fuzzing, or while its targets were written.
             ("a.yaml", "images:", 1, "a.yaml: images must be a list"),
             ("a.toml", "images = 3", 1, "a.toml: images must be a list"),
+            ("a.toml", 'resume = "yes"', 1, "a.toml: resume must be true or false, not 'yes'"),
+            ("a.toml", "settings = {bloom = 1}", 1, "a.toml: bloom must be true or false, not 1"),
             ("a.yaml", "axes: {1: [[1, 2]]}", 2, "--axis 1: the method separable has no such"),
             ("a.yaml", "a: !!bool x", 1, "a.yaml: a value does not fit its tag"),
             ("a.yaml", "a: !!timestamp x", 1, "a.yaml: a value does not fit its tag"),
