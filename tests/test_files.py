@@ -328,6 +328,17 @@ class TestWriteErrors:
         assert names_in(tmp_path) == [file.name]
         assert file.read_text() == "the one before"
 
+    def test_an_interrupt_leaves_nothing(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def interrupted(array: Any) -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("vkbloom.safe_writing.np.ascontiguousarray", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            safe_writing.write_whole(tmp_path / "a.png", b"bytes")
+        assert names_in(tmp_path) == []
+
     def test_disk_is_full_of_bytes(self, tmp_path: Path) -> None:
         file = tmp_path / "sheet.png"
         safe_writing.write_whole(file, b"the one before, and longer")

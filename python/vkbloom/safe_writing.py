@@ -99,10 +99,13 @@ def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
             stream.write(bytes(_LARGEST_HEADER))
             for array in arrays:
                 stream.write(np.ascontiguousarray(array).data)
-    except OSError as error:
+    except BaseException as error:
+        # Ctrl-C too, which a large file leaves time for.
         with contextlib.suppress(OSError):
             temporary.unlink()
-        raise OSError(error.errno, error.strerror, str(file)) from error
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror, str(file)) from error
+        raise
     return temporary
 
 
