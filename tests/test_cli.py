@@ -134,6 +134,21 @@ def test_an_interrupt_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (result.exit_code, result.stderr) == (1, "\nvkbloom: interrupted\n")
 
 
+@pytest.mark.parametrize("kind", [AssertionError, OSError])
+def test_what_fails_because_of_an_interrupt_is_one(
+    monkeypatch: pytest.MonkeyPatch, kind: type[Exception]
+) -> None:
+    def interrupt() -> None:
+        try:
+            raise KeyboardInterrupt
+        finally:
+            raise kind("not started yet")
+
+    monkeypatch.setattr(vkbloom, "adapters", interrupt)
+    result = vkb("adapters")
+    assert (result.exit_code, result.stderr) == (1, "vkbloom: interrupted\n")
+
+
 def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail() -> None:
         raise KeyError("missing")
