@@ -48,7 +48,7 @@ _STORE: Final = ".zarr"
     "--out",
     required=True,
     type=click.Path(),
-    help="NAME.zarr: a Zarr store, as is an URL that fsspec knows. Else a folder of image files.",
+    help="NAME.zarr: a Zarr store, as is a URL that fsspec knows. Else a folder of image files.",
 )
 @click.option(
     "--axis",
