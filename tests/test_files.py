@@ -230,6 +230,14 @@ class TestFiles:
             frames.save(tmp_path / f"out{extension}")
         assert names_in(tmp_path) == []
 
+    def test_no_name(self, frames: Frames, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(ValueError, match=r"^path: .* is needed, not ''"):
+            frames.save("")
+        assert names_in(tmp_path) == []
+        frames.save(".")
+        assert "final.png" in names_in(tmp_path)
+
     def test_nothing_to_save(self, tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="no framebuffer"):
             make({}).save(tmp_path / "out.png")
