@@ -553,6 +553,17 @@ def test_text_survives_a_plain_terminal(tmp_path: Path, encoding: str, name: str
     assert ended.stdout.endswith(f"{name}.exr\n")
 
 
+def test_without_standard_output_and_error(tmp_path: Path) -> None:
+    """Closed by whoever starts the process, as some that start daemons do."""
+    animation = ["render", "-o", str(tmp_path / "a.png"), "--frames", "2", *SMALL]
+    image = ["apply", str(tmp_path / "a_0000.png"), str(tmp_path / "b.png")]
+    for words in (animation, image):
+        command = [sys.executable, "-m", "vkbloom.cli", *words]
+        ended = subprocess.run(["sh", "-c", 'exec "$@" >&- 2>&-', "sh", *command], check=False)
+        assert ended.returncode == 0
+    assert {file.name for file in tmp_path.iterdir()} == {"a_0000.png", "a_0001.png", "b.png"}
+
+
 def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
     termios.tcsetwinsize(theirs, (24, 80))
