@@ -290,6 +290,17 @@ class TestWhatIsThere:
         assert caught.value.filename == str(link)
         assert names_in(tmp_path) == ["out.exr"]
 
+    def test_a_current_folder_that_is_gone(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        gone = tmp_path / "gone"
+        gone.mkdir()
+        monkeypatch.chdir(gone)
+        gone.rmdir()
+        with pytest.raises(FileNotFoundError) as caught:
+            make({"final": noise(4, 5, 3, dtype="uint8")}).save("out.exr")
+        assert caught.value.filename == "out.exr"
+
     def test_permissions_stay(self, tmp_path: Path) -> None:
         file = tmp_path / "out.exr"
         frames = make({"final": noise(4, 5, 3, dtype="uint8")})

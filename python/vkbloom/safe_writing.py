@@ -229,7 +229,11 @@ def write_whole(file: Path, content: bytes) -> None:
 
 def _meant(file: Path) -> Path:
     """Return the file that a name stands for: links are written through, not replaced."""
-    return Path(os.path.realpath(file))
+    try:
+        return Path(os.path.realpath(file))
+    except OSError as error:
+        # The current folder is not there any more.
+        raise OSError(error.errno, error.strerror, str(file)) from error
 
 
 def _is_readable(oiio: ModuleType, file: Path) -> bool:
