@@ -180,6 +180,26 @@ def test_bevys_other_settings(renderer: Renderer, settings: Settings, format: An
     check(renderer, lights((91, 53), "float32"), settings.replace(format=format))
 
 
+NARROWER: list[tuple[Any, str, float, float]] = [
+    (BevyBloom, "intensity", 0.0, 1.0),
+    (KinoBloom, "radius", 1.0, 7.0),
+    (FilamentBloom, "intensity", 0.0, 1.0),
+    (FilamentBloom, "levels", 1, 12),
+    (HdrpBloom, "intensity", 0.0, 1.0),
+    (UnrealBloom, "radius", 0.0, 1.0),
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "low", "high"), NARROWER)
+def test_a_range_is_that_of_the_source(kind: Any, name: str, low: float, high: float) -> None:
+    for value in (low, high):
+        assert getattr(kind(**{name: value}), name) == value
+    step = 1 if isinstance(low, int) else 1e-9
+    for value in (low - step, high + step):
+        with pytest.raises(ValueError, match=rf"^{name}: .* out of range"):
+            kind(**{name: value})
+
+
 def test_bevy_has_no_screen_and_ends_at_1() -> None:
     with pytest.raises(ValueError, match="composite: 'screen' is not one of mix, add"):
         BevyBloom(composite="screen")
