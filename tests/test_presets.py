@@ -109,6 +109,14 @@ def test_a_flat_image_gets_the_gain(renderer: Renderer, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
+def test_negative_colours(renderer: Renderer, name: str) -> None:
+    image = lights((41, 29), "float32") * 4 - 3
+    # Where 1 + luminance is 0.
+    image[:12, :16] = -1
+    check(renderer, image, presets[name].replace(format="rgba32float"))
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
 def test_nan_and_infinity_are_not_spread(renderer: Renderer, name: str) -> None:
     image = lights((33, 21), "float32")
     image[4, 5, 0], image[10, 20, 1], image[20, 0, 2] = np.nan, np.inf, -np.inf
