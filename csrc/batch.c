@@ -281,13 +281,17 @@ static void dealloc(PyObject *object)
 static bool build_graph(const struct batch *self, const struct vkb_settings *settings,
                         struct vkb_graph *graph, struct vkb_error *error)
 {
-    const bool built =
-        self->of_scene ? vkb_build_scene(self->shading, settings, &self->scene_source, graph, error)
-                       : vkb_build_image(settings, &self->image_source, graph, error);
+    const struct vkb_device *device = &self->renderer->device;
 
-    return built
-        && vkb_forms_choose(self->renderer->forms, &self->renderer->device.limits, graph, error)
-        && vkb_graph_check(graph, self->renderer->device.limits.maxFramebufferWidth, error);
+    const bool built =
+        self->of_scene
+            ? vkb_check_sizes(settings, "size", self->scene_source.size, device->max_side, error)
+                  && vkb_build_scene(self->shading, settings, &self->scene_source, graph, error)
+            : vkb_check_sizes(settings, "image", self->image_source.size, device->max_side, error)
+                  && vkb_build_image(settings, &self->image_source, graph, error);
+
+    return built && vkb_forms_choose(self->renderer->forms, device, graph, error)
+        && vkb_graph_check(graph, device->max_side, error) && vkb_slots_check(device, graph, error);
 }
 
 static bool require_filling(const struct batch *self)

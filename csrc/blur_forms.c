@@ -140,21 +140,23 @@ bool vkb_add_enlarged(const struct vkb_form_choice *choice, const struct vkb_pas
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const struct vkb_sampling sampling = vkb_sampling_into(&choice->plain, pass->targets[0]);
+    // In 8 bits the sampler's filter of the lines is good enough, where there is one for floats.
+    const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
+    const bool filters = vkb_device_supports(choice->device, VKB_FORMAT_RGBA32_FLOAT,
+                                             VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
     struct kernel kernel;
     uint32_t lines;
 
     *fits = is_blur(pass) && pass->constants[0] == DIRECTION_HORIZONTAL
          && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
          && vkb_is_written_once(&choice->plain, pass->targets[0])
-         && floor(tap_step(pass)) == tap_step(pass)
-         && source->width + 2 <= choice->limits->maxFramebufferWidth
-         && find_kernel(pass, LINE_RADIUS, &kernel);
+         && floor(tap_step(pass)) == tap_step(pass) && source->width + 2 <= choice->device->max_side
+         && (filters || !unorm) && find_kernel(pass, LINE_RADIUS, &kernel);
     if (!*fits)
         return true;
     // In floats: what is between two rounded values must not be rounded before. The border holds
     // what the filter takes from beyond the edges.
     const struct vkb_size size = {source->width + 2, source->height};
-    const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     char name[VKB_NAME_SIZE];
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
     if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, &lines, error))
@@ -286,8 +288,8 @@ bool vkb_add_tiles(const struct vkb_form_choice *choice, const struct vkb_pass_r
     struct chain chain;
     int radius = TILE_RADIUS / 4;
 
-    *fits = choice->limits->maxComputeSharedMemorySize >= shared
-         && choice->limits->maxComputeWorkGroupInvocations >= TILE_LOADED * TILE_RUNS
+    *fits = choice->device->limits.maxComputeSharedMemorySize >= shared
+         && choice->device->limits.maxComputeWorkGroupInvocations >= TILE_LOADED * TILE_RUNS
          && find_chain(&choice->plain, pass, TILE_RADIUS, &chain);
     if (!*fits)
         return true;

@@ -102,8 +102,9 @@ PyObject *vkb_describe(PyObject *module, PyObject *arguments)
         || !vkb_read_settings(vkb_module_state(module), settings_object, &settings))
         return NULL;
     source.has_sky = has_sky;
-    if (vkb_build_scene(shading, &settings, &source, &graph, &error)
-        && vkb_graph_check(&graph, UINT32_MAX, &error))
+    if (vkb_check_sizes(&settings, "size", source.size, VKB_MAX_SIDE, &error)
+        && vkb_build_scene(shading, &settings, &source, &graph, &error)
+        && vkb_graph_check(&graph, VKB_MAX_SIDE, &error))
         result = describe_graph(&graph);
     else
         vkb_raise(vkb_module_state(module), &error);

@@ -103,11 +103,34 @@ static uint64_t timestamp_mask(const struct vkb_device *device)
     return bits >= 64 ? UINT64_MAX : (UINT64_C(1) << bits) - 1;
 }
 
+static uint32_t smallest(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
+// What is asked again and again, or when the device may be gone.
+static void read_properties(struct vkb_device *device)
+{
+    VkPhysicalDeviceProperties properties;
+    const VkPhysicalDeviceLimits *limits = &device->limits;
+
+    vkGetPhysicalDeviceMemoryProperties(device->adapter.physical, &device->memory);
+    vkGetPhysicalDeviceProperties(device->adapter.physical, &properties);
+    device->limits = properties.limits;
+    device->max_side = smallest(smallest(limits->maxFramebufferWidth, limits->maxFramebufferHeight),
+                                smallest(limits->maxImageDimension2D, VKB_MAX_SIDE));
+    for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format) {
+        VkFormatProperties ways;
+        vkGetPhysicalDeviceFormatProperties(device->adapter.physical, vkb_formats[format].vk,
+                                            &ways);
+        device->features[format] = ways.optimalTilingFeatures;
+    }
+    device->timestamp_mask = timestamp_mask(device);
+}
+
 bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bool validation,
                        struct vkb_error *error)
 {
-    VkPhysicalDeviceProperties properties;
-
     *device = (struct vkb_device){0};
     if (!vkb_instance_create(&device->instance, validation, error))
         return false;
@@ -118,10 +141,7 @@ bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bo
     }
     volkLoadDeviceTable(&device->vk, device->handle);
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
-    vkGetPhysicalDeviceMemoryProperties(device->adapter.physical, &device->memory);
-    vkGetPhysicalDeviceProperties(device->adapter.physical, &properties);
-    device->limits = properties.limits;
-    device->timestamp_mask = timestamp_mask(device);
+    read_properties(device);
     return true;
 }
 
@@ -133,13 +153,10 @@ void vkb_device_destroy(struct vkb_device *device)
     vkb_instance_destroy(&device->instance);
 }
 
-bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
+bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format,
                          VkFormatFeatureFlags features)
 {
-    VkFormatProperties properties;
-
-    vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
-    return (properties.optimalTilingFeatures & features) == features;
+    return (device->features[format] & features) == features;
 }
 
 bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,

@@ -3,6 +3,7 @@
 #define VKB_DEVICE_H
 
 #include "adapter.h"
+#include "format.h"
 
 #include <stdatomic.h>
 #include <volk.h>
@@ -15,6 +16,8 @@ struct vkb_device {
     VkQueue queue;
     VkPhysicalDeviceMemoryProperties memory;
     VkPhysicalDeviceLimits limits;
+    uint32_t max_side;                                // of an image that passes write
+    VkFormatFeatureFlags features[VKB_FORMAT_COUNT];  // of images with optimal tiling
     bool dispatch;            // compute shaders can write images of every format
     uint64_t timestamp_mask;  // 0: the queue has no timestamps
     // Host memory that becomes a buffer starts and ends at multiples of it; 0: none can.
@@ -33,7 +36,7 @@ bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bo
 void vkb_device_destroy(struct vkb_device *device);
 
 // Whether images of `format` can be used in all the ways of `features` with optimal tiling.
-bool vkb_device_supports(const struct vkb_device *device, VkFormat format,
+bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format,
                          VkFormatFeatureFlags features);
 
 // Whether images of that kind are best in memory that the host can write to: on a CPU, where all

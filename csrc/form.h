@@ -9,7 +9,7 @@
 // The choice of forms for one graph: the passes of `plain` to those of `graph`.
 struct vkb_form_choice {
     enum vkb_forms forms;
-    const VkPhysicalDeviceLimits *limits;
+    const struct vkb_device *device;
     struct vkb_graph plain;
     struct vkb_graph *graph;
 };

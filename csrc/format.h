@@ -14,6 +14,9 @@ enum vkb_format {
     VKB_FORMAT_COUNT,
 };
 
+// No side of an image is longer: so far the whole numbers of sampling.glsl keep to 32 bits.
+enum { VKB_MAX_SIDE = 32768 };
+
 struct vkb_format_info {
     const char *name;   // "rgba8unorm"
     const char *dtype;  // "uint8"

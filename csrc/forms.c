@@ -12,14 +12,14 @@ enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *devi
 {
     int forms = 0;
 
-    if (!device->dispatch)
-        return VKB_FORMS_FRAGMENT;
     if (strcmp(name, "auto") == 0)
-        return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_FORMS_CPU
-                                                                          : VKB_FORMS_GPU;
-    while (forms < VKB_FORMS_COUNT && strcmp(form_names[forms], name) != 0)
-        ++forms;
-    return (enum vkb_forms)forms;
+        forms = device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_FORMS_CPU
+                                                                           : VKB_FORMS_GPU;
+    else
+        while (forms < VKB_FORMS_COUNT && strcmp(form_names[forms], name) != 0)
+            ++forms;
+    return forms < VKB_FORMS_COUNT && !device->dispatch ? VKB_FORMS_FRAGMENT
+                                                        : (enum vkb_forms)forms;
 }
 
 const enum vkb_mode vkb_stored_as[VKB_FORMAT_COUNT] = {
@@ -169,12 +169,12 @@ static bool add_in_its_form(const struct vkb_form_choice *choice, const struct v
     return vkb_graph_add_pass(choice->graph, pass, error);
 }
 
-bool vkb_forms_choose(enum vkb_forms forms, const VkPhysicalDeviceLimits *limits,
+bool vkb_forms_choose(enum vkb_forms forms, const struct vkb_device *device,
                       struct vkb_graph *graph, struct vkb_error *error)
 {
     struct vkb_form_choice choice = {
         .forms = forms,
-        .limits = limits,
+        .device = device,
         .plain = *graph,
         .graph = graph,
     };

@@ -11,12 +11,13 @@ enum vkb_forms {
     VKB_FORMS_COUNT,
 };
 
-// The forms of that name: "fragment", "cpu", "gpu", or "auto" for those that suit the device.
-// VKB_FORMS_COUNT where there are none.
+// The forms of that name: "fragment", "cpu", "gpu", or "auto" for those that suit the device; on
+// one without compute shaders that write images always "fragment". VKB_FORMS_COUNT where there are
+// none.
 enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *device);
 
-// Gives each pass of a graph its form, within the device's limits.
-bool vkb_forms_choose(enum vkb_forms forms, const VkPhysicalDeviceLimits *limits,
+// Gives each pass of a graph its form, within what the device can do.
+bool vkb_forms_choose(enum vkb_forms forms, const struct vkb_device *device,
                       struct vkb_graph *graph, struct vkb_error *error);
 
 #endif

@@ -79,6 +79,15 @@ bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
     return pass->depth == image;
 }
 
+bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].blend != VKB_BLEND_NONE && graph->passes[i].depth != image
+            && vkb_pass_writes(&graph->passes[i], image))
+            return true;
+    return false;
+}
+
 enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
 {
     if (pass->geometry != VKB_GEOMETRY_DISPATCH)
@@ -144,15 +153,23 @@ static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pa
     return graph->images[image].input;
 }
 
-static bool check_image(const struct vkb_graph *graph, uint32_t index, uint32_t max_size,
+bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
+                    struct vkb_error *error)
+{
+    if (width == 0 || height == 0 || width > max_side || height > max_side)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "%s: a size of %u x %u is out of this adapter's range, 1 to %u a side",
+                        name, width, height, max_side);
+    return true;
+}
+
+static bool check_image(const struct vkb_graph *graph, uint32_t index, uint32_t max_side,
                         struct vkb_error *error)
 {
     const struct vkb_image_row *row = &graph->images[index];
 
-    if (row->width == 0 || row->height == 0 || row->width > max_size || row->height > max_size)
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "%s: a size of %u x %u is out of this adapter's range, 1 to %u a side",
-                        row->name, row->width, row->height, max_size);
+    if (!vkb_check_size(row->name, row->width, row->height, max_side, error))
+        return false;
     if (row->format == VKB_FORMAT_NONE || row->format >= VKB_FORMAT_COUNT)
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: image %s has no format", row->name);
     for (uint32_t i = 0; i < index; ++i)
@@ -198,7 +215,8 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
 {
     const struct vkb_pass_row *pass = &graph->passes[index];
 
-    if (pass->target_count > VKB_MAX_TARGETS || pass->read_count > VKB_MAX_READS
+    if (pass->target_count > VKB_MAX_TARGETS
+        || pass->read_count > (pass->loads ? VKB_MAX_LOADS : VKB_MAX_READS)
         || pass->constant_count > VKB_MAX_CONSTANTS
         || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
         || (pass->geometry == VKB_GEOMETRY_DISPATCH
@@ -225,10 +243,10 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
     return pass->depth == VKB_NO_IMAGE || check_target(graph, index, pass->depth, true, error);
 }
 
-bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_size, struct vkb_error *error)
+bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        if (!check_image(graph, i, max_size, error))
+        if (!check_image(graph, i, max_side, error))
             return false;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (!check_pass(graph, i, error))

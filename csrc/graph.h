@@ -11,6 +11,8 @@
 enum {
     VKB_NAME_SIZE = 32,
     VKB_MAX_READS = GATHERED_LEVELS,
+    // As storage images. With the target one less than the four that every device can bind.
+    VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
     VKB_MAX_CONSTANTS = 7,
 };
@@ -87,7 +89,11 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error);
 
 // Every rule that the rows must keep, so that nothing but a right graph reaches Vulkan.
-bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_size, struct vkb_error *error);
+bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error);
+
+// Whether both sides are within 1 and max_side; `name` is what the message calls them.
+bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
+                    struct vkb_error *error);
 
 // Whether both have the same images, in the same order; their passes may differ.
 bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b);
@@ -96,6 +102,9 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 
 bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
+
+// Whether a pass blends what it draws with what the image holds.
+bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image);
 
 // How a pass reads its images.
 enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass);

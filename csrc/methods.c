@@ -38,6 +38,15 @@ static uint32_t scaled(double scale, uint32_t side)
     return size < 1.0 ? 1 : (uint32_t)size;
 }
 
+bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,
+                     uint32_t max_side, struct vkb_error *error)
+{
+    return vkb_check_size(name, frame.width, frame.height, max_side, error)
+        && (!settings->bloom_width
+            || vkb_check_size("bloom_size", settings->bloom_width, settings->bloom_height, max_side,
+                              error));
+}
+
 struct vkb_size vkb_bloom_size(const struct vkb_settings *settings, struct vkb_size frame)
 {
     if (settings->bloom_width)

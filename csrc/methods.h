@@ -35,6 +35,12 @@ struct vkb_bloom_source {
     enum vkb_format format;
 };
 
+// Whether the sizes that all others of a graph follow from are within 1 and max_side: asked before
+// a graph is built, where sizes that follow from longer sides would not fit 32 bits. `name` is what
+// the caller knows the frame by.
+bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,
+                     uint32_t max_side, struct vkb_error *error);
+
 // The graph of a scene in the shading of that name.
 bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
                      const struct vkb_scene_source *source, struct vkb_graph *graph,

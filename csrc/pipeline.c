@@ -36,16 +36,18 @@ struct vkb_pipeline_entry {
     VkPipeline handle;
 };
 
-static bool create_sampler(const struct vkb_device *device, VkSampler *sampler,
+static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
                            struct vkb_error *error)
 {
     return VK(error,
               device->vk.vkCreateSampler(device->handle,
                                          &(VkSamplerCreateInfo){
                                              .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
-                                             .magFilter = VK_FILTER_LINEAR,
-                                             .minFilter = VK_FILTER_LINEAR,
-                                             .mipmapMode = VK_SAMPLER_MIPMAP_MODE_LINEAR,
+                                             .magFilter = filter,
+                                             .minFilter = filter,
+                                             .mipmapMode = filter == VK_FILTER_LINEAR
+                                                             ? VK_SAMPLER_MIPMAP_MODE_LINEAR
+                                                             : VK_SAMPLER_MIPMAP_MODE_NEAREST,
                                              .addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
                                              .addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
                                              .addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
@@ -56,18 +58,21 @@ static bool create_sampler(const struct vkb_device *device, VkSampler *sampler,
 
 static const struct binding_kind {
     VkDescriptorType read;
+    uint32_t most_reads;
     bool target;
     VkShaderStageFlags parameter_stages, image_stages;
 } binding_kinds[VKB_BINDING_KINDS] = {
     [VKB_BINDINGS_DRAW] =
         {
             .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .most_reads = VKB_MAX_READS,
             .parameter_stages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT,
             .image_stages = VK_SHADER_STAGE_FRAGMENT_BIT,
         },
     [VKB_BINDINGS_DISPATCH] =
         {
             .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .most_reads = VKB_MAX_READS,
             .target = true,
             .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
             .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
@@ -75,6 +80,7 @@ static const struct binding_kind {
     [VKB_BINDINGS_LOAD] =
         {
             .read = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .most_reads = VKB_MAX_LOADS,
             .target = true,
             .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
             .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
@@ -134,10 +140,11 @@ bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_dat
                                   .pInitialData = cache_data,
                               },
                               NULL, &pipelines->cache))
-             && create_sampler(device, &pipelines->sampler, error);
+             && create_sampler(device, VK_FILTER_LINEAR, &pipelines->filter, error)
+             && create_sampler(device, VK_FILTER_NEAREST, &pipelines->nearest, error);
 
     for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
-        for (uint32_t images = 0; done && images <= VKB_MAX_READS; ++images)
+        for (uint32_t images = 0; done && images <= binding_kinds[kind].most_reads; ++images)
             done = create_layouts(device, pipelines, (enum vkb_binding_kind)kind, images, error);
     if (!done)
         vkb_pipelines_destroy(device, pipelines);
@@ -159,7 +166,8 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
         }
     for (uint32_t i = 0; i < VKB_SHADER_COUNT; ++i)
         vk->vkDestroyShaderModule(device->handle, pipelines->modules[i], NULL);
-    vk->vkDestroySampler(device->handle, pipelines->sampler, NULL);
+    vk->vkDestroySampler(device->handle, pipelines->filter, NULL);
+    vk->vkDestroySampler(device->handle, pipelines->nearest, NULL);
     vk->vkDestroyPipelineCache(device->handle, pipelines->cache, NULL);
     vkb_free(pipelines->entries);
     vkb_free(pipelines->render_passes);
@@ -506,6 +514,14 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     memcpy(&entry->key, &key, sizeof key);
     entry->handle = *pipeline;
     return true;
+}
+
+VkSampler vkb_pipelines_sampler(const struct vkb_device *device,
+                                const struct vkb_pipelines *pipelines, enum vkb_format format)
+{
+    return vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT)
+             ? pipelines->filter
+             : pipelines->nearest;
 }
 
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)

@@ -19,7 +19,7 @@ enum vkb_binding_kind {
 
 struct vkb_pipelines {
     VkPipelineCache cache;
-    VkSampler sampler;
+    VkSampler filter, nearest;  // of images; without a filter those that are only fetched from
     VkShaderModule modules[VKB_SHADER_COUNT];
     // By the number of images read.
     VkDescriptorSetLayout set_layouts[VKB_BINDING_KINDS][VKB_MAX_READS + 1];
@@ -49,6 +49,10 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
 bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
                        const struct vkb_pass_row *pass, VkRenderPass render_pass,
                        VkPipeline *pipeline, struct vkb_error *error);
+
+// The sampler of the package's own images of the format.
+VkSampler vkb_pipelines_sampler(const struct vkb_device *device,
+                                const struct vkb_pipelines *pipelines, enum vkb_format format);
 
 // How many images the pass reads by descriptor, the scene's cubemap or textures counted in.
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);

@@ -19,21 +19,21 @@ static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct 
                                         const struct vkb_surface *surface, uint32_t index)
 {
     const struct vkb_scene *scene = &run->frame->scene;
+    const struct vkb_texture *texture = NULL;
     const struct vkb_image *image;
-    VkSampler sampler = run->frame->pipelines.sampler;
 
     if (surface) {
-        const struct vkb_texture *texture =
-            &scene->textures[index == 0 ? surface->base : surface->emission];
+        texture = &scene->textures[index == 0 ? surface->base : surface->emission];
         image = &texture->image;
-        sampler = texture->sampler;
     } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
         image = &scene->sky;
     } else {
         image = &run->slots[pass->reads[index]]->image;
     }
     return (VkDescriptorImageInfo){
-        .sampler = sampler,
+        .sampler = texture
+                     ? texture->sampler
+                     : vkb_pipelines_sampler(run->device, &run->frame->pipelines, image->format),
         .imageView = image->view,
         .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
     };

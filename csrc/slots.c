@@ -53,19 +53,34 @@ static VkImageUsageFlags image_usage(enum vkb_format format)
                 : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_STORAGE_BIT);
 }
 
-static bool check_format(const struct vkb_device *device, enum vkb_format format,
-                         struct vkb_error *error)
+static bool check_format(const struct vkb_device *device, const struct vkb_graph *graph,
+                         uint32_t image, struct vkb_error *error)
 {
+    const enum vkb_format format = graph->images[image].format;
     const VkFormatFeatureFlags features = format == VKB_FORMAT_DEPTH32_FLOAT
                                             ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
-                                            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT
+                                            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT
                                                   | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT
                                                   | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
 
-    if (vkb_device_supports(device, vkb_formats[format].vk, features))
-        return true;
-    return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
-                    device->adapter.name, vkb_formats[format].name);
+    if (!vkb_device_supports(device, format, features))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
+                        device->adapter.name, vkb_formats[format].name);
+    if (vkb_graph_blends(graph, image)
+        && !vkb_device_supports(device, format, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT))
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "the adapter %s cannot add up layers in %s images", device->adapter.name,
+                        vkb_formats[format].name);
+    return true;
+}
+
+bool vkb_slots_check(const struct vkb_device *device, const struct vkb_graph *graph,
+                     struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (!check_format(device, graph, i, error))
+            return false;
+    return true;
 }
 
 // The image from the host: written by it in place where the device reads that as fast.
@@ -136,8 +151,7 @@ bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
     destroy_framebuffers(device, slots, slot->image_id);
     slot->image_id = ++slots->clock;
     vkb_image_destroy(device, &slot->image);
-    return check_format(device, row->format, error)
-        && vkb_image_create(device,
+    return vkb_image_create(device,
                             &(struct vkb_image_spec){
                                 .format = row->format,
                                 .width = row->width,

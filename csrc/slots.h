@@ -28,6 +28,10 @@ struct vkb_slots {
 
 void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots);
 
+// Whether the device can have the graph's images and do with them what the passes do.
+bool vkb_slots_check(const struct vkb_device *device, const struct vkb_graph *graph,
+                     struct vkb_error *error);
+
 // The slot of an image row where it holds an image of the row's size and format, else NULL.
 struct vkb_slot *vkb_slots_find(const struct vkb_slots *slots, const struct vkb_image_row *row);
 

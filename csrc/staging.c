@@ -65,6 +65,11 @@ bool vkb_staging_load_picture(const struct vkb_device *device, VkCommandBuffer c
         return vkb_fail(error, VKB_ERROR_VALUE,
                         "%s: a side of %u pixels is beyond this adapter's limit of %u", name,
                         data->width > data->height ? data->width : data->height, limit);
+    if (!vkb_device_supports(device, data->format,
+                             VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT))
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "%s: the adapter %s cannot filter %s; uint8 and float16 it can", name,
+                        device->adapter.name, vkb_formats[data->format].dtype);
     if (!vkb_image_create(device,
                           &(struct vkb_image_spec){
                               .format = data->format,

@@ -27,7 +27,10 @@ void main()
     mat4 projection = mat4(params.projection[0], params.projection[1], params.projection[2],
                            params.projection[3]);
     mat3 rotation = mat3(params.view[0].xyz, params.view[1].xyz, params.view[2].xyz);
-    // Any size between the near and the far plane shows the same picture.
     direction = cube_vertex(gl_VertexIndex) * 5.0;
     gl_Position = projection * vec4(rotation * direction, 1.0);
+    // The sky is beyond all planes: whatever the camera's are, the cube is clipped by the original
+    // camera's, between which it lies.
+    const float NEAR = 0.1, FAR = 256.0;
+    gl_Position.z = (gl_Position.w - NEAR) * (FAR / (FAR - NEAR));
 }

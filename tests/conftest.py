@@ -37,17 +37,18 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 
 @pytest.fixture(scope="session", autouse=True)
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """No test reads or writes the pipeline cache of the user, or follows the user's choice."""
+    """No test reads or writes the pipeline cache of the user, or follows the user's choice: the
+    adapter of all that name none is the tests' one, in the processes that they start too."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path_factory.mktemp("pipelines")))
-        patch.delenv("VKBLOOM_ADAPTER", raising=False)
+        patch.setenv("VKBLOOM_ADAPTER", ADAPTER)
         yield
 
 
 @pytest.fixture(scope="session")
 def renderer(environment: None) -> Iterator[Renderer]:
     """A renderer whose first validation message raises, at the latest when it is closed."""
-    with Renderer(ADAPTER, validation=True) as opened:
+    with Renderer(validation=True) as opened:
         yield opened
 
 
@@ -57,7 +58,7 @@ def new_renderer() -> Iterator[Callable[[], Renderer]]:
     opened: list[Renderer] = []
 
     def open_one() -> Renderer:
-        opened.append(Renderer(ADAPTER, validation=True))
+        opened.append(Renderer(validation=True))
         return opened[-1]
 
     yield open_one

@@ -113,7 +113,6 @@ def grid_to_zarr(_: Renderer) -> Arrays:
         FOLDER,
         chunks={"exposure": 2},
         reduce={"mean": vkbloom.reductions.Mean()},
-        adapter="software",
         validation=True,
         progress=False,
     )
@@ -150,7 +149,7 @@ def state() -> dict[str, int]:
 
 
 def open_renderer() -> Renderer:
-    return Renderer("software", validation=True)
+    return Renderer(validation=True)
 
 
 def check_error(error: BaseException, failed: str, result: int) -> None:

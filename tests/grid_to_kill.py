@@ -21,7 +21,6 @@ if __name__ == "__main__":
             "blur_strength": np.linspace(1, 2, 10),
         },
         sys.argv[1],
-        adapter="software",
         chunks={"exposure": 20, "blur_strength": 1},
         reduce={"mean": vkbloom.reductions.Mean()},
         progress=False,

@@ -446,7 +446,7 @@ def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
 
 def test_framebuffers_outlive_the_renderer() -> None:
     image = picture(9, 12, 3, "float16", seed=14)
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         frames = renderer.apply(image)
     assert_matches_reference(frames, image, Separable())
 
@@ -578,6 +578,16 @@ def test_image_of_the_wrong_shape(renderer: Renderer, dtype: str, shape: tuple[i
     assert_matches_reference(renderer.apply(image), image, Separable())
 
 
+def test_masked_images(renderer: Renderer) -> None:
+    """What lies under a mask is not to be seen."""
+    image = picture(6, 5, 3, "float32")
+    masked = np.ma.masked_greater(image, float(np.median(image)))
+    with pytest.raises(ValueError, match=r"^image: some of it is masked"):
+        renderer.apply(masked)
+    assert_same(renderer.apply(masked.filled(0)), renderer.apply(np.where(masked.mask, 0, image)))
+    assert_same(renderer.apply(np.ma.masked_invalid(image)), renderer.apply(image))
+
+
 def largest_side(renderer: Renderer) -> int:
     """Return the limit that the error of a far too large image names."""
     with pytest.raises(ValueError, match=r"40000000 x 1 is out of .* range, 1 to") as caught:
@@ -624,7 +634,7 @@ def test_settings_of_the_wrong_type(renderer: Renderer, settings: Any) -> None:
 
 def test_closed_renderer() -> None:
     image = picture(4, 4, 3, "uint8")
-    renderer = vkbloom.Renderer("software")
+    renderer = vkbloom.Renderer()
     frames = renderer.apply_many(image, [Separable(), Separable()])
     next(frames)
     renderer.close()

@@ -292,7 +292,7 @@ def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> N
 
 
 def test_a_sequence_forgotten_with_its_renderer() -> None:
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     frames = renderer.apply_many(picture(40, 30, 3, 15), SEQUENCE)
     for _ in range(4):
         next(frames)
@@ -502,7 +502,7 @@ def test_a_batch_of_a_closed_renderer() -> None:
     def allocate(_: str, shape: tuple[int, ...], dtype: str) -> Any:
         return np.empty(shape, dtype)
 
-    renderer = vkbloom.Renderer("software", validation=True)
+    renderer = vkbloom.Renderer(validation=True)
     waiting, flying = (renderer._core.apply(picture(8, 8, 4, 21), None) for _ in range(2))
     for batch in (waiting, flying):
         batch.add(Separable(), allocate)

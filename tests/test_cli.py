@@ -27,7 +27,7 @@ from vkbloom.scene import Camera, Scene
 oiio = pytest.importorskip("OpenImageIO")
 
 ASSETS = Path(vkbloom.__file__).parent / "assets"
-SMALL = ("--size", "48x32", "--adapter", "software", "--bloom-size", "16x16")
+SMALL = ("--size", "48x32", "--bloom-size", "16x16")
 SMALL_SETTINGS = vkbloom.Separable(bloom_size=(16, 16))
 
 
@@ -51,7 +51,7 @@ def pixels(path: Path) -> NDArray[Any]:
 
 
 def rendered(**arguments: Any) -> vkbloom.Frames:
-    with vkbloom.Renderer("software") as renderer:
+    with vkbloom.Renderer() as renderer:
         scene = arguments.pop("scene", None) or Scene.ufo()
         settings = arguments.pop("settings", SMALL_SETTINGS)
         return renderer.render(scene, settings, (48, 32), **arguments)
@@ -335,7 +335,7 @@ def test_render_writes_every_framebuffer(tmp_path: Path) -> None:
 
 def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:
     stdout = vkb("render", "-o", tmp_path / "out.exr", *SMALL).stdout
-    with vkbloom.Renderer("software") as renderer:
+    with vkbloom.Renderer() as renderer:
         assert stdout.startswith(f"Rendering on {renderer.info.summary}\n")
     assert "ms on the CPU" in stdout
     times = dict(re.findall(r"^ +(\w+) +(\d+\.\d{3}) +1$", stdout, re.M))
@@ -528,11 +528,14 @@ def test_importing_the_entry_point_is_quick() -> None:
     assert not {"click", "rich", "tqdm", "OpenImageIO", "pygltflib"} & set(listed)
 
 
-def test_text_survives_a_plain_terminal(tmp_path: Path) -> None:
-    out = str(tmp_path / "out.exr")
-    ended = python(*("-m", "vkbloom.cli", "render", "-o", out, *SMALL), PYTHONIOENCODING="ascii")
+@pytest.mark.parametrize(("encoding", "name"), [("ascii", "\u2600"), ("latin-1", r"\u2600")])
+def test_text_survives_a_plain_terminal(tmp_path: Path, encoding: str, name: str) -> None:
+    out = str(tmp_path / "\u2600.exr")
+    ended = python(*("-m", "vkbloom.cli", "render", "-o", out, *SMALL), PYTHONIOENCODING=encoding)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "ms on the CPU" in ended.stdout
+    # To click, ASCII is a terminal that does not say what it is: it gets UTF-8.
+    assert ended.stdout.endswith(f"{name}.exr\n")
 
 
 def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:

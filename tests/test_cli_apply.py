@@ -55,7 +55,7 @@ def png(path: Path, pixels: NDArray[Any]) -> Path:
     return path
 
 
-def run(*arguments: str | Path, adapter: str = "software") -> Result:
+def run(*arguments: str | Path, adapter: str = "auto") -> Result:
     words = ["apply", *(str(argument) for argument in arguments), "--adapter", adapter]
     return CliRunner().invoke(program, words)
 
@@ -72,7 +72,7 @@ def pixels(path: Path) -> NDArray[Any]:
 
 
 def applied(image: NDArray[Any], settings: vkbloom.Settings | None = None) -> NDArray[Any]:
-    with vkbloom.Renderer("software") as renderer:
+    with vkbloom.Renderer() as renderer:
         return renderer.apply(image, settings, attachments="final")["final"]
 
 
@@ -210,14 +210,16 @@ class TestFormats:
 
     def test_parts(self, tmp_path: Path) -> None:
         image = light(20, 30, 3)
-        with vkbloom.Renderer("software") as renderer:
+        with vkbloom.Renderer() as renderer:
             frames = renderer.apply(image, Separable(threshold=0.5))
         frames.save(tmp_path / "a.exr")
         names = list(frames)
         last = names.index("final")
-        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", "--subimage", str(last))
+        chosen = ("--subimage", str(last))
+        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", *chosen)
         assert np.array_equal(pixels(tmp_path / "b.exr"), frames["final"])
-        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
+        result = run(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
+        assert "a.exr: the first of its parts 0 glow, 1 blur_vertical, " in result.stderr
         assert np.array_equal(pixels(tmp_path / "b.exr"), frames[names[0]])
 
     def test_in_place(self, tmp_path: Path) -> None:
@@ -310,7 +312,7 @@ class TestAttachments:
         image = light(20, 30, 3, dtype="float16")
         path = stored(tmp_path / "a.exr", image)
         result = done(path, tmp_path / "b.exr", "--attachments", "all")
-        with vkbloom.Renderer("software") as renderer:
+        with vkbloom.Renderer() as renderer:
             frames = renderer.apply(image)
         others = [name for name in frames if name != "final"]
         assert sorted(file.name for file in tmp_path.iterdir()) == sorted(

@@ -27,7 +27,7 @@ xr = pytest.importorskip("xarray")
 
 
 def run(*arguments: Any) -> Result:
-    words = ["grid", *(str(argument) for argument in arguments), "--adapter", "software"]
+    words = ["grid", *(str(argument) for argument in arguments)]
     return CliRunner().invoke(program, words)
 
 
@@ -170,6 +170,10 @@ class TestStores:
             (["--chunk", "blur_scale"], "NAME=COUNT"),
             (["--size", "3x3"], "only scenes"),
             (["--attachments", "none"], "nothing is asked for"),
+            (["--sheet", "a.jpg"], "--sheet a.jpg: its extension is none of .png"),
+            (["--curves", "a"], "--curves a: its extension is none of .png, .svg, .pdf"),
+            (["--sheet", "a.png", "--attachments", "none", "--reduce", "mean"], "keeps none"),
+            (["--curves", "a.svg", "--axis", "blur_scale=1"], "more than one value"),
         ],
         ids=str,
     )
@@ -179,6 +183,20 @@ class TestStores:
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert told in result.stderr
         assert not out.exists()
+
+    @pytest.mark.parametrize("option", ["--sheet", "--curves"])
+    def test_drawings_that_cannot_be_written(
+        self, tmp_path: Path, picture: Path, option: str
+    ) -> None:
+        """Known before anything is rendered."""
+        out = tmp_path / "a.zarr"
+        (tmp_path / "folder.png").mkdir()
+        for name, told in (("no/a.png", "No such file"), ("folder.png", "Is a directory")):
+            file = tmp_path / name
+            result = run(picture, "--axis", "blur_scale=1,2", "-o", out, option, file)
+            assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+            assert result.stderr.startswith(f"vkbloom: {file}: {told}")
+            assert not out.exists()
 
 
 class TestImageFiles:
@@ -212,8 +230,6 @@ class TestImageFiles:
                 str(tmp_path / "one.png"),
                 "--exposure",
                 "-1",
-                "--adapter",
-                "software",
             ],
         )
         np.testing.assert_array_equal(
@@ -291,6 +307,13 @@ class TestImageFiles:
             assert result.exit_code == 2
             assert "for a store" in result.stderr
 
+    def test_formats_that_are_not_there(self, tmp_path: Path, picture: Path) -> None:
+        out = tmp_path / "files"
+        result = run(picture, "--axis", "exposure=0", "-o", out, "--image-format", "no")
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert "no image format for the extension '.no'" in result.stderr
+        assert not out.exists()
+
 
 TOML = """
 out = "{out}"
@@ -351,7 +374,7 @@ class TestOptionFiles:
         assert found["final"].chunks[1] == (2,)
         assert {"mean", "energy"} <= set(found)
         image = load(picture).pixels
-        with Renderer("software") as renderer:
+        with Renderer() as renderer:
             expected = renderer.apply(
                 image,
                 Pyramid(

@@ -14,6 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
+from vkbloom import Frames, Separable
 from vkbloom.cli.program import program
 from vkbloom.comparison import Comparison, Limits, compare, difference, flip_map
 from vkbloom.image_writing import save
@@ -565,6 +566,20 @@ class TestCommand:
         assert result.exit_code == 0
         assert "SSIM       not computed: a side is under the window's 7 pixels\n" in result.stdout
         assert run(small, small, "--min-ssim", "0").exit_code == 1
+
+    def test_one_of_several_parts_is_named(self, tmp_path: Path) -> None:
+        """Files whose first parts are equal are not thereby equal."""
+        values = np.random.default_rng(0).random((8, 9, 3)).astype(np.float32)
+        for name, final in (("a.exr", values), ("b.exr", values / 2)):
+            arrays = {"glow": values, "final": final}
+            frames = Frames(arrays, timings={}, settings=Separable(), info={})
+            frames.save(tmp_path / name)
+        paths = (tmp_path / "a.exr", tmp_path / "b.exr")
+        result = run(*paths)
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert "--subimage has to name one of its parts 0 glow, 1 final" in result.stderr
+        assert run(*paths, "--subimage", "0").exit_code == 0
+        assert run(*paths, "--subimage", "1").exit_code == 1
 
     def test_json(self, files: dict[str, Path]) -> None:
         result = run(files["a.png"], files["b.png"], "--json", "--max-error", "0.001")

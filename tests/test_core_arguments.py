@@ -119,11 +119,11 @@ def test_scenes(renderer: Renderer, scene: Scene) -> None:
 def test_a_renderer_takes_no_keywords() -> None:
     make: Any = _core.Renderer
     with pytest.raises(TypeError, match="keyword"):
-        make("software", validation=True)
+        make("auto", validation=True)
     with pytest.raises(OSError, match="no cache"):
-        _core.Renderer("software", True, "auto", 1.0, _no_cache)
+        _core.Renderer("auto", True, "auto", 1.0, _no_cache)
     with pytest.raises(TypeError):
-        _core.Renderer("software", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
+        _core.Renderer("auto", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
 
 
 def _no_cache(uuid: bytes) -> bytes | None:

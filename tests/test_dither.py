@@ -208,7 +208,7 @@ def test_the_reference_dithers_alike(renderer: Renderer, settings: Settings, cha
 
 
 def test_the_command_line_dithers(tmp_path: Any) -> None:
-    words = ["render", "--size", "64x36", "--adapter", "software", "--shading", "deferred"]
+    words = ["render", "--size", "64x36", "--shading", "deferred"]
     words += ["--attachments", "final"]
     for name, more in (("plain", []), ("a", ["--dither"]), ("b", ["--dither-seed", "5"])):
         extra = [*more, "--dither"] if name == "b" else more

@@ -47,7 +47,6 @@ def commands() -> Iterator[Any]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with the files that pages name."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("VKBLOOM_ADAPTER", "software")
     photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)
     save(Picture.of_values(photo, "half"), "photo.exr")
     np.save("picture.npy", photo)

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import vkbloom
-from vkbloom import Frames, Renderer, Scene, Separable
+from vkbloom import FilamentBloom, Frames, Renderer, Scene, Separable, Settings, presets
 
 SIZE = (32, 24)
 
 
 @pytest.fixture(scope="module")
 def right(scene: Scene) -> Frames:
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         return renderer.render(scene, None, SIZE)
 
 
@@ -76,8 +76,20 @@ def test_sizes_beyond_the_adapter(renderer: Renderer, scene: Scene, size: Any) -
     with pytest.raises(ValueError, match=rf"size of {size[0]} x {size[1]} .* 1 to \d+ a side"):
         renderer.render(scene, None, size)
     for settings in (Separable(bloom_size=size), Separable(bloom_size=size, direct=True)):
-        with pytest.raises(ValueError, match=rf"glow: a size of {size[0]} x {size[1]} "):
+        with pytest.raises(ValueError, match=rf"bloom_size: a size of {size[0]} x {size[1]} "):
             renderer.render(scene, settings, SIZE)
+
+
+@pytest.mark.parametrize("settings", [*presets.values(), FilamentBloom(resolution=2048)])
+def test_sizes_that_sizes_of_levels_would_overflow_from(
+    renderer: Renderer, scene: Scene, settings: Settings
+) -> None:
+    """Once a loop without an end: a level of 2^31 pixels, twice as wide, is not 0 pixels wide."""
+    for size in ((2**20, 1), (2**31 - 1, 1), (1, 2**31 - 1)):
+        with pytest.raises(ValueError, match=rf"^size: a size of {size[0]} x {size[1]} "):
+            renderer.render(scene, settings, size)
+        with pytest.raises(ValueError, match=rf"bloom_size: a size of {size[0]} x {size[1]} "):
+            renderer.render(scene, settings.replace(bloom_size=size), SIZE)
 
 
 def test_a_scale_beyond_the_adapter(renderer: Renderer, scene: Scene) -> None:
@@ -221,7 +233,7 @@ def test_out_is_a_mapping(renderer: Renderer, scene: Scene, out: Any) -> None:
 
 
 def test_use_after_close(scene: Scene) -> None:
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     renderer.close()
     for _ in range(2):
         with pytest.raises(ValueError, match="closed"):
@@ -232,7 +244,7 @@ def test_use_after_close(scene: Scene) -> None:
 
 
 def test_a_mistake_before_the_first_frame(scene: Scene) -> None:
-    with Renderer("software", validation=True) as renderer:
+    with Renderer(validation=True) as renderer:
         with pytest.raises(ValueError, match="attachments"):
             renderer.render(scene, None, SIZE, attachments="nope")
         assert renderer.render(scene, None, SIZE)["final"].any()

@@ -307,7 +307,7 @@ class TestViewer:
     ) -> None:
         Viewer(scene, renderer=renderer).close()
         assert not renderer.closed
-        owner = Viewer(scene, adapter="software")
+        owner = Viewer(scene)
         owner.close()
         owner.close()
         assert owner.renderer.closed

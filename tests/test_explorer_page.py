@@ -7,7 +7,6 @@ What is shown is compared, to the pixel, with what the renderer gives: in the pa
 from __future__ import annotations
 
 import base64
-import os
 import re
 import shutil
 import time
@@ -375,8 +374,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A JupyterLab with a notebook, and where it is."""
     pytest.importorskip("jupyterlab")
     folder = tmp_path_factory.mktemp("lab")
-    adapter = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
-    with jupyterlab(folder, [NOTEBOOK], {"VKBLOOM_ADAPTER": adapter}) as url:
+    with jupyterlab(folder, [NOTEBOOK], {}) as url:
         yield url
 
 

@@ -237,7 +237,7 @@ class TestCommand:
         result = self.run("photo.exr", "--scene", "ufo")
         assert result.exit_code == 2
         assert "do not go with an IMAGE" in result.stderr
-        assert self.run("--size", "0x3", "--adapter", "software").exit_code == 2
+        assert self.run("--size", "0x3").exit_code == 2
 
     def test_failures(self, monkeypatch: pytest.MonkeyPatch) -> None:
         result = self.run("missing.exr")

@@ -8,6 +8,7 @@ import json
 import re
 import resource
 import signal
+import stat
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -263,6 +264,37 @@ def small_files_only() -> Iterator[None]:
         signal.signal(signal.SIGXFSZ, handler)
 
 
+class TestWhatIsThere:
+    @pytest.mark.parametrize("name", ["out.exr", "out.png"])
+    def test_links_are_written_through(self, name: str, tmp_path: Path) -> None:
+        (tmp_path / "elsewhere").mkdir()
+        target, link = tmp_path / "elsewhere" / f"target-{name}", tmp_path / name
+        link.symlink_to(target)
+        frames = make({"final": noise(4, 5, 3, dtype="uint8")})
+        # The first time there is nothing behind the link.
+        for _ in range(2):
+            assert frames.save(link) == [link]
+            assert link.is_symlink()
+            assert names_in(target.parent) == [target.name]
+            assert len(read(target)) == 1
+
+    def test_a_link_to_nowhere(self, tmp_path: Path) -> None:
+        link = tmp_path / "out.exr"
+        link.symlink_to(tmp_path / "no" / "out.exr")
+        with pytest.raises(FileNotFoundError) as caught:
+            make({"final": noise(4, 5, 3, dtype="uint8")}).save(link)
+        assert caught.value.filename == str(link)
+        assert names_in(tmp_path) == ["out.exr"]
+
+    def test_permissions_stay(self, tmp_path: Path) -> None:
+        file = tmp_path / "out.exr"
+        frames = make({"final": noise(4, 5, 3, dtype="uint8")})
+        frames.save(file)
+        file.chmod(0o600)
+        frames.save(file)
+        assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
 class TestWriteErrors:
     @pytest.mark.parametrize("name", ["out.exr", "out.png", "out.tif"])
     def test_folder_is_not_there(self, frames: Frames, name: str, tmp_path: Path) -> None:
@@ -299,6 +331,16 @@ class TestWriteErrors:
         assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
         assert names_in(tmp_path) == [file.name]
         assert file.read_text() == "the one before"
+
+    def test_disk_is_full_of_bytes(self, tmp_path: Path) -> None:
+        file = tmp_path / "sheet.png"
+        safe_writing.write_whole(file, b"the one before, and longer")
+        safe_writing.write_whole(file, b"the one before")
+        with small_files_only(), pytest.raises(OSError, match=r"sheet\.png") as caught:
+            safe_writing.write_whole(file, bytes(1 << 20))
+        assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
+        assert names_in(tmp_path) == [file.name]
+        assert file.read_bytes() == b"the one before"
 
     # Without JPEG and WebP, whose writers would end the process or never return.
     @pytest.mark.parametrize("extension", ["exr", "png", "tif", "tga", "bmp"])

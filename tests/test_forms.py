@@ -47,7 +47,7 @@ def formed(form: str) -> Iterator[Renderer]:
     """A renderer that is held to one table of forms."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VKBLOOM_FORM", form)
-        opened = Renderer(ADAPTER, validation=True)
+        opened = Renderer(validation=True)
     with opened:
         yield opened
 
@@ -99,7 +99,7 @@ def test_strips_give_the_bits_of_the_passes_they_stand_for(
         pytest.skip("compilers of GPUs contract sums in one form and not in the other")
     monkeypatch.setenv("VKBLOOM_FORM", "cpu")
     image = picture(256, 160, 4, dtype)
-    with Renderer(ADAPTER, validation=True) as renderer:
+    with Renderer(validation=True) as renderer:
         alone = renderer.apply(image, WHOLE[name], attachments=("final",))
         renderer.apply(image[::-1], WHOLE[name])
         np.testing.assert_array_equal(alone["final"], renderer.apply(image, WHOLE[name])["final"])
@@ -134,7 +134,7 @@ def test_large_images_in_the_form_of_gpus(monkeypatch: pytest.MonkeyPatch) -> No
     settings = Pyramid(levels=2)
     expected = reference_apply(image, settings)["final"]
     limit = tolerance(image.dtype, expected)
-    with Renderer(ADAPTER, validation=True) as renderer:
+    with Renderer(validation=True) as renderer:
         for attachments in (("final",), "all"):
             frames = renderer.apply(image, settings, attachments=attachments)
             assert np.abs(real(frames["final"]) - expected).max() <= limit
@@ -217,7 +217,7 @@ def drawn() -> Iterator[dict[str, NDArray[np.uint8]]]:
     """The forward system's framebuffers as its passes are, drawn."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VKBLOOM_FORM", "fragment")
-        with Renderer(ADAPTER, validation=True) as renderer:
+        with Renderer(validation=True) as renderer:
             yield dict(renderer.render(Scene.ufo(), None, (640, 360), time=0.2))
 
 
@@ -259,4 +259,4 @@ def test_blurs_into_other_sizes(formed: Renderer, settings: Settings) -> None:
 def test_unknown_forms_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_FORM", "quick")
     with pytest.raises(ValueError, match="VKBLOOM_FORM: quick is not one of auto, fragment"):
-        Renderer(ADAPTER)
+        Renderer()

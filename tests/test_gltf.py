@@ -147,6 +147,40 @@ def test_a_matrix_is_column_major(tmp_path: Path) -> None:
     np.testing.assert_allclose(document.load(tmp_path).vertices, NESTED_VERTICES, atol=1e-6)
 
 
+@pytest.mark.parametrize("noise", [1e-17, 6e-8, -3e-6])
+def test_a_matrix_may_be_rounded(tmp_path: Path, noise: float) -> None:
+    # As exporters write that multiply single-precision matrices.
+    document = nested()
+    matrix = [0, 2, 0, noise, -6, 0, 0, -noise, 0, 0, 2, noise, 10, 20, 30, 1 + noise]
+    document.json["nodes"] = [{"mesh": 0, "matrix": matrix}]
+    np.testing.assert_allclose(document.load(tmp_path).vertices, NESTED_VERTICES, atol=1e-6)
+
+
+def test_colours_are_never_negative(tmp_path: Path) -> None:
+    document = triangle()
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["COLOR_0"] = document.accessor([[-1e-9, -1.0, 0.5]] * 3)
+    assert document.load(tmp_path).vertices[:, 6:].tolist() == [[0.0, 0.0, 0.5]] * 3
+
+
+@pytest.mark.parametrize("extras", [1, "by hand", [1, [2]], None, True, {"extras": [{}]}])
+def test_extras_may_be_anything_anywhere(tmp_path: Path, extras: Any) -> None:
+    document = nested()
+    file = tmp_path / "mesh.gltf"
+    file.write_bytes(document.as_gltf())
+    expected = load_mesh(file)
+    text = json.loads(document.as_gltf())
+    for path in places(text):
+        place: Any = text
+        for key in path:
+            place = place[key]
+        if isinstance(place, dict) and path[-1] != "attributes":
+            place["extras"] = extras
+    text["extras"] = extras
+    file.write_text(json.dumps(text))
+    np.testing.assert_array_equal(load_mesh(file).vertices, expected.vertices)
+
+
 def test_arrays_are_read_only_and_contiguous(tmp_path: Path) -> None:
     mesh = triangle().load(tmp_path)
     assert mesh.vertices.dtype == np.dtype(np.float32)
@@ -305,7 +339,7 @@ def test_glb_and_outer_buffers_give_the_same_mesh(tmp_path: Path) -> None:
         np.testing.assert_array_equal(mesh.indices, expected.indices)
 
 
-def test_the_default_scene_or_all_roots(tmp_path: Path) -> None:
+def test_the_default_scene_or_the_first_or_all_roots(tmp_path: Path) -> None:
     document = triangle()
     document.json["nodes"] = [
         {"mesh": 0},
@@ -318,6 +352,8 @@ def test_the_default_scene_or_all_roots(tmp_path: Path) -> None:
     first_corners = corners(document.load(tmp_path))[:, 0].tolist()
     assert first_corners == [[1, 0, 7], [6, 0, 0]]
     del document.json["scene"]
+    assert corners(document.load(tmp_path))[:, 0].tolist() == [[1, 0, 0]]
+    del document.json["scenes"]
     first_corners = corners(document.load(tmp_path))[:, 0].tolist()
     assert first_corners == [[1, 0, 0], [6, 0, 0], [1, 0, 7]]
 
@@ -487,6 +523,9 @@ def at(document: dict[str, Any], path: str, value: Any) -> None:
         ("nodes.0.scale", [1, 10**400, 1], "too large"),
         ("nodes.1.rotation", [0, 0, 0, 0], "no length"),
         ("nodes.0.matrix", [1.0] * 16, "both a matrix"),
+        ("nodes.0", {"matrix": [1.0] * 16}, "not affine"),
+        ("nodes.0", {"matrix": [*([0.0] * 15), 1.001]}, "not affine"),
+        ("scenes", [], "index into scenes is 0; there are none"),
         ("nodes.0.scale", [2e38, 2e38, 2e38], "not finite"),
         ("meshes.0.primitives", [], "no triangles"),
         ("meshes.0.primitives.0.mode", 7, "mode is 7"),

@@ -41,7 +41,6 @@ def source() -> Any:
 
 def make(store: Path, client: Any = None, **changes: Any) -> Any:
     arguments: dict[str, Any] = {
-        "adapter": "software",
         "chunks": {"exposure": 8},
         "reduce": REDUCE,
         "progress": False,

@@ -46,7 +46,6 @@ def source() -> Any:
 
 def make(store: Any, **changes: Any) -> Any:
     arguments: dict[str, Any] = {
-        "adapter": "software",
         "chunks": CHUNKS,
         "reduce": REDUCE,
         "attachments": ("final", "bloom"),
@@ -106,6 +105,15 @@ class TestWhole:
         report = check_grid(undisturbed)
         assert report.complete
         assert str(report) == f"{POINTS} of {POINTS} points are done"
+
+    @pytest.mark.parametrize("url", ["file://{}/a.zarr", "memory://{}/a.zarr"])
+    def test_in_the_store_of_an_url(self, tmp_path: Path, undisturbed: Path, url: str) -> None:
+        store = url.format(tmp_path)
+        make(store)
+        assert check_grid(store).complete
+        xr.testing.assert_identical(xr.open_zarr(store), xr.open_zarr(undisturbed))
+        if store.startswith("file:"):
+            assert contents(tmp_path / "a.zarr") == contents(undisturbed)
 
     def test_counts_are_of_this_call(self, copy: Path) -> None:
         mended: list[str] = []
@@ -649,13 +657,13 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
         "import numpy as np, vkbloom\n"
         "image = np.random.default_rng(1).integers(0, 256, (256, 256, 3), dtype=np.uint8)\n"
         "vkbloom.grid_to_zarr(image, None, {'intensity': [0, 1]}, sys.argv[1],\n"
-        "                     adapter='software', chunks={'intensity': 2})\n"
+        "                     chunks={'intensity': 2})\n"
     )
     store = tmp_path / "a.zarr"
     ended = subprocess.run(
         [sys.executable, "-c", code, str(store)], capture_output=True, text=True, check=False
     )
-    assert "OSError: [Errno 27] File too large" in ended.stderr
+    assert f"OSError: [Errno 27] File too large: '{store}/" in ended.stderr
     assert not list(store.rglob("*.partial"))
     assert check_grid(store).done == 0
     assert not check_grid(store).problems

@@ -203,6 +203,7 @@ class TestLoad:
         assert writer.close()
         assert np.array_equal(load(path).pixels, parts[0])
         assert np.array_equal(load(path, 2).pixels, parts[2])
+        assert load(path).parts == load(path, 2).parts == ("part 0", "part 1", "part 2")
         for wrong in (3, -1):
             with pytest.raises(ValueError, match=f"a.exr: there is no part {wrong}, only 0 to 2"):
                 load(path, wrong)
@@ -249,6 +250,28 @@ class TestLoad:
     def test_numbers_of_other_types(self, tmp_path: Path) -> None:
         path = store(tmp_path / "a.tif", np.zeros((2, 2, 3), np.int16), "int16")
         with pytest.raises(ValueError, match=r"a\.tif: holds numbers of int16"):
+            load(path)
+
+    @pytest.mark.parametrize("folder", ["", "caf\udce9/"], ids=["file", "folder"])
+    def test_names_that_are_not_utf8(self, tmp_path: Path, folder: str) -> None:
+        path = store(tmp_path / "a.png", noise(2, 3, 3, numbers="uint8"), "uint8")
+        other = tmp_path / f"{folder}b\udce9.png"
+        other.parent.mkdir(exist_ok=True)
+        other.write_bytes(path.read_bytes())
+        for call in (lambda: load(other), lambda: save(decode(load(path)), other)):
+            with pytest.raises(ValueError, match=r"b\\udce9\.png': names .* must be UTF-8"):
+                call()
+        assert other.read_bytes() == path.read_bytes()
+
+    def test_damage_whose_message_is_no_text(self, tmp_path: Path) -> None:
+        path = store(tmp_path / "a.exr", noise(4, 4, 3, numbers="half"), "half")
+        # OpenEXR's message holds the type of the attribute.
+        content = path.read_bytes()
+        assert content.count(b"compression\0compression\0") == 1
+        path.write_bytes(
+            content.replace(b"compression\0compression\0", b"compression\0c\xe9mpression\0")
+        )
+        with pytest.raises(ValueError, match=r"a\.exr: .*c\ufffdmpression"):
             load(path)
 
     def test_deep_images(self, tmp_path: Path) -> None:

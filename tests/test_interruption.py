@@ -25,7 +25,7 @@ LEAVES_BEHIND = pytest.mark.skipif(
 )
 UNIX = pytest.mark.skipif(os.name == "nt", reason="signals and forks of Unix")
 
-# 65 x 65 taps a pixel, filtered by hand: a second on a few cores, so that there is a wait to leave.
+# 65 x 65 taps a pixel, filtered by hand.
 LONG = Separable(
     weights=gaussian_weights(10.0, 32), blur_scale=0.5, direct=True, format="rgba32float"
 )
@@ -54,13 +54,27 @@ def noise(side: int) -> NDArray[np.float32]:
     return np.random.default_rng(side).random((side, side, 4), dtype=np.float32)
 
 
-def long_work(renderer: Renderer, side: int = 256) -> None:
-    renderer.apply(noise(side), LONG)
+@pytest.fixture(scope="module")
+def large() -> NDArray[np.float32]:
+    """An image that LONG takes a second or so for, so that there is a wait to leave."""
+    with Renderer() as renderer:
+        renderer.apply(noise(8), LONG)
+        for side in (256, 512, 1024, 2048, 4096):
+            image = noise(side)
+            begin = time.perf_counter()
+            renderer.apply(image, LONG, attachments="final")
+            if time.perf_counter() - begin > 0.5:
+                return image
+    pytest.skip("this device is done before a wait can be interrupted")
+
+
+def long_work(renderer: Renderer, image: NDArray[np.float32]) -> None:
+    renderer.apply(image, LONG, attachments="final")
 
 
 def check(renderer: Renderer, scene: Scene) -> None:
     """The renderer gives the exact pictures of a new one."""
-    with Renderer("software") as new:
+    with Renderer() as new:
         for settings in (SHORT, Separable(bloom_size=(7, 5))):
             expected = new.render(scene, settings, RIGHT_SIZE)
             frames = renderer.render(scene, settings, RIGHT_SIZE)
@@ -71,29 +85,36 @@ def check(renderer: Renderer, scene: Scene) -> None:
         )
 
 
+def quarter(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    return image[: len(image) // 4, : len(image) // 4]
+
+
 # Signals
 
 
 @UNIX
 def test_a_long_frame_is_interrupted(
-    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+    new_renderer: Callable[[], Renderer],
+    scene: Scene,
+    alarm: Callable[[float], None],
+    large: NDArray[np.float32],
 ) -> None:
     renderer = new_renderer()
     renderer.apply(noise(8), LONG)
     for _ in range(2):
         alarm(0.1)
         with pytest.raises(Alarm):
-            long_work(renderer)
+            long_work(renderer, large)
     check(renderer, scene)
 
 
 @UNIX
 def test_an_interrupted_frame_keeps_its_arrays(
-    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None]
+    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], large: NDArray[np.float32]
 ) -> None:
     # Large enough for the device to write into the array itself, after nobody else has it.
     renderer = new_renderer()
-    image = noise(256)  # 1 MiB
+    image = large  # 1 MiB at least
     expected = renderer.apply(image, LONG, attachments="final")["final"]
     renderer.apply(image[:8, :8], LONG)
     alarm(0.1)
@@ -108,13 +129,16 @@ def test_an_interrupted_frame_keeps_its_arrays(
 
 @UNIX
 def test_a_sequence_is_interrupted(
-    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+    new_renderer: Callable[[], Renderer],
+    scene: Scene,
+    alarm: Callable[[float], None],
+    large: NDArray[np.float32],
 ) -> None:
     renderer = new_renderer()
     settings = [LONG.replace(exposure=step / 8, blur_strength=1 + step / 8) for step in range(3)]
     alarm(0.3)
     with pytest.raises(Alarm):
-        for _ in renderer.apply_many(noise(200), settings):
+        for _ in renderer.apply_many(large, settings):
             pass
     check(renderer, scene)
 
@@ -138,12 +162,15 @@ class Stopper:
 
 @UNIX
 def test_a_grid_is_interrupted(
-    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+    new_renderer: Callable[[], Renderer],
+    scene: Scene,
+    alarm: Callable[[float], None],
+    large: NDArray[np.float32],
 ) -> None:
     renderer = new_renderer()
     stopper = Stopper(alarm)
     with pytest.raises(Alarm):
-        renderer.grid(noise(64), LONG, STRENGTHS, reduce={"mean": stopper}, progress=False)
+        renderer.grid(quarter(large), LONG, STRENGTHS, reduce={"mean": stopper}, progress=False)
     assert stopper.points < 24
     check(renderer, scene)
 
@@ -154,6 +181,7 @@ def test_an_interrupted_store_is_gone_on_with(
     alarm: Callable[[float], None],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    large: NDArray[np.float32],
 ) -> None:
     closers: list[threading.Thread] = []
     close = Renderer.close
@@ -166,13 +194,12 @@ def test_an_interrupted_store_is_gone_on_with(
 
     def to_store(stopper: Stopper) -> xarray.Dataset:
         return vkbloom.grid_to_zarr(
-            noise(64),
+            quarter(large),
             LONG,
             STRENGTHS,
             tmp_path / "grid",
             chunks={"blur_strength": 2},
             reduce={"mean": stopper},
-            adapter="software",
             validation=True,
             progress=False,
         )
@@ -189,7 +216,7 @@ def test_an_interrupted_store_is_gone_on_with(
     # And the first point, for its shape; a block may be whole without its mark.
     assert second.points <= 24 - done + 1
     right = new_renderer().grid(
-        noise(64), LONG, STRENGTHS, reduce={"mean": Stopper(None)}, progress=False
+        quarter(large), LONG, STRENGTHS, reduce={"mean": Stopper(None)}, progress=False
     )
     assert bool(got["done"].all())
     for name in ("final", "mean"):
@@ -198,12 +225,15 @@ def test_an_interrupted_store_is_gone_on_with(
 
 @UNIX
 def test_an_interrupted_close_leaves_the_renderer_open(
-    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+    new_renderer: Callable[[], Renderer],
+    scene: Scene,
+    alarm: Callable[[float], None],
+    large: NDArray[np.float32],
 ) -> None:
     renderer = new_renderer()
     alarm(0.1)
     with pytest.raises(Alarm):
-        long_work(renderer)
+        long_work(renderer, large)
     alarm(0.1)
     with pytest.raises(Alarm):
         renderer.close()
@@ -215,10 +245,13 @@ def test_an_interrupted_close_leaves_the_renderer_open(
 
 @UNIX
 def test_waiting_for_another_thread_is_interrupted(
-    new_renderer: Callable[[], Renderer], scene: Scene, alarm: Callable[[float], None]
+    new_renderer: Callable[[], Renderer],
+    scene: Scene,
+    alarm: Callable[[float], None],
+    large: NDArray[np.float32],
 ) -> None:
     renderer = new_renderer()
-    thread = threading.Thread(target=long_work, args=(renderer,))
+    thread = threading.Thread(target=long_work, args=(renderer, large))
     thread.start()
     time.sleep(0.05)
     alarm(0.1)
@@ -230,7 +263,7 @@ def test_waiting_for_another_thread_is_interrupted(
 
 @UNIX
 def test_a_handler_that_uses_the_renderer_gets_an_error(
-    new_renderer: Callable[[], Renderer], scene: Scene
+    new_renderer: Callable[[], Renderer], scene: Scene, large: NDArray[np.float32]
 ) -> None:
     renderer = new_renderer()
     caught: list[str] = []
@@ -249,7 +282,7 @@ def test_a_handler_that_uses_the_renderer_gets_an_error(
     before = signal.signal(signal.SIGALRM, handler)
     signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
     while not caught:
-        long_work(renderer)
+        long_work(renderer, large)
     signal.signal(signal.SIGALRM, before)
     assert len(caught) == 1
     assert "at work in this thread" in caught[0]
@@ -263,17 +296,19 @@ def test_a_handler_that_uses_the_renderer_gets_an_error(
 def test_limits_that_are_none(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     monkeypatch.setenv("VKBLOOM_TIMEOUT", text)
     with pytest.raises(ValueError, match=f"VKBLOOM_TIMEOUT: '{text}' is not"):
-        Renderer("software")
+        Renderer()
 
 
 @LEAVES_BEHIND
-def test_a_device_that_takes_too_long(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
+def test_a_device_that_takes_too_long(
+    monkeypatch: pytest.MonkeyPatch, scene: Scene, large: NDArray[np.float32]
+) -> None:
     monkeypatch.setenv("VKBLOOM_TIMEOUT", "0.1")
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     with pytest.raises(
         DeviceLostError, match=r"not finished within 0.1 s.*VKBLOOM_TIMEOUT"
     ) as hung:
-        long_work(renderer)
+        long_work(renderer, large)
     assert hung.value.vk_call == "vkWaitForFences"
     assert hung.value.vk_result == 2  # VK_TIMEOUT
     with pytest.raises(DeviceLostError):
@@ -293,7 +328,7 @@ import numpy as np
 import vkbloom
 
 image = np.random.default_rng(3).random((16, 24, 3), dtype=np.float32)
-renderer = vkbloom.Renderer("software", validation=True)
+renderer = vkbloom.Renderer(validation=True)
 right = renderer.apply(image)["final"]
 batches = renderer.apply_many(image, [vkbloom.Separable()] * 9)
 next(batches); next(batches)
@@ -313,7 +348,7 @@ if child == 0:
             else:
                 raise AssertionError("the child used its parent's device")
         assert not renderer.closed
-        with vkbloom.Renderer("software", validation=True) as own:
+        with vkbloom.Renderer(validation=True) as own:
             np.testing.assert_array_equal(own.apply(image)["final"], right)
         if sys.argv[1] == "close":
             renderer.close()
@@ -349,3 +384,22 @@ def test_a_forked_process(how: str, tmp_path: Path) -> None:
         0,
         ["child done", "parent done", ""],
     ), done.stdout + done.stderr
+
+
+def test_a_driver_that_does_not_survive_forks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise vkbloom.Error("vkCreateDevice failed with VK_ERROR_INITIALIZATION_FAILED")
+
+    def notes() -> list[str]:
+        with pytest.raises(vkbloom.Error, match="vkCreateDevice failed") as refused:
+            Renderer()
+        return getattr(refused.value, "__notes__", [])
+
+    Renderer().close()
+    monkeypatch.setattr(vkbloom._core, "Renderer", refuse)
+    assert notes() == []
+    here = os.getpid()
+    monkeypatch.setattr(os, "getpid", lambda: here + 1)
+    (note,) = notes()
+    assert "forked" in note
+    assert '"spawn"' in note

@@ -39,11 +39,11 @@ def assert_same(frames: Frames, expected: Frames) -> None:
 
 
 def test_arrays_outlive_the_renderer(scene: Scene) -> None:
-    with Renderer("software", validation=True) as renderer:
+    with Renderer(validation=True) as renderer:
         frames = renderer.render(scene, None, SIZE)
         kept = {name: array.copy() for name, array in frames.items()}
     # Another renderer may get the memory of the first.
-    with Renderer("software") as other:
+    with Renderer() as other:
         other.render(scene, Separable(blur_strength=0.2), SIZE, time=0.5)
         for name, array in frames.items():
             np.testing.assert_array_equal(array, kept[name])
@@ -52,7 +52,7 @@ def test_arrays_outlive_the_renderer(scene: Scene) -> None:
 
 
 def test_close_twice() -> None:
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     assert not renderer.closed
     renderer.close()
     assert renderer.closed
@@ -61,14 +61,14 @@ def test_close_twice() -> None:
 
 
 def test_context_manager(scene: Scene) -> None:
-    with Renderer("software", validation=True) as renderer:
+    with Renderer(validation=True) as renderer:
         assert not renderer.closed
         renderer.render(scene, None, SIZE)
     assert renderer.closed
-    with pytest.raises(KeyError, match="mine"), Renderer("software", validation=True) as other:
+    with pytest.raises(KeyError, match="mine"), Renderer(validation=True) as other:
         raise KeyError("mine")
     assert other.closed
-    with Renderer("software", validation=True) as third:
+    with Renderer(validation=True) as third:
         third.close()
     assert third.closed
     with pytest.raises(ValueError, match="closed"), third:
@@ -77,9 +77,9 @@ def test_context_manager(scene: Scene) -> None:
 
 @LINUX
 def test_a_renderer_that_is_not_closed_is_collected(scene: Scene) -> None:
-    with Renderer("software"):
+    with Renderer():
         before = in_use()
-        renderer = Renderer("software", validation=True)
+        renderer = Renderer(validation=True)
         frames = renderer.render(scene, None, SIZE)
         kept = frames["final"].copy()
         assert in_use() > before
@@ -92,7 +92,7 @@ def test_a_renderer_that_is_not_closed_is_collected(scene: Scene) -> None:
 
 
 def test_two_renderers_do_not_know_each_other(scene: Scene) -> None:
-    with Renderer("software", validation=True) as one, Renderer("software") as other:
+    with Renderer(validation=True) as one, Renderer() as other:
         right = one.render(scene, None, SIZE)
         other.render(scene, Separable(loops=2), SIZE, time=0.3)
         other.close()
@@ -103,11 +103,11 @@ def test_two_renderers_do_not_know_each_other(scene: Scene) -> None:
 OBJECTION = """
 import vkbloom
 try:
-    with vkbloom.Renderer("software", validation=True) as renderer:
+    with vkbloom.Renderer(validation=True) as renderer:
         renderer.render(vkbloom.Scene.ufo(), size=(8, 8))
 except vkbloom.ValidationError as error:
     print("raised", error)
-with vkbloom.Renderer("software") as renderer:
+with vkbloom.Renderer() as renderer:
     print("without", renderer.render(vkbloom.Scene.ufo(), size=(8, 8))["final"].shape)
 """
 
@@ -204,7 +204,7 @@ def test_lists_of_adapters_leave_nothing() -> None:
 
 @LINUX
 def test_renderers_that_fail_leave_nothing(scene: Scene) -> None:
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         renderer.render(scene, None, SIZE)
         before = in_use()
         for _ in range(20):
@@ -262,7 +262,7 @@ def test_four_threads_and_one_renderer(renderer: Renderer, scene: Scene) -> None
 
 def test_a_renderer_for_each_of_four_threads(scene: Scene) -> None:
     def work(settings: Separable) -> Frames:
-        with Renderer("software", validation=True) as renderer:
+        with Renderer(validation=True) as renderer:
             return renderer.render(scene, settings, SIZE)
 
     with ThreadPoolExecutor(4) as pool:
@@ -272,7 +272,7 @@ def test_a_renderer_for_each_of_four_threads(scene: Scene) -> None:
 
 
 def test_close_while_other_threads_render(scene: Scene) -> None:
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     right = renderer.render(scene, None, SIZE)
     started = threading.Semaphore(0)
 
@@ -330,6 +330,6 @@ def test_python_goes_on_while_the_device_works(scene: Scene) -> None:
         format="rgba32float",
         bloom_size=(200, 200),
     )
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         renderer.render(scene, settings, (4, 4))
         assert ticks_during(lambda: renderer.render(scene, settings, (300, 200))) > 10

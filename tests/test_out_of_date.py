@@ -27,7 +27,7 @@ def opened(new_renderer: Callable[[], Renderer], scene: Scene) -> Renderer:
 
 def fresh(*arguments: Any, **more: Any) -> Frames:
     """Return the frames of a renderer that renders nothing else."""
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         return renderer.render(*arguments, **more)
 
 

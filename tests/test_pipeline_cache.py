@@ -20,7 +20,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def render(scene: Scene) -> None:
-    with Renderer("software", validation=True) as renderer:
+    with Renderer(validation=True) as renderer:
         renderer.render(scene, size=SIZE)
 
 
@@ -35,7 +35,7 @@ def driver_of(file: Path) -> bytes:
 
 
 def test_a_file_is_made_for_the_driver(folder: Path, scene: Scene) -> None:
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         assert not folder.exists()
         renderer.render(scene, size=SIZE)
         file = only_file(folder)
@@ -48,7 +48,7 @@ def test_a_file_is_made_for_the_driver(folder: Path, scene: Scene) -> None:
 
 
 def test_it_is_written_only_for_new_pipelines(folder: Path, scene: Scene) -> None:
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         renderer.render(scene, size=SIZE)
         only_file(folder).unlink()
         renderer.render(scene, size=SIZE, time=0.5)
@@ -140,7 +140,7 @@ def test_a_right_digest_over_wrong_data_does_no_harm(
     driver = driver_of(file)
     pipeline_cache.write(driver, data)
     assert pipeline_cache.read(driver) == data
-    with Renderer("software") as renderer:
+    with Renderer() as renderer:
         renderer.render(scene, size=SIZE)
     assert pipeline_cache.read(driver) not in (data, None)
 

@@ -70,6 +70,12 @@ def references(project: pytest.Pytester, module: str = "test_one") -> list[str]:
     return sorted(file.name for file in (project.path / "bloom_references" / module).iterdir())
 
 
+def edit(file: Path, was: str, now: str) -> None:
+    content = file.read_text()
+    assert content.count(was) == 1
+    file.write_text(content.replace(was, now))
+
+
 class TestReferences:
     def test_missing_fails_and_says_what_to_do(self, project: pytest.Pytester) -> None:
         write(project, ONE)
@@ -237,9 +243,27 @@ def test_image(frame_regression):
                 lambda folder: (folder / "test_frames.json").write_text("{}"),
                 "*ValueError: *test_frames.json: not a list of references*",
             ),
-            (
-                lambda folder: (folder / "test_frames.json").write_text("[1"),
-                "*ValueError: *test_frames.json: not a list of references*",
+            *(
+                (
+                    lambda folder, content=content: (folder / "test_frames.json").write_bytes(
+                        content
+                    ),
+                    "*ValueError: *test_frames.json: not a list of references*",
+                )
+                for content in (b"[1", b"\xff\xfe", b"[" * 100_000)
+            ),
+            *(
+                (
+                    lambda folder, was=was, now=now: edit(folder / "test_frames.json", was, now),
+                    f"*ValueError: *test_frames.json: not a list of references: {told}*",
+                )
+                for was, now, told in (
+                    ('"name": "glow"', '"names": "glow"', "no 'name'"),
+                    ('"name": "glow"', '"name": ["glow"]', "expected string"),
+                    ('"name": "glow"', '"name": "a/b"', "'a/b' cannot name a framebuffer"),
+                    ('"test_frames.glow.exr"', '"../glow.exr"', "'../glow.exr' is not in this"),
+                    ('"test_frames.glow.exr"', r'"\u0000"', "'?x00' is not in this folder"),
+                )
             ),
         ],
     )

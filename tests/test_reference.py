@@ -919,6 +919,17 @@ def test_wrong_arguments() -> None:
         reference.composite(flat(1.0), None, Separable())
 
 
+@pytest.mark.parametrize("settings", [None, "kino", {"threshold": 1.0}], ids=repr)
+def test_wrong_settings(settings: Any) -> None:
+    for call in (reference.apply, reference.passes, reference.blur):
+        with pytest.raises(TypeError, match=r"^settings must be vkbloom\.Settings, not "):
+            call(flat(1.0), settings)
+    with pytest.raises(TypeError, match=r"^settings must be "):
+        reference.gain(settings)
+    with pytest.raises(TypeError, match=r"^settings must be "):
+        reference.composite(flat(1.0), flat(1.0), settings)
+
+
 def test_grey_can_take_the_firefly_filter() -> None:
     grey = random_image(12, 12, 1) * 9
     bloom = reference.blur(grey, Pyramid(firefly_filter=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import time
@@ -154,6 +155,23 @@ def test_whole_turns_change_nothing(renderer: Renderer, scene: Scene) -> None:
         np.testing.assert_array_equal(first[name], third[name])
         assert not np.array_equal(first[name], other[name])
         np.testing.assert_array_equal(other[name], late[name])
+
+
+@pytest.mark.parametrize(("near", "far"), [(6.0, 256.0), (50.0, 1e5), (1e-4, 3.0)])
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_no_clip_plane_cuts_the_sky(
+    renderer: Renderer, scene: Scene, shading: Any, near: float, far: float
+) -> None:
+    # Moved far behind the camera: nothing but sky.
+    behind = Camera(position=(0.0, 0.0, 1e4))
+    cut = dataclasses.replace(behind, near=near, far=far)
+    settings = Separable(bloom=False)
+    whole, other = (
+        renderer.render(scene.with_camera(camera), settings, SIZE, shading=shading)["scene"]
+        for camera in (behind, cut)
+    )
+    assert rgb(whole).any()
+    np.testing.assert_array_equal(other, whole)
 
 
 def test_no_sky_is_black(renderer: Renderer, scene: Scene) -> None:

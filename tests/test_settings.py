@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 import json
 import math
 import pickle
@@ -120,8 +121,13 @@ def test_every_kind_of_real_number_is_stored_as_a_float(value: Any) -> None:
     assert settings.intensity == settings.weights[0] == float(value)
 
 
-def test_names_of_numpy_are_stored_as_plain_ones() -> None:
-    settings = make(tonemap=np.array(["aces"])[0], format=np.str_("rgba16float"))
+class Curve(str, enum.Enum):  # noqa: UP042 (a StrEnum's str() is its value, this one's is not)
+    ACES = "aces"
+
+
+@pytest.mark.parametrize("curve", [np.array(["aces"])[0], Curve.ACES])
+def test_names_of_other_classes_are_stored_as_plain_ones(curve: str) -> None:
+    settings = make(tonemap=curve, format=np.str_("rgba16float"))
     assert [type(name) for name in (settings.tonemap, settings.format)] == [str, str]
     assert eval(repr(settings), {"Separable": Separable}) == settings
 
@@ -305,6 +311,7 @@ def test_gaussian_weights() -> None:
     ("sigma", "radius", "count"),
     [
         (0.1, None, 2),
+        (1e-300, None, 2),
         (1.0, None, 4),
         (21.3, None, 65),
         (1000.0, None, 65),

@@ -66,7 +66,7 @@ def play(right: Mapping[Key, Any], scene: Scene, seed: int, *, closing: bool) ->
 
     In a closing round one thread closes what the others are using.
     """
-    renderer = Renderer("software", validation=True)
+    renderer = Renderer(validation=True)
     start = threading.Barrier(THREADS)
 
     def work(thread: int) -> int:
@@ -95,7 +95,7 @@ def play(right: Mapping[Key, Any], scene: Scene, seed: int, *, closing: bool) ->
 
 
 def test_eight_threads_in_random_order(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    with Renderer("software") as single:
+    with Renderer() as single:
         right = {
             (kind, which, size): one(single, scene, kind, which, size)
             for kind in KINDS

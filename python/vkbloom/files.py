@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vkbloom import safe_writing
 from vkbloom.dimensions import leading
 from vkbloom.extras import import_extra
+from vkbloom.images import check_name
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -45,7 +46,7 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
     Raises
     ------
     ValueError
-        If the extension is unknown, or there is no framebuffer.
+        If the extension is unknown, the name not UTF-8, or there is no framebuffer.
     OSError
         If a file cannot be written; it names the file, and no half file is left.
     ModuleNotFoundError
@@ -55,6 +56,7 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
         raise ValueError("these Frames hold no framebuffer to save")
     oiio = import_extra("OpenImageIO", "images", "Frames.save")
     target = Path(path)
+    check_name(target)
     plan: dict[Path, list[str]]
     if target.is_dir() or not target.suffix or os.fspath(path).endswith(("/", os.sep)):
         target.mkdir(parents=True, exist_ok=True)

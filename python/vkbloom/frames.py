@@ -175,8 +175,8 @@ class Frames(Mapping[str, NDArray[Any]]):
         ----------
         path : str or path-like
             A file name with an extension that OpenImageIO writes, or a folder. What is
-            already there is replaced. All files are written under temporary names first
-            and renamed when all are complete.
+            already there is replaced, and links are written through. All files are written
+            under temporary names first and renamed when all are complete.
 
         Returns
         -------
@@ -186,7 +186,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         Raises
         ------
         ValueError
-            If the extension is unknown, or there is no framebuffer.
+            If the extension is unknown, the name not UTF-8, or there is no framebuffer.
         OSError
             If a file cannot be written; it names the file, and no half file is left.
         ModuleNotFoundError

@@ -38,9 +38,9 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
 
     Node transforms are baked: positions are transformed, normals multiplied by the 3x3 part and
     normalized again. Colours are COLOR_0 times the material's base colour factor, either being 1
-    where there is none. The y of positions and normals is negated. Where a material emits, the
-    mesh's `emission` is the emissive factor times its strength
-    (KHR_materials_emissive_strength).
+    where there is none; what is negative in COLOR_0 counts as 0. The y of positions and normals is
+    negated. Where a material emits, the mesh's `emission` is the emissive factor times its
+    strength (KHR_materials_emissive_strength).
 
     Textures of the base colour and of the emission are read from PNG and JPEG images, decoded by
     the sRGB curve (3.9.2, 3.9.3) and sampled as their sampler says; one that says nothing of its
@@ -48,11 +48,11 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     of an emission whose factor is 0 is not read, for it changes nothing. A base colour's alpha is
     ignored.
 
-    Nodes of the file's default scene are used, or all root nodes where it names none. Triangles,
-    strips and fans, indexed or not, are read; where there are no normals, flat ones are computed
-    (3.7.2.1). Under a transform of negative determinant the winding is reversed (3.7.4). A normal
-    without length becomes the mesh's y axis, as a shader would make NaN of it. Cameras of the file
-    and `doubleSided` are ignored.
+    Nodes of the file's default scene are used, or of its first where it names none, or all root
+    nodes where it has no scenes. Triangles, strips and fans, indexed or not, are read; where there
+    are no normals, flat ones are computed (3.7.2.1). Under a transform of negative determinant the
+    winding is reversed (3.7.4). A normal without length becomes the mesh's y axis, as a shader
+    would make NaN of it. Cameras of the file and `doubleSided` are ignored.
 
     Parameters
     ----------
@@ -157,9 +157,13 @@ class _Loader:
             self._file.fail(f"damaged: the nodes form a cycle, at or above node {stray}")
 
         starts = roots
-        if self._file.root.scene is not None:
-            scene = self._file.item("scenes", self._file.root.scene, "scene")
-            starts = self._node_list(scene.nodes, f"scenes[{self._file.root.scene}].nodes")
+        shown = self._file.root.scene
+        if shown is None and self._file.items("scenes"):
+            # Scenes are alternatives: all of them at once would be what no viewer shows.
+            shown = 0
+        if shown is not None:
+            scene = self._file.item("scenes", shown, "scene")
+            starts = self._node_list(scene.nodes, f"scenes[{shown}].nodes")
             for start in starts:
                 if start in parents:
                     self._file.fail(f"damaged: the scene lists node {start}, which has a parent")
@@ -197,8 +201,11 @@ class _Loader:
                     f"damaged: {what} has both a matrix and a translation, rotation or scale"
                 )
             matrix = self._file.floats(node.matrix, f"{what}.matrix", 16).reshape(4, 4).T
-            if not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
+            affine_row = (0.0, 0.0, 0.0, 1.0)
+            # Exporters multiply in single precision, so that the row may be rounded.
+            if not np.allclose(matrix[3], affine_row, rtol=0.0, atol=1e-5):
                 self._file.fail(f"damaged: {what}.matrix is not affine")
+            matrix[3] = affine_row
             return matrix
         if node.rotation is not None:
             rotation = self._file.floats(node.rotation, f"{what}.rotation", 4)
@@ -329,7 +336,8 @@ class _Loader:
         colours = np.broadcast_to(material.factor, (count, 3))
         if attribute["COLOR_0"] is not None:
             read = self._file.vectors(attribute["COLOR_0"], f"{what}.COLOR_0", count)
-            colours = material.factor * read
+            # 3.7.2.1 asks for 0..1; what is brighter than 1 serves the deferred system.
+            colours = material.factor * np.maximum(read, 0.0)
         if primitive.indices is None:
             corners = np.arange(count, dtype=np.int64)
         else:

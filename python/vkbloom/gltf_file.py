@@ -56,7 +56,7 @@ class GltfFile:
         text, self._blob = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
         try:
             self.root: Parsed = pygltflib.GLTF2.from_json(
-                text.decode("utf-8-sig"), infer_missing=True
+                text.decode("utf-8-sig"), infer_missing=True, object_hook=_without_extras
             )
         except MemoryError:
             raise
@@ -145,6 +145,8 @@ class GltfFile:
     def item(self, field: str, index: object, user: str) -> Parsed:
         """Return one entry of a list of the root; `user` is what refers to it, for messages."""
         items = self.items(field)
+        if not items:
+            self.fail(f"{user}: index into {field} is {reprlib.repr(index)}; there are none")
         item = items[self.integer(index, f"{user}: index into {field}", 0, len(items) - 1)]
         if not isinstance(item, self._kinds[field]):
             self.fail(f"{field}[{index}] is no object")
@@ -373,3 +375,9 @@ class GltfFile:
             raise OSError(
                 error.errno, f"{error.strerror} ({what} of {self.path})", str(target)
             ) from error
+
+
+def _without_extras(value: dict[str, Any]) -> dict[str, Any]:
+    """Drop what an application stores beside: it may be of any type, pygltflib takes objects."""
+    value.pop("extras", None)
+    return value

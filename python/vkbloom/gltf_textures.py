@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
 from .image_reading import check_plausible, opened
+from .images import failure_of
 from .srgb import decode_srgb
 from .textures import MAX_SIDE, AddressMode, Filter, Texture, mip_levels
 
@@ -170,7 +171,7 @@ class TextureReader:
                     kind = "uint16" if str(spec.format) == "uint16" else "uint8"
                     pixels = reader.read_image(0, 0, 0, channels, kind)
                     # A file that ends early gives what is there, and says so.
-                    reason = reader.geterror().strip()
+                    reason = failure_of(reader)
             except ValueError as error:
                 reason = str(error)
                 pixels = None

@@ -20,6 +20,8 @@ from vkbloom.images import (
     Encoding,
     Picture,
     StoredImage,
+    check_name,
+    failure_of,
 )
 from vkbloom.srgb import decode_srgb
 
@@ -36,6 +38,8 @@ _LARGEST_AREA: Final = 1 << 28
 # have, makes 1032 bytes of one at the most (RFC 1951: 258 of two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
+# That are listed. Some files have thousands, and each takes time.
+_MOST_PARTS: Final = 100
 
 
 @contextmanager
@@ -59,12 +63,13 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     OSError
         The file is not there, or cannot be opened; it names the file.
     ValueError
-        The file is no image; it names the file.
+        The file is no image, or its name not UTF-8; it names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
     oiio = import_extra("OpenImageIO", "images", purpose)
     name = os.fspath(path)
+    check_name(name)
     # OpenImageIO says the same of missing and of damaged files; this has the system's own reason.
     with open(name, "rb"):
         pass
@@ -73,13 +78,12 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     plain.attribute("oiio:UnassociatedAlpha", 1)
     reader = oiio.ImageInput.open(name, plain)
     if reader is None:
-        reason = oiio.geterror().strip() or "unknown format"
+        reason = failure_of(oiio) or "unknown format"
         raise ValueError(f"{name}: not an image that can be read: {reason}")
     try:
         yield reader
     finally:
-        # An error that nobody asked for would be printed when the reader is gone.
-        reader.geterror()
+        failure_of(reader)
         reader.close()
 
 
@@ -112,8 +116,8 @@ def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     OSError
         The file is not there, or cannot be opened; it names the file.
     ValueError
-        The file is damaged or no image, has no such part, or is no flat image of 8 or 16 bit
-        integers or floats; it names the file.
+        The file is damaged or no image, has no such part, is no flat image of 8 or 16 bit
+        integers or floats, or its name is not UTF-8; it names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
@@ -147,7 +151,7 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
     wanted = stored_as if stored_as != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
     # Of a JPEG that was cut off there are pixels, and an error.
-    reason = reader.geterror().strip()
+    reason = failure_of(reader)
     if data is None or reason:
         raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
     pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
@@ -175,7 +179,15 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
             for attribute in spec.extra_attribs
             if attribute.name in (*KEPT_ATTRIBUTES, "ICCProfile")
         },
+        parts=tuple(_parts(reader)),
     )
+
+
+def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
+    for index in range(_MOST_PARTS):
+        if not reader.seek_subimage(index, 0):
+            return
+        yield reader.spec().get_string_attribute("oiio:subimagename")
 
 
 def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:

@@ -14,6 +14,7 @@ half, float          linear                    linear
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Self, TypeAlias
@@ -30,6 +31,8 @@ __all__ = [
     "Picture",
     "StoredImage",
     "Window",
+    "check_name",
+    "failure_of",
 ]
 
 Colour = Literal["linear", "srgb"]
@@ -82,6 +85,9 @@ class StoredImage:
         OpenImageIO's name of the colour space that the file gives, else "".
     attributes : mapping of str to (OpenImageIO.TypeDesc, value)
         The attributes that `save` keeps.
+    parts : tuple of str
+        The names of the file's parts, of which the pixels are one; "" where it gives none. Of
+        more than 100 the first.
     """
 
     pixels: NDArray[Any]
@@ -92,6 +98,7 @@ class StoredImage:
     associated: bool
     space: str
     attributes: Mapping[str, tuple[Any, Any]]
+    parts: tuple[str, ...] = ("",)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -149,3 +156,30 @@ class Picture:
     def values(self) -> NDArray[Any]:
         """The pixels with one channel of the three equal ones of a grey image."""
         return self.pixels[:, :, [0, *range(3, self.pixels.shape[2])] if self.grey else slice(None)]
+
+
+def check_name(path: str | os.PathLike[str]) -> None:
+    """Raise ValueError for a file name that is not UTF-8, which OpenImageIO cannot be given."""
+    name = os.fspath(path)
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise ValueError(
+            f"{name!r}: names of image files and of their folders must be UTF-8"
+        ) from None
+
+
+def failure_of(source: Any) -> str:
+    """Return why something of OpenImageIO failed; "" where it did not.
+
+    Parameters
+    ----------
+    source : OpenImageIO.ImageInput or module
+        Its error is taken from it: one that nobody asked for would be printed in the end.
+    """
+    try:
+        text: str = source.geterror()
+    except UnicodeDecodeError as error:
+        # It holds bytes of a damaged file.
+        text = error.object.decode(errors="replace")
+    return text.strip()

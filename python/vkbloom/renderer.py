@@ -6,11 +6,12 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
 from vkbloom import _core, batches, pipeline_cache
+from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
 from vkbloom.frames import Frames
 from vkbloom.settings import Separable, Settings, check_size, check_time
@@ -62,6 +63,8 @@ def _check_image(image: object) -> NDArray[Any]:
     """Return the image, in this machine's byte order, if the core can take it."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"image: an array is needed, not {type(image).__name__}")
+    if type(image) is not np.ndarray and np.ma.is_masked(image):
+        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
     if image.dtype not in _DTYPES:
         if image.dtype.name not in ("uint8", "float16", "float32"):
             raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
@@ -163,8 +166,12 @@ class Renderer:
     Ctrl-C, or whatever else a signal's handler raises, ends a call that waits, and the renderer can
     be used again; closing waits for what the device is still at work on. A device that takes longer
     than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
-    number. After a fork the child opens a renderer of its own; its parent's raise ValueError.
+    number. After a fork the child opens a renderer of its own, where the driver can; its parent's
+    raise ValueError.
     """
+
+    #: The process that opened the last one: any other has been forked from it since.
+    _opened_in: ClassVar[int | None] = None
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
@@ -172,9 +179,19 @@ class Renderer:
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
-        self._core = _core.Renderer(
-            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
-        )
+        try:
+            self._core = _core.Renderer(
+                adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+            )
+        except Error as error:
+            if self._opened_in not in (None, os.getpid()):
+                error.add_note(
+                    "This process was forked from one that had opened a renderer, which some "
+                    "drivers (NVIDIA's among them) refuse to work after; start it by "
+                    'multiprocessing\'s method "spawn" or "forkserver".'
+                )
+            raise
+        Renderer._opened_in = os.getpid()
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._made_by = {
@@ -323,8 +340,8 @@ class Renderer:
         Raises
         ------
         ValueError
-            The image has another shape or is larger than the adapter allows, an argument is out
-            of range, an array of `out` does not fit, or the renderer is closed.
+            The image has another shape, masked values or more pixels than the adapter allows, an
+            argument is out of range, an array of `out` does not fit, or the renderer is closed.
         TypeError
             The image has another dtype, or an argument another type.
         OutOfMemoryError, DeviceLostError, ValidationError, Error

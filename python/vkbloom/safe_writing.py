@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
@@ -21,6 +22,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vkbloom.images import check_name
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -32,6 +35,7 @@ __all__ = [
     "put_in_place",
     "reserve",
     "write_error",
+    "write_whole",
 ]
 
 # Formats of OpenImageIO that throw the picture away or print it on the terminal.
@@ -83,10 +87,13 @@ def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
 
     Raises
     ------
+    ValueError
+        The name is not UTF-8.
     OSError
         It cannot be made or the disk is full; it names `file`, and nothing is left.
     """
-    temporary = file.with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
+    check_name(file)
+    temporary = _meant(file).with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
     try:
         with temporary.open("xb") as stream:
             stream.write(bytes(_LARGEST_HEADER))
@@ -172,22 +179,54 @@ def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
 
 
 def put_in_place(temporary: Path, file: Path) -> None:
-    """Give a temporary file its name, in place of what is there.
+    """Give a temporary file its name, in place of what is there, and the permissions of that.
 
     Parameters
     ----------
     temporary, file : Path
-        In one folder.
+        From `reserve`, and what it was given.
 
     Raises
     ------
     OSError
         It cannot be done, for example because a folder is there; it names `file`.
     """
+    meant = _meant(file)
+    with contextlib.suppress(OSError):
+        shutil.copymode(meant, temporary)
     try:
-        temporary.replace(file)
+        temporary.replace(meant)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(file)) from error
+
+
+def write_whole(file: Path, content: bytes) -> None:
+    """Write a file at once, in place of what is there.
+
+    Parameters
+    ----------
+    file : Path
+    content : bytes
+
+    Raises
+    ------
+    OSError
+        It cannot be written; it names `file`, which is as it was.
+    """
+    temporary = reserve(file, [np.frombuffer(content, np.uint8)])
+    try:
+        # Into the room that is there by now.
+        with temporary.open("r+b") as stream:
+            stream.write(content)
+            stream.truncate()
+        put_in_place(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _meant(file: Path) -> Path:
+    """Return the file that a name stands for: links are written through, not replaced."""
+    return Path(os.path.realpath(file))
 
 
 def _is_readable(oiio: ModuleType, file: Path) -> bool:

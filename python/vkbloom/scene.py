@@ -133,7 +133,7 @@ class Camera:
     fov : float
         Vertical field of view in degrees, over 0 and under 180.
     near, far : float
-        Distances of the clip planes in scene units, 0 < near < far.
+        Distances of the clip planes in scene units, 0 < near < far. They do not cut the sky.
 
     Raises
     ------

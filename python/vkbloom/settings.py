@@ -186,9 +186,11 @@ class Settings:
     def _check_name(self, field: str, names: tuple[str, ...]) -> None:
         """Check a name and store it as a plain str, of whatever class it is."""
         value = getattr(self, field)
+        # An array compares with a name element by element.
         if not isinstance(value, str) or value not in names:
             raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}")
-        object.__setattr__(self, field, str(value))
+        # Not by str(), which gives an enum's own name.
+        object.__setattr__(self, field, names[names.index(value)])
 
     def replace(self, **changes: Any) -> Self:
         """Return the same settings with some fields changed, as `dataclasses.replace`.

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from . import ktx
 from .image_reading import check_plausible, opened
+from .images import failure_of
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
@@ -428,6 +429,6 @@ def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
         pixels = image.read_image(0, 0, 0, spec.nchannels, kind)
         # A file that ends early gives what is there, and says so.
         if pixels is None or image.has_error:
-            raise ValueError(f"{name}: damaged: {image.geterror().strip()}")
+            raise ValueError(f"{name}: damaged: {failure_of(image)}")
     result: NDArray[Any] = np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
     return result

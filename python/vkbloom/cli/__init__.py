@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from importlib.util import find_spec
 
@@ -15,4 +16,7 @@ def main() -> None:
     # Late, because it imports what may be missing.
     from vkbloom.cli.program import program  # noqa: PLC0415
 
+    # A file's name may hold what the terminal's encoding has no place for.
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
     program()

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from vkbloom import image_writing
 from vkbloom.cli import fields
-from vkbloom.cli.image_files import note, read, subimage_option
+from vkbloom.cli.image_files import check_part_is_given, note, read, subimage_option
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.comparison import Comparison, Limits, compare, difference
 from vkbloom.images import Picture, StoredImage
@@ -65,7 +65,8 @@ def command(
     Prints the largest error with its place and the mean error, the share of pixels that differ,
     PSNR and SSIM (scikit-image's, over all channels) and the mean FLIP (OpenImageIO's, of the
     colours alone: of integers, as sRGB, LDR-FLIP; of floats, as linear, HDR-FLIP). Integers
-    count as 0 to 1. Values are compared as they are stored.
+    count as 0 to 1. Values are compared as they are stored. Of files with several parts, as
+    vkbloom render writes them, --subimage says which one is compared.
 
     The exit status is 1 if a limit is exceeded, and without any limit, as of cmp, if a single
     value differs. It is always 1 for images of different size, number of channels or kind
@@ -80,6 +81,8 @@ def command(
     if diff is None and diff_scale is not None:
         raise click.UsageError("--diff-scale is for --diff")
     a, b = read(first, subimage), read(second, subimage)
+    check_part_is_given(first, a)
+    check_part_is_given(second, b)
     # FLIP of a large picture of floats takes half a minute.
     with blaming_the_call(), Console(stderr=True).status("Comparing"):
         found = compare(

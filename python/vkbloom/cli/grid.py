@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import logging
 import math
+import os
 import typing
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +16,7 @@ from typing import Any, Final
 import click
 
 import vkbloom
+from vkbloom import image_writing, safe_writing
 from vkbloom.cli import axis_options
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
@@ -148,8 +152,15 @@ def command(
     """
     is_store = out.endswith(_STORE) or "://" in out
     _check_combination(workers, scheduler, is_store, bool(reduce_words or chunk_words))
-    if not is_store and (sheet or curves):
-        raise click.UsageError(f"--sheet and --curves are for a store, NAME{_STORE}")
+    if not is_store:
+        if sheet or curves:
+            raise click.UsageError(f"--sheet and --curves are for a store, NAME{_STORE}")
+        with blaming_the_call():
+            image_writing.check_writable(f"image.{suffix.lstrip('.')}")
+    if sheet and attachments == "none":
+        raise click.UsageError("--sheet shows framebuffers, and --attachments none keeps none")
+    _check_drawing("--sheet", sheet, (".png",))
+    _check_drawing("--curves", curves, (".png", ".svg", ".pdf"))
     axes = axis_options.axis_values(axis_words, settings)
     reduce = axis_options.named_reductions(reduce_words, settings)
     pictures = [read_picture(image, subimage, input_colour, raw=raw) for image in images]
@@ -163,6 +174,8 @@ def command(
     }
     with blaming_the_call():
         grid = ask(source, settings, axes, **shared)
+    if curves and max(grid.shape, default=1) < 2:
+        raise click.UsageError("--curves needs an --axis of more than one value")
     with _client(workers, scheduler) as client:
         device = {"client": client, "adapter": adapter, "validation": validation}
         if is_store:
@@ -191,10 +204,12 @@ def command(
             ran, saved = tally.ran, tally.saved
     click.echo(f"wrote {out}, {math.prod(grid.shape)} points; passes run {ran}, saved {saved}")
     if sheet:
-        Path(sheet).write_bytes(vkbloom.contact_sheet(dataset))
+        safe_writing.write_whole(Path(sheet), vkbloom.contact_sheet(dataset))
         click.echo(f"wrote {sheet}")
     if curves:
-        vkbloom.response_curves(dataset).savefig(curves)
+        drawn = io.BytesIO()
+        vkbloom.response_curves(dataset).savefig(drawn, format=Path(curves).suffix[1:].lower())
+        safe_writing.write_whole(Path(curves), drawn.getvalue())
         click.echo(f"wrote {curves}")
 
 
@@ -206,6 +221,19 @@ def _check_combination(
         raise click.UsageError("--workers makes a cluster, --scheduler names one; give one of them")
     if needs_store and not is_store:
         raise click.UsageError(f"--reduce and --chunk are for a store, NAME{_STORE}")
+
+
+def _check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:
+    """Find out before a long grid what would be in the way of a drawing of it."""
+    if file is None:
+        return
+    path = Path(file)
+    if path.suffix.lower() not in suffixes:
+        raise click.UsageError(f"{option} {file}: its extension is none of {', '.join(suffixes)}")
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), file)
+    if not path.absolute().parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file)
 
 
 def _source(

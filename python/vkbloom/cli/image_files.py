@@ -12,6 +12,7 @@ import click
 import numpy as np
 
 from vkbloom import image_reading
+from vkbloom.cli.program import given
 from vkbloom.images import Colour, Picture, StoredImage
 
 #: What the colours in a file can be said to be.
@@ -36,6 +37,17 @@ def read(path: str, subimage: int) -> StoredImage:
     """Read an image file; the only message of a failure is that of the exception."""
     with _silenced():
         return image_reading.load(path, subimage)
+
+
+def check_part_is_given(path: str, stored: StoredImage) -> None:
+    """Raise click.UsageError where a file has several parts and nobody said which is meant."""
+    if len(stored.parts) > 1 and not given("subimage"):
+        raise click.UsageError(f"{path}: --subimage has to name one of its {_listed(stored)}")
+
+
+def _listed(stored: StoredImage) -> str:
+    names = ", ".join(f"{index} {name}" for index, name in enumerate(stored.parts) if name)
+    return f"parts {names}" if names else f"{len(stored.parts)} parts"
 
 
 def note(text: str) -> None:
@@ -64,6 +76,8 @@ def read_picture(
         picture = image_reading.decode(stored, colour, raw=raw)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
+    if len(stored.parts) > 1 and not given("subimage"):
+        note(f"{source}: the first of its {_listed(stored)}; --subimage reads another")
     nan = int(np.isnan(picture.values).sum())
     infinite = int(np.isinf(picture.values).sum())
     if nan or infinite:

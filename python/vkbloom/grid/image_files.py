@@ -19,7 +19,7 @@ from vkbloom.grid.order import Block, Index, blocks, points
 from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.running import Writer
 from vkbloom.grid.sources import ImageSource
-from vkbloom.images import Encoding, Picture
+from vkbloom.images import Encoding, Picture, check_name
 
 __all__ = ["FileForm", "GridFiles"]
 
@@ -118,6 +118,7 @@ class GridFiles:
         forms: Sequence[FileForm] = (),
     ) -> None:
         image_writing.check_writable(f"image{suffix}")
+        check_name(folder)
         # Writers are sent with every task, and need not know the pixels.
         light = replace(grid, source=ImageSource(()))
         self._files = _FileWriter(folder.absolute(), suffix, light, layout, tuple(forms))

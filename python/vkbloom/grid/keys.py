@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +54,18 @@ class Keys:
         """Write a key; on disk another reader sees all of it or what was there before."""
         prototype = import_extra("zarr.core.buffer", "grid", "Grids on disk")
         buffer = prototype.default_buffer_prototype().buffer.from_bytes(content)
-        _sync(self.store.set(key, buffer))
+        with self.named(key):
+            _sync(self.store.set(key, buffer))
+
+    @contextmanager
+    def named(self, key: str) -> Iterator[None]:
+        """Name what was written in an OSError that does not, as of a full disk."""
+        try:
+            yield
+        except OSError as error:
+            if error.errno is None or error.filename is not None:
+                raise
+            raise OSError(error.errno, error.strerror, f"{self.name}/{key}") from error
 
     def all(self) -> set[str]:
         """Return all keys."""
@@ -121,7 +133,12 @@ def open_keys(store: Any) -> Keys:
     if isinstance(store, zarr.abc.store.Store):
         return Keys(store)
     if isinstance(store, str) and "://" in store:
-        return Keys(zarr.storage.FsspecStore.from_url(store))
+        system, path = import_extra("fsspec.core", "grid", "Grids on disk").url_to_fs(store)
+        local = import_extra("fsspec.implementations.local", "grid", "Grids on disk")
+        if not isinstance(system, local.LocalFileSystem):
+            return Keys(zarr.storage.FsspecStore.from_url(store))
+        # A folder of this machine: what is promised of those holds for it, too.
+        store = path
     if isinstance(store, str | os.PathLike):
         return Keys(zarr.storage.LocalStore(Path(store).absolute()))
     raise TypeError(f"store: a folder, an URL or a Zarr store is needed, not {store!r}")

@@ -195,7 +195,8 @@ class GridWriter:
     def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write a block's variables."""
         for name, values in arrays.items():
-            self._array(name)[block.slices] = values
+            with self.keys.named(name):
+                self._array(name)[block.slices] = values
 
     def keys_of(self, block: Block) -> list[str]:
         """Return the keys that hold a block."""
@@ -370,7 +371,8 @@ class GridStore:
         written = []
         for part in blocks(self.grid.shape, array.chunks, range(touched.ndim)):
             if touched[part.slices].any():
-                array[part.slices] = self.done[part.slices]
+                with self.keys.named(DONE):
+                    array[part.slices] = self.done[part.slices]
                 written.append(chunk_key(DONE, part, array.chunks, 0))
         self.keys.flush(written)
 

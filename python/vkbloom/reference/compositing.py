@@ -11,7 +11,7 @@ from .image import as_float, format_of, storage
 from .sampling import Array
 from .tone_map import ENCODINGS, TONE_MAPS
 
-__all__ = ["composite"]
+__all__ = ["check_settings", "composite"]
 
 
 class CompositeSettings(Protocol):
@@ -33,6 +33,12 @@ class CompositeSettings(Protocol):
     def dither(self) -> bool: ...
     @property
     def dither_seed(self) -> int: ...
+
+
+def check_settings(settings: object) -> None:
+    """Raise TypeError for what has not even the fields that all settings have."""
+    if not hasattr(settings, "composite"):
+        raise TypeError(f"settings must be vkbloom.Settings, not {settings!r}")
 
 
 def composite(
@@ -69,10 +75,11 @@ def composite(
     Raises
     ------
     TypeError
-        An image of another dtype, or none where the bloom is on.
+        An image of another dtype, or none where the bloom is on; `settings` are none.
     ValueError
         An image of another shape, or sizes that differ.
     """
+    check_settings(settings)
     image = as_float(scene, "scene", (3, 4))
     stored = np.asarray(scene).dtype if dtype is None else np.dtype(dtype)
     original = image[..., :3]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import bevy, dual_kawase, filament, hdrp, kino, pyramid, separable, unreal, urp
-from .compositing import CompositeSettings, composite
+from .compositing import CompositeSettings, check_settings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
 from .threshold import extract
@@ -87,10 +87,11 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     Raises
     ------
     TypeError
-        An image of another dtype.
+        An image of another dtype, or `settings` that are none.
     ValueError
         An image of another shape.
     """
+    method = _method(settings)
     scene = as_float(image, "image", (3, 4))
     dtype = np.asarray(image).dtype
     if not settings.bloom:
@@ -98,7 +99,6 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     height, width, _ = scene.shape
     store = storage(format_of(image, settings.format))
     reduced = sample(finite(scene[..., :3]), _bloom_size(settings, (width, height)))
-    method = _method(settings)
     threshold = None if method.published else settings.threshold
     glow = store(extract(reduced, threshold, settings.knee))
     blurred = method.passes(glow, settings, (width, height), store)
@@ -139,10 +139,11 @@ def passes(
     Raises
     ------
     TypeError
-        A glow of another dtype.
+        A glow of another dtype, or `settings` that are none.
     ValueError
         A glow of another shape, a size under 1 or an unknown format.
     """
+    method = _method(settings)
     values = finite(as_float(glow, "glow"))
     height, width, channels = values.shape
     if size is not None and min(size) < 1:
@@ -150,7 +151,7 @@ def passes(
     store = storage(format_of(glow, settings.format if format is None else format))
     has_alpha = channels == 4
     colours = store(values[..., :3] if has_alpha else values)
-    framebuffers = _method(settings).passes(colours, settings, size or (width, height), store)
+    framebuffers = method.passes(colours, settings, size or (width, height), store)
     if not has_alpha:
         return framebuffers
     return {name: _with_alpha(rgb) for name, rgb in framebuffers.items()}
@@ -204,6 +205,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
 
 
 def _method(settings: Settings) -> _Method:
+    check_settings(settings)
     try:
         return _METHODS[settings.method]
     except KeyError:

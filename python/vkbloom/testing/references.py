@@ -27,6 +27,7 @@ __all__ = ["NAME", "Origin", "Reference", "ReferenceFolder", "cpu_vendor"]
 #: What names of references and framebuffers may be: nothing that a file system treats specially.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]{0,99}")
 _FRAMEBUFFER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}")
+_FILE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]*")
 _FORMAT: Final = 1
 
 # Extension and OpenImageIO's name of the numbers by the array's dtype.
@@ -176,11 +177,11 @@ class ReferenceFolder:
     def _listed(self, name: str) -> list[dict[str, Any]]:
         file = self.file(name)
         try:
-            text = file.read_text(encoding="utf-8")
+            stored = file.read_bytes()
         except FileNotFoundError:
             return []
         try:
-            content = json.loads(text)
+            content = json.loads(stored.decode())
             references = content["references"]
             if content["format"] != _FORMAT:
                 raise ValueError(f"format {content['format']!r} is not {_FORMAT}")
@@ -190,9 +191,13 @@ class ReferenceFolder:
                 for entry in listed["framebuffers"]:
                     tuple(entry["shape"])
                     np.dtype(entry["dtype"])
-                    if Path(entry["file"]).name != entry["file"]:
+                    if not _FRAMEBUFFER.fullmatch(entry["name"]):
+                        raise ValueError(f"{entry['name']!r} cannot name a framebuffer")
+                    if not _FILE.fullmatch(entry["file"]):
                         raise ValueError(f"{entry['file']!r} is not in this folder")
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
+        except KeyError as error:
+            raise ValueError(f"{file}: not a list of references: no {error}") from error
+        except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise ValueError(f"{file}: not a list of references: {error}") from error
         found: list[dict[str, Any]] = references
         return found

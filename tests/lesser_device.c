@@ -1,0 +1,405 @@
+// A Vulkan layer for tests: the device below it with less than it has. VKBLOOM_LESSER names what is
+// taken, separated by commas. test_lesser_devices.py builds and uses it.
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <vulkan/vk_layer.h>
+
+#define INSTANCE_FUNCTIONS(FUNCTION) \
+    FUNCTION(vkCreateDevice) \
+    FUNCTION(vkGetPhysicalDeviceProperties) \
+    FUNCTION(vkGetPhysicalDeviceProperties2) \
+    FUNCTION(vkGetPhysicalDeviceFeatures) \
+    FUNCTION(vkGetPhysicalDeviceFeatures2) \
+    FUNCTION(vkGetPhysicalDeviceFormatProperties) \
+    FUNCTION(vkGetPhysicalDeviceFormatProperties2) \
+    FUNCTION(vkGetPhysicalDeviceQueueFamilyProperties) \
+    FUNCTION(vkGetPhysicalDeviceQueueFamilyProperties2) \
+    FUNCTION(vkGetPhysicalDeviceMemoryProperties) \
+    FUNCTION(vkGetPhysicalDeviceMemoryProperties2) \
+    FUNCTION(vkEnumerateDeviceExtensionProperties)
+
+#define DEVICE_FUNCTIONS(FUNCTION) \
+    FUNCTION(vkGetBufferMemoryRequirements) \
+    FUNCTION(vkGetImageMemoryRequirements) \
+    FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
+    FUNCTION(vkAllocateMemory)
+
+// What is below. Of the first instance and its first device, and good for all: these functions go
+// by their handles.
+static struct {
+    PFN_vkGetInstanceProcAddr instance_proc;
+    PFN_vkGetDeviceProcAddr device_proc;
+#define MEMBER(name) PFN_##name name;
+    INSTANCE_FUNCTIONS(MEMBER)
+    DEVICE_FUNCTIONS(MEMBER)
+#undef MEMBER
+} below;
+
+static bool lacks(const char *name)
+{
+    const char *list = getenv("VKBLOOM_LESSER");
+    const size_t length = strlen(name);
+
+    for (; list && *list; list += strcspn(list, ","), list += *list == ',')
+        if (strcspn(list, ",") == length && strncmp(list, name, length) == 0)
+            return true;
+    return false;
+}
+
+static void lower(uint32_t *limit, uint32_t least)
+{
+    *limit = *limit < least ? *limit : least;
+}
+
+static void raise_to(VkDeviceSize *alignment, VkDeviceSize most)
+{
+    *alignment = *alignment > most ? *alignment : most;
+}
+
+// What every device must have at the least, and no more (Vulkan 1.3, "Required Limits").
+static void lower_limits(VkPhysicalDeviceLimits *limits)
+{
+    lower(&limits->maxImageDimension2D, 4096);
+    lower(&limits->maxImageDimensionCube, 4096);
+    lower(&limits->maxFramebufferWidth, 4096);
+    lower(&limits->maxFramebufferHeight, 4096);
+    lower(&limits->maxViewportDimensions[0], 4096);
+    lower(&limits->maxViewportDimensions[1], 4096);
+    lower(&limits->maxColorAttachments, 4);
+    lower(&limits->maxFragmentOutputAttachments, 4);
+    lower(&limits->maxFragmentCombinedOutputResources, 4);
+    lower(&limits->maxFragmentInputComponents, 64);
+    lower(&limits->maxVertexOutputComponents, 64);
+    lower(&limits->maxUniformBufferRange, 16384);
+    lower(&limits->maxPerStageDescriptorSamplers, 16);
+    lower(&limits->maxPerStageDescriptorUniformBuffers, 12);
+    lower(&limits->maxPerStageDescriptorSampledImages, 16);
+    lower(&limits->maxPerStageDescriptorStorageImages, 4);
+    lower(&limits->maxPerStageResources, 128);
+    lower(&limits->maxDescriptorSetSamplers, 96);
+    lower(&limits->maxDescriptorSetUniformBuffers, 72);
+    lower(&limits->maxDescriptorSetSampledImages, 96);
+    lower(&limits->maxDescriptorSetStorageImages, 24);
+    lower(&limits->maxComputeSharedMemorySize, 16384);
+    lower(&limits->maxComputeWorkGroupInvocations, 128);
+    lower(&limits->maxComputeWorkGroupSize[0], 128);
+    lower(&limits->maxComputeWorkGroupSize[1], 128);
+    lower(&limits->maxComputeWorkGroupSize[2], 64);
+    for (int i = 0; i < 3; ++i)
+        lower(&limits->maxComputeWorkGroupCount[i], 65535);
+    lower(&limits->maxDrawIndexedIndexValue, (1u << 24) - 1);
+    lower(&limits->maxMemoryAllocationCount, 4096);
+    lower(&limits->maxSamplerAllocationCount, 4000);
+    raise_to(&limits->minUniformBufferOffsetAlignment, 256);
+    raise_to(&limits->nonCoherentAtomSize, 256);
+}
+
+static void change_properties(VkPhysicalDeviceProperties *properties)
+{
+    if (lacks("limits"))
+        lower_limits(&properties->limits);
+    // Less than any device may have: the validation layer must object.
+    if (lacks("bindings"))
+        properties->limits.maxPerStageDescriptorStorageImages = 0;
+    if (lacks("wide"))
+        lower(&properties->limits.maxImageDimension2D, 5000);
+    if (lacks("high"))
+        lower(&properties->limits.maxFramebufferHeight, 5000);
+    if (lacks("cpu"))
+        properties->deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_properties(VkPhysicalDevice physical,
+                                                 VkPhysicalDeviceProperties *properties)
+{
+    below.vkGetPhysicalDeviceProperties(physical, properties);
+    change_properties(properties);
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_properties2(VkPhysicalDevice physical,
+                                                  VkPhysicalDeviceProperties2 *properties)
+{
+    below.vkGetPhysicalDeviceProperties2(physical, properties);
+    change_properties(&properties->properties);
+    for (VkBaseOutStructure *next = properties->pNext; next; next = next->pNext)
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT
+            && lacks("limits"))
+            raise_to(&((VkPhysicalDeviceExternalMemoryHostPropertiesEXT *)next)
+                          ->minImportedHostPointerAlignment,
+                     65536);
+}
+
+static void change_features(VkPhysicalDeviceFeatures *features)
+{
+    if (lacks("storage"))
+        features->shaderStorageImageWriteWithoutFormat = VK_FALSE;
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_features(VkPhysicalDevice physical,
+                                               VkPhysicalDeviceFeatures *features)
+{
+    below.vkGetPhysicalDeviceFeatures(physical, features);
+    change_features(features);
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_features2(VkPhysicalDevice physical,
+                                                VkPhysicalDeviceFeatures2 *features)
+{
+    below.vkGetPhysicalDeviceFeatures2(physical, features);
+    change_features(&features->features);
+}
+
+static void change_format(VkFormat format, VkFormatProperties *properties)
+{
+    VkFormatFeatureFlags taken = 0;
+
+    if (format == VK_FORMAT_R32G32B32A32_SFLOAT && lacks("blend"))
+        taken |= VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT;
+    if (format == VK_FORMAT_R32G32B32A32_SFLOAT && lacks("filter"))
+        taken |= VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT;
+    if (format == VK_FORMAT_D32_SFLOAT && lacks("depth"))
+        taken |= VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT;
+    properties->linearTilingFeatures &= ~taken;
+    properties->optimalTilingFeatures &= ~taken;
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_format(VkPhysicalDevice physical, VkFormat format,
+                                             VkFormatProperties *properties)
+{
+    below.vkGetPhysicalDeviceFormatProperties(physical, format, properties);
+    change_format(format, properties);
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_format2(VkPhysicalDevice physical, VkFormat format,
+                                              VkFormatProperties2 *properties)
+{
+    below.vkGetPhysicalDeviceFormatProperties2(physical, format, properties);
+    change_format(format, &properties->formatProperties);
+    for (VkBaseOutStructure *next = properties->pNext; next; next = next->pNext)
+        if (next->sType == VK_STRUCTURE_TYPE_FORMAT_PROPERTIES_3) {
+            VkFormatProperties3 *third = (VkFormatProperties3 *)next;
+            third->linearTilingFeatures &= ~(VkFormatFeatureFlags2)0xffffffff
+                                         | properties->formatProperties.linearTilingFeatures;
+            third->optimalTilingFeatures &= ~(VkFormatFeatureFlags2)0xffffffff
+                                          | properties->formatProperties.optimalTilingFeatures;
+        }
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_families(VkPhysicalDevice physical, uint32_t *count,
+                                               VkQueueFamilyProperties *families)
+{
+    below.vkGetPhysicalDeviceQueueFamilyProperties(physical, count, families);
+    for (uint32_t i = 0; families && i < *count && lacks("timestamps"); ++i)
+        families[i].timestampValidBits = 0;
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_families2(VkPhysicalDevice physical, uint32_t *count,
+                                                VkQueueFamilyProperties2 *families)
+{
+    below.vkGetPhysicalDeviceQueueFamilyProperties2(physical, count, families);
+    for (uint32_t i = 0; families && i < *count && lacks("timestamps"); ++i)
+        families[i].queueFamilyProperties.timestampValidBits = 0;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL get_extensions(VkPhysicalDevice physical, const char *layer,
+                                                     uint32_t *count,
+                                                     VkExtensionProperties *extensions)
+{
+    VkResult result =
+        below.vkEnumerateDeviceExtensionProperties(physical, layer, count, extensions);
+
+    for (uint32_t i = 0; extensions && i < *count && lacks("import"); ++i)
+        if (strcmp(extensions[i].extensionName, "VK_EXT_external_memory_host") == 0)
+            strcpy(extensions[i].extensionName, "VK_EXT_another");
+    return result;
+}
+
+// Memory of the device's own, the host's without a cache, and the host's with one that is not
+// coherent: all of them the one type below.
+enum { DEVICE_TYPE, COHERENT_TYPE, CACHED_TYPE, TYPE_COUNT };
+
+static void change_memory(VkPhysicalDeviceMemoryProperties *memory)
+{
+    static const VkMemoryPropertyFlags flags[TYPE_COUNT] = {
+        [DEVICE_TYPE] = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT,
+        [COHERENT_TYPE] =
+            VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT,
+        [CACHED_TYPE] = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT,
+    };
+
+    if (!lacks("memory"))
+        return;
+    memory->memoryTypeCount = TYPE_COUNT;
+    for (int i = 0; i < TYPE_COUNT; ++i)
+        memory->memoryTypes[i] = (VkMemoryType){.propertyFlags = flags[i]};
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_memory(VkPhysicalDevice physical,
+                                             VkPhysicalDeviceMemoryProperties *memory)
+{
+    below.vkGetPhysicalDeviceMemoryProperties(physical, memory);
+    change_memory(memory);
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_memory2(VkPhysicalDevice physical,
+                                              VkPhysicalDeviceMemoryProperties2 *memory)
+{
+    below.vkGetPhysicalDeviceMemoryProperties2(physical, memory);
+    change_memory(&memory->memoryProperties);
+}
+
+static void change_requirements(VkMemoryRequirements *requirements)
+{
+    if (lacks("memory"))
+        requirements->memoryTypeBits = (1 << TYPE_COUNT) - 1;
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_buffer_requirements(VkDevice handle, VkBuffer buffer,
+                                                          VkMemoryRequirements *requirements)
+{
+    below.vkGetBufferMemoryRequirements(handle, buffer, requirements);
+    change_requirements(requirements);
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_image_requirements(VkDevice handle, VkImage image,
+                                                         VkMemoryRequirements *requirements)
+{
+    below.vkGetImageMemoryRequirements(handle, image, requirements);
+    change_requirements(requirements);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL get_host_pointer(VkDevice handle,
+                                                       VkExternalMemoryHandleTypeFlagBits type,
+                                                       const void *pointer,
+                                                       VkMemoryHostPointerPropertiesEXT *properties)
+{
+    VkResult result = below.vkGetMemoryHostPointerPropertiesEXT(handle, type, pointer, properties);
+
+    // The host's own memory is cached, and whoever imports it cannot invalidate it.
+    if (lacks("memory"))
+        properties->memoryTypeBits = 1 << CACHED_TYPE;
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAllocateInfo *info,
+                                               const VkAllocationCallbacks *callbacks,
+                                               VkDeviceMemory *memory)
+{
+    VkMemoryAllocateInfo changed = *info;
+
+    if (lacks("memory"))
+        changed.memoryTypeIndex = 0;
+    return below.vkAllocateMemory(handle, &changed, callbacks, memory);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,
+                                                      const VkAllocationCallbacks *callbacks,
+                                                      VkInstance *created)
+{
+    VkLayerInstanceCreateInfo *link = (VkLayerInstanceCreateInfo *)info->pNext;
+
+    while (link->sType != VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO
+           || link->function != VK_LAYER_LINK_INFO)
+        link = (VkLayerInstanceCreateInfo *)link->pNext;
+    below.instance_proc = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
+    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
+    PFN_vkCreateInstance create =
+        (PFN_vkCreateInstance)below.instance_proc(VK_NULL_HANDLE, "vkCreateInstance");
+    VkResult result = create(info, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)below.instance_proc(*created, #name);
+    if (result == VK_SUCCESS && !below.vkCreateDevice) {
+        INSTANCE_FUNCTIONS(FETCH)
+    }
+#undef FETCH
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
+                                                    const VkDeviceCreateInfo *info,
+                                                    const VkAllocationCallbacks *callbacks,
+                                                    VkDevice *created)
+{
+    VkLayerDeviceCreateInfo *link = (VkLayerDeviceCreateInfo *)info->pNext;
+
+    while (link->sType != VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO
+           || link->function != VK_LAYER_LINK_INFO)
+        link = (VkLayerDeviceCreateInfo *)link->pNext;
+    below.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
+    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
+    VkResult result = below.vkCreateDevice(physical, info, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)below.device_proc(*created, #name);
+    if (result == VK_SUCCESS && !below.vkAllocateMemory) {
+        DEVICE_FUNCTIONS(FETCH)
+    }
+#undef FETCH
+    return result;
+}
+
+static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name);
+static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name);
+
+static const struct entry {
+    const char *name;
+    PFN_vkVoidFunction function;
+    bool of_device;
+} entries[] = {
+#define ENTRY(name, function, of_device) {#name, (PFN_vkVoidFunction)function, of_device}
+    ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
+    ENTRY(vkCreateInstance, create_instance, false),
+    ENTRY(vkCreateDevice, create_device, false),
+    ENTRY(vkGetPhysicalDeviceProperties, get_properties, false),
+    ENTRY(vkGetPhysicalDeviceProperties2, get_properties2, false),
+    ENTRY(vkGetPhysicalDeviceProperties2KHR, get_properties2, false),
+    ENTRY(vkGetPhysicalDeviceFeatures, get_features, false),
+    ENTRY(vkGetPhysicalDeviceFeatures2, get_features2, false),
+    ENTRY(vkGetPhysicalDeviceFeatures2KHR, get_features2, false),
+    ENTRY(vkGetPhysicalDeviceFormatProperties, get_format, false),
+    ENTRY(vkGetPhysicalDeviceFormatProperties2, get_format2, false),
+    ENTRY(vkGetPhysicalDeviceFormatProperties2KHR, get_format2, false),
+    ENTRY(vkGetPhysicalDeviceQueueFamilyProperties, get_families, false),
+    ENTRY(vkGetPhysicalDeviceQueueFamilyProperties2, get_families2, false),
+    ENTRY(vkGetPhysicalDeviceQueueFamilyProperties2KHR, get_families2, false),
+    ENTRY(vkGetPhysicalDeviceMemoryProperties, get_memory, false),
+    ENTRY(vkGetPhysicalDeviceMemoryProperties2, get_memory2, false),
+    ENTRY(vkGetPhysicalDeviceMemoryProperties2KHR, get_memory2, false),
+    ENTRY(vkEnumerateDeviceExtensionProperties, get_extensions, false),
+    ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
+    ENTRY(vkGetBufferMemoryRequirements, get_buffer_requirements, true),
+    ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
+    ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
+    ENTRY(vkAllocateMemory, allocate, true),
+};
+
+static PFN_vkVoidFunction find(const char *name, bool of_device)
+{
+    for (size_t i = 0; i < sizeof entries / sizeof entries[0]; ++i)
+        if (strcmp(entries[i].name, name) == 0 && (entries[i].of_device || !of_device))
+            return entries[i].function;
+    return NULL;
+}
+
+static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name)
+{
+    PFN_vkVoidFunction found = find(name, false);
+
+    return found || !handle ? found : below.instance_proc(handle, name);
+}
+
+static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name)
+{
+    PFN_vkVoidFunction found = find(name, true);
+
+    return found ? found : below.device_proc(handle, name);
+}
+
+VK_LAYER_EXPORT VKAPI_ATTR VkResult VKAPI_CALL
+vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface *layer)
+{
+    layer->loaderLayerInterfaceVersion = 2;
+    layer->pfnGetInstanceProcAddr = get_instance_proc;
+    layer->pfnGetDeviceProcAddr = get_device_proc;
+    layer->pfnGetPhysicalDeviceProcAddr = NULL;
+    return VK_SUCCESS;
+}
