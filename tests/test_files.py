@@ -211,6 +211,10 @@ class TestFiles:
         (file,) = make({"final": image}).save(tmp_path / "b.ppm")
         assert file.name == "b.exr"
         assert np.array_equal(np.rint(255.0 * read(file)["final"].pixels), image)
+        # Of floats the largest alpha is 1, not 255.
+        for alpha, name in ((1, "c.hdr"), (255, "c.exr")):
+            frames = make({"final": np.full((8, 8, 4), (0.5, 0.5, 0.5, alpha), np.float32)})
+            assert frames.save(tmp_path / "c.hdr") == [tmp_path / name]
 
     def test_jpeg(self, tmp_path: Path) -> None:
         image = np.full((8, 8, 4), 255, np.uint8)
