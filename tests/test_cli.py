@@ -134,6 +134,21 @@ def test_an_interrupt_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (result.exit_code, result.stderr) == (1, "\nvkbloom: interrupted\n")
 
 
+@pytest.mark.parametrize("kind", [AssertionError, OSError])
+def test_what_fails_because_of_an_interrupt_is_one(
+    monkeypatch: pytest.MonkeyPatch, kind: type[Exception]
+) -> None:
+    def interrupt() -> None:
+        try:
+            raise KeyboardInterrupt
+        finally:
+            raise kind("not started yet")
+
+    monkeypatch.setattr(vkbloom, "adapters", interrupt)
+    result = vkb("adapters")
+    assert (result.exit_code, result.stderr) == (1, "vkbloom: interrupted\n")
+
+
 def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail() -> None:
         raise KeyError("missing")
@@ -536,6 +551,17 @@ def test_text_survives_a_plain_terminal(tmp_path: Path, encoding: str, name: str
     assert "ms on the CPU" in ended.stdout
     # To click, ASCII is a terminal that does not say what it is: it gets UTF-8.
     assert ended.stdout.endswith(f"{name}.exr\n")
+
+
+def test_without_standard_output_and_error(tmp_path: Path) -> None:
+    """Closed by whoever starts the process, as some that start daemons do."""
+    animation = ["render", "-o", str(tmp_path / "a.png"), "--frames", "2", *SMALL]
+    image = ["apply", str(tmp_path / "a_0000.png"), str(tmp_path / "b.png")]
+    for words in (animation, image):
+        command = [sys.executable, "-m", "vkbloom.cli", *words]
+        ended = subprocess.run(["sh", "-c", 'exec "$@" >&- 2>&-', "sh", *command], check=False)
+        assert ended.returncode == 0
+    assert {file.name for file in tmp_path.iterdir()} == {"a_0000.png", "a_0001.png", "b.png"}
 
 
 def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import signal
 import socket
+import subprocess
+import sys
+import time
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -158,6 +163,23 @@ class TestStores:
         done(*words, "-o", tmp_path / "b.zarr")
         found, expected = (xr.open_zarr(tmp_path / name) for name in ("a.zarr", "b.zarr"))
         np.testing.assert_array_equal(found["final"].values, expected["final"].values)
+
+    def test_an_interrupt_of_all_processes(self, tmp_path: Path, picture: Path) -> None:
+        """Ctrl-C on a terminal, which the workers get as well."""
+        out = tmp_path / "a.zarr"
+        words = [picture, "-o", out, "--axis", "exposure=0:1:5000", "--workers", "2"]
+        running = subprocess.Popen(
+            [sys.executable, "-m", "vkbloom.cli", "grid", *map(str, words)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        while not (out / "zarr.json").exists() and running.poll() is None:
+            time.sleep(0.05)
+        os.killpg(running.pid, signal.SIGINT)
+        stdout, stderr = running.communicate()
+        assert (running.returncode, stdout, stderr) == (1, "", "\nvkbloom: interrupted\n")
 
     @pytest.mark.parametrize(
         ("words", "told"),
@@ -423,6 +445,8 @@ class TestOptionFiles:
             # Found by fuzzing, or while its targets were written.
             ("a.yaml", "images:", 1, "a.yaml: images must be a list"),
             ("a.toml", "images = 3", 1, "a.toml: images must be a list"),
+            ("a.toml", 'resume = "yes"', 1, "a.toml: resume must be true or false, not 'yes'"),
+            ("a.toml", "settings = {bloom = 1}", 1, "a.toml: bloom must be true or false, not 1"),
             ("a.yaml", "axes: {1: [[1, 2]]}", 2, "--axis 1: the method separable has no such"),
             ("a.yaml", "a: !!bool x", 1, "a.yaml: a value does not fit its tag"),
             ("a.yaml", "a: !!timestamp x", 1, "a.yaml: a value does not fit its tag"),

@@ -113,6 +113,9 @@ class TestFigures:
         found = compare(a, b)
         assert found.data_range == 9.5
         assert found.psnr == pytest.approx(20 * math.log10(9.5 / 0.5), rel=1e-9)
+        assert found.ssim == pytest.approx(
+            metrics.structural_similarity(a, b, data_range=9.5, channel_axis=-1), rel=1e-5
+        )
         assert compare(a, b, data_range=2).psnr == pytest.approx(20 * math.log10(4), rel=1e-9)
         assert compare(a, b, data_range=2).data_range == 2
 
@@ -186,6 +189,10 @@ class TestFigures:
         assert compare(a, b, relative=0.1).percent_over == 75.0
         assert compare(a, b, threshold=0.1).percent_over == 75.0
         assert compare(a, b, threshold=math.inf).percent_over == 0.0
+        # Relative to the first image, the reference: 1 by 1.5, and 1.5 by 1.5 the other way round.
+        one, other = np.array([[1.0]]), np.array([[2.5]])
+        assert compare(one, other, relative=1.0).percent_over == 100.0
+        assert compare(other, one, relative=1.0).percent_over == 0.0
 
     @pytest.mark.parametrize("wanted", [(), ("ssim",), ("psnr",), ("flip",), ("ssim", "flip")])
     def test_metrics_that_are_asked_for(self, wanted: tuple[Any, ...]) -> None:

@@ -138,6 +138,50 @@ def test_positions_are_what_depth_and_projection_say(frames: Frames) -> None:
     assert (error <= HALF * np.abs(expected[body]) + 2e-4 * 13).all()
 
 
+def rotation(axis: int, angle: float) -> NDArray[np.float64]:
+    """Return the 3x3 matrix that turns by `angle` radians around x, y or z."""
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[[a, b], [a, b]] = math.cos(angle)
+    matrix[b, a] = math.sin(angle)
+    matrix[a, b] = -math.sin(angle)
+    return matrix
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.1, 0.25, 0.5, 0.8, -0.35, 1.15])
+def test_camera_and_animation_place_every_point(renderer: Renderer, turns: float) -> None:
+    # Body and glow are a triangle, in both windings, whose colours are where its points lie.
+    corners = np.eye(3, dtype=np.float32)
+    vertices = np.concatenate((corners, np.tile(corners[2], (3, 1)), corners), axis=1)
+    mesh = Mesh(vertices, np.array([0, 1, 2, 2, 1, 0], np.uint32))
+    camera = Camera(position=(0.3, 0.2, -4.0), rotation=(20.0, -40.0, 30.0), fov=60.0)
+    scene = Scene(body=mesh, glow=mesh, camera=camera)
+    seen = deferred(renderer, scene, time=turns)
+    body = seen["depth"] < 1
+    assert body.mean() > 0.005
+    points, normals = rgb(seen["albedo"])[body], rgb(seen["normal"])[body]
+    np.testing.assert_array_equal(rgb(seen["brightness"])[body], points)
+
+    # The forward system's formulas: model = translate * rotate x * rotate y, view = translate *
+    # rotate x * rotate y * rotate z.
+    angle = 2 * math.pi * turns
+    turned = rotation(0, -0.15 * math.sin(angle)) @ rotation(1, angle)
+    moved = (0.25 * math.sin(angle), -1.0, 0.25 * math.cos(angle))
+    x, y, z = (rotation(axis, math.radians(camera.rotation[axis])) for axis in range(3))
+    view = x @ y @ z
+    positions = (points @ turned.T + moved) @ view.T + camera.position
+    # Points and positions are rounded to half; positions are up to 6 away.
+    assert np.abs(rgb(seen["position"])[body] - positions).max() <= HALF * (2 + 6)
+    expected = view @ turned @ (0.0, 0.0, 1.0)
+    np.testing.assert_allclose(normals, np.tile(expected, (len(normals), 1)), atol=2 * HALF)
+
+    settings = Separable(bloom_size=SIZE, format="rgba16float")
+    forward = renderer.render(scene, settings, SIZE, time=turns)
+    for name in ("depth", "glow_depth"):
+        np.testing.assert_array_equal(forward[name], seen["depth"], err_msg=name)
+    np.testing.assert_array_equal(forward["glow"], seen["brightness"])
+
+
 def test_normals_are_those_of_the_surface(frames: Frames) -> None:
     normal, position = rgb(frames["normal"]), rgb(frames["position"])
     body = frames["depth"] < 1

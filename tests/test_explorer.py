@@ -16,7 +16,7 @@ from framebuffers import decode, make, noise
 import vkbloom
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, presets
 from vkbloom.explorer.controls import METHODS, as_code, controls, settings_from
-from vkbloom.explorer.shown import picture_of, reduced
+from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.explorer.viewer import Viewer
 
 EXAMPLES = [
@@ -72,6 +72,9 @@ class TestControls:
                 if field["kind"] == "number":
                     assert field["low"] <= field["from"] < field["to"] <= field["high"]
                     assert 0 < field["step"] <= field["to"] - field["from"]
+                    # Of 1, 2 and 5 times powers of ten, neighbours are 2.5 times apart at the most.
+                    steps = (field["to"] - field["from"]) / field["step"]
+                    assert field["whole"] or 200 <= steps * (1 + 1e-9) <= 500
                     assert value is None or field["low"] <= value <= field["high"]
                     assert field["whole"] == (type(value) is int)
                 elif field["kind"] == "choice":
@@ -169,6 +172,13 @@ class TestShown:
         assert (small == 50).all()
         assert reduced(image, (60, 40)) is image
         assert reduced(image, (1, 1)).shape == (1, 1, 3)
+
+    def test_numbers_have_the_digits_that_tell_them_apart(self) -> None:
+        pixel = np.array([0.0, 0.1, -1e-3, 1e-5, 999999, 1e6, np.nan, -np.inf], np.float32)
+        expected = ["0.0", "0.1", "-0.001", "1.0e-05", "999999.0", "1.0e+06", "nan", "-inf"]
+        assert texts_of(pixel) == expected
+        assert texts_of(pixel[:2].astype(np.float16)) == ["0.0", "0.1"]
+        assert texts_of(np.array([0, 255], np.uint8)) == ["0", "255"]
 
 
 class TestViewer:

@@ -211,6 +211,10 @@ class TestFiles:
         (file,) = make({"final": image}).save(tmp_path / "b.ppm")
         assert file.name == "b.exr"
         assert np.array_equal(np.rint(255.0 * read(file)["final"].pixels), image)
+        # Of floats the largest alpha is 1, not 255.
+        for alpha, name in ((1, "c.hdr"), (255, "c.exr")):
+            frames = make({"final": np.full((8, 8, 4), (0.5, 0.5, 0.5, alpha), np.float32)})
+            assert frames.save(tmp_path / "c.hdr") == [tmp_path / name]
 
     def test_jpeg(self, tmp_path: Path) -> None:
         image = np.full((8, 8, 4), 255, np.uint8)
@@ -229,6 +233,14 @@ class TestFiles:
         with pytest.raises(ValueError, match=re.escape(repr(extension))):
             frames.save(tmp_path / f"out{extension}")
         assert names_in(tmp_path) == []
+
+    def test_no_name(self, frames: Frames, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(ValueError, match=r"^path: .* is needed, not ''"):
+            frames.save("")
+        assert names_in(tmp_path) == []
+        frames.save(".")
+        assert "final.png" in names_in(tmp_path)
 
     def test_nothing_to_save(self, tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="no framebuffer"):
@@ -282,6 +294,17 @@ class TestWhatIsThere:
         assert caught.value.filename == str(link)
         assert names_in(tmp_path) == ["out.exr"]
 
+    def test_a_current_folder_that_is_gone(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        gone = tmp_path / "gone"
+        gone.mkdir()
+        monkeypatch.chdir(gone)
+        gone.rmdir()
+        with pytest.raises(FileNotFoundError) as caught:
+            make({"final": noise(4, 5, 3, dtype="uint8")}).save("out.exr")
+        assert caught.value.filename == "out.exr"
+
     def test_permissions_stay(self, tmp_path: Path) -> None:
         file = tmp_path / "out.exr"
         frames = make({"final": noise(4, 5, 3, dtype="uint8")})
@@ -327,6 +350,17 @@ class TestWriteErrors:
         assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
         assert names_in(tmp_path) == [file.name]
         assert file.read_text() == "the one before"
+
+    def test_an_interrupt_leaves_nothing(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def interrupted(array: Any) -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("vkbloom.safe_writing.np.ascontiguousarray", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            safe_writing.write_whole(tmp_path / "a.png", b"bytes")
+        assert names_in(tmp_path) == []
 
     def test_disk_is_full_of_bytes(self, tmp_path: Path) -> None:
         file = tmp_path / "sheet.png"

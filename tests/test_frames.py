@@ -157,5 +157,6 @@ class TestXarray:
 
     def test_xarray_missing(self, frames: Frames, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "xarray", None)
-        with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[grid\]"):
+        with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[grid\]") as caught:
             frames.to_xarray()
+        assert caught.value.name == "xarray"

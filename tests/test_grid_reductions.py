@@ -65,6 +65,12 @@ class TestEncircledEnergy:
         found = reductions.EncircledEnergy(radii=(1,), centre=(1, 2))(frames(bloom=bloom))
         np.testing.assert_allclose(found, [0.2126 / (0.2126 + 0.7152)], rtol=EXACT)
 
+    def test_what_is_no_light_counts_as_0(self) -> None:
+        bloom = np.ones((3, 3, 3), np.float32)
+        bloom[0, 0], bloom[0, 1], bloom[2, 2] = -5, np.nan, np.inf
+        found = reductions.EncircledEnergy(radii=(1,), centre=(1, 1))(frames(bloom=bloom))
+        np.testing.assert_allclose(found, [4 / 6], rtol=EXACT)
+
     def test_without_light_there_is_no_share(self) -> None:
         dark = frames(bloom=np.zeros((3, 3, 3), np.float32))
         assert np.isnan(reductions.EncircledEnergy()(dark)).all()

@@ -116,9 +116,11 @@ class TestWhole:
             assert contents(tmp_path / "a.zarr") == contents(undisturbed)
 
     def test_counts_are_of_this_call(self, copy: Path) -> None:
-        again = make(copy)
+        mended: list[str] = []
+        again = make(copy, on_mended=mended.append)
         assert again.attrs["passes_run"] == 0
         assert "vkbloom_grid" not in again.attrs
+        assert mended == []
 
     def test_black_pictures_are_stored_too(self, tmp_path: Path) -> None:
         black = np.zeros((4, 4, 3), np.uint8)

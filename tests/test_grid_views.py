@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from framebuffers import noise
 
 from vkbloom import Renderer, contact_sheet, reductions, response_curves
+from vkbloom.grid.views import select
 
 xr = pytest.importorskip("xarray")
 pytest.importorskip("matplotlib")
@@ -96,6 +98,55 @@ class TestContactSheet:
             contact_sheet(xr.Dataset())
         with pytest.raises(ValueError, match="no framebuffers"):
             contact_sheet(dataset[["mean"]])
+
+
+class TestSelect:
+    @pytest.mark.parametrize(
+        ("axis", "values", "at", "place"),
+        [
+            # In whatever order the values are, with None among them or not.
+            ("exposure", [1.0, 0.0, 2.0], 0.0, 1),
+            ("exposure", [1.0, 0.0, 2.0], 1.7, 2),
+            ("exposure", [1.0, 0.0, 2.0], np.float32(-30), 1),
+            ("loops", [3, 1, 2], 2, 2),
+            ("threshold", [None, 0.7, 0.3], 0.4, 2),
+            ("threshold", [0.7, None, 0.3], None, 1),
+            ("threshold", [0.7, None, 0.3], np.nan, 1),
+            ("direct", [False, True], True, 1),
+            ("tonemap", ["aces", "none"], "none", 1),
+            ("format", ["rgba16float", None], None, 1),
+            ("format", ["rgba16float", None], "none", 1),
+        ],
+    )
+    def test_the_nearest_number_or_that_text(
+        self, renderer: Renderer, axis: str, values: Any, at: Any, place: int
+    ) -> None:
+        image = noise(6, 8, 3, dtype="uint8")
+        grid = renderer.grid(
+            image, None, {"blur_scale": [0.5, 1.0], axis: values}, attachments=["final"]
+        )
+        found = select(grid, {axis: at}, ("blur_scale",))
+        assert found.identical(grid.isel({axis: place}))
+
+    @pytest.mark.parametrize(
+        ("axis", "values", "at"),
+        [
+            ("exposure", [1.0, 0.0], "one"),
+            ("exposure", [1.0, 0.0], None),
+            ("exposure", [1.0, 0.0], np.inf),
+            ("exposure", [1.0, 0.0], [0.0, 1.0]),
+            ("exposure", [1.0, 0.0], [0.0, 1.0, 2.0]),
+            ("tonemap", ["aces", "none"], 1),
+            ("tonemap", ["aces", "none"], ["aces", "none"]),
+            ("direct", [False, True], "on"),
+        ],
+    )
+    def test_values_that_are_not_there(
+        self, renderer: Renderer, axis: str, values: Any, at: Any
+    ) -> None:
+        grid = renderer.grid(noise(6, 8, 3, dtype="uint8"), None, {axis: values})
+        with pytest.raises(ValueError, match=f"at: {axis} has no value {re.escape(repr(at))}"):
+            select(grid, {axis: at}, ())
 
 
 class TestResponseCurves:

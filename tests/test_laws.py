@@ -135,6 +135,27 @@ def test_the_picture_with_its_bloom(renderer: Renderer) -> None:
     assert "light is added and none is taken" in message
 
 
+def off_by(*amounts: float) -> Bloom:
+    """Return a bloom of 1 whose results are off, each call's by the next amount."""
+    left = iter(amounts)
+    return lambda image: image.astype(np.float64) + next(left)
+
+
+def test_every_result_may_be_off() -> None:
+    probe = Probe(size=(5, 5), dtype="float64", atol=0.01)
+    # The mixture of the two images in one direction, both in the other: by 0.01 each, 0.0175.
+    testing.assert_superposition(off_by(0.0099, -0.0099, -0.0099), probe)
+    fails(testing.assert_superposition, off_by(0.0101, -0.0101, -0.0101), probe)
+    # The picture, and half of the bloom that is added: 0.015.
+    picture, glow = off_by(0.0099, 0.0101), off_by(-0.0099, -0.0101)
+
+    def lit(image: NDArray[Any]) -> NDArray[Any]:
+        return picture(image) + 0.5 * image
+
+    testing.assert_additive(lit, glow, 0.5, probe)
+    fails(testing.assert_additive, lit, glow, 0.5, probe)
+
+
 class TestBrokenLaws:
     def test_superposition(self) -> None:
         message = fails(testing.assert_superposition, in_floats(lambda image: image**1.1), SMALL)

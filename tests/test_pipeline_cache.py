@@ -178,6 +178,9 @@ def test_the_users_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert pipeline_cache.folder() == tmp_path / "vkbloom"
-    monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path))
+    for ignored in ("", "relative"):
+        monkeypatch.setenv("XDG_CACHE_HOME", ignored)
+        assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"
+    monkeypatch.delenv("XDG_CACHE_HOME")
     assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"

@@ -109,6 +109,14 @@ def test_a_flat_image_gets_the_gain(renderer: Renderer, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
+def test_negative_colours(renderer: Renderer, name: str) -> None:
+    image = lights((41, 29), "float32") * 4 - 3
+    # Where 1 + luminance is 0.
+    image[:12, :16] = -1
+    check(renderer, image, presets[name].replace(format="rgba32float"))
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
 def test_nan_and_infinity_are_not_spread(renderer: Renderer, name: str) -> None:
     image = lights((33, 21), "float32")
     image[4, 5, 0], image[10, 20, 1], image[20, 0, 2] = np.nan, np.inf, -np.inf
@@ -178,6 +186,26 @@ def test_bevys_sizes(renderer: Renderer) -> None:
 @pytest.mark.parametrize("format", FORMATS.values())
 def test_bevys_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
     check(renderer, lights((91, 53), "float32"), settings.replace(format=format))
+
+
+NARROWER: list[tuple[Any, str, float, float]] = [
+    (BevyBloom, "intensity", 0.0, 1.0),
+    (KinoBloom, "radius", 1.0, 7.0),
+    (FilamentBloom, "intensity", 0.0, 1.0),
+    (FilamentBloom, "levels", 1, 12),
+    (HdrpBloom, "intensity", 0.0, 1.0),
+    (UnrealBloom, "radius", 0.0, 1.0),
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "low", "high"), NARROWER)
+def test_a_range_is_that_of_the_source(kind: Any, name: str, low: float, high: float) -> None:
+    for value in (low, high):
+        assert getattr(kind(**{name: value}), name) == value
+    step = 1 if isinstance(low, int) else 1e-9
+    for value in (low - step, high + step):
+        with pytest.raises(ValueError, match=rf"^{name}: .* out of range"):
+            kind(**{name: value})
 
 
 def test_bevy_has_no_screen_and_ends_at_1() -> None:
@@ -342,7 +370,7 @@ def test_unitys_other_settings(renderer: Renderer, settings: Settings, format: A
     check(renderer, lights((211, 153), "float32"), settings.replace(format=format))
 
 
-@pytest.mark.parametrize("size", [(801, 451), (800, 449), (799, 450)])
+@pytest.mark.parametrize("size", [(800, 450), (800, 449), (799, 450)])
 @pytest.mark.parametrize("smooth", [True, False])
 def test_hdrps_cubic_filter_is_for_larger_frames(
     renderer: Renderer, size: tuple[int, int], smooth: bool

@@ -243,6 +243,12 @@ def test_firefly_filter_weights_the_groups_of_the_first_downsample_alone() -> No
     assert_close(passes["down_1"], slow_taps(expected, (3, 3), DOWN_13))
 
 
+def test_a_negative_luminance_counts_as_0_in_the_firefly_filter() -> None:
+    # 1 / (1 - 1) would be infinite.
+    passes = reference.passes(np.full((8, 8, 3), -1.0), Pyramid(firefly_filter=True))
+    assert_array_equal(passes["down_0"], np.full((4, 4, 3), -1.0))
+
+
 def test_dual_kawase_is_what_loops_over_its_taps_compute() -> None:
     glow = random_image(9, 13)
     expected = slow_dual_kawase(glow, [(6, 4), (3, 2)], 1.3, (11, 10))

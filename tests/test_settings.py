@@ -178,7 +178,6 @@ def test_the_edges_of_a_range_are_in_it(name: str, low: Any, high: Any) -> None:
         np.array("a"),
         Decimal("sNaN"),
     ],
-    ids=repr,
 )
 def test_a_number_is_needed(name: str, value: object) -> None:
     with pytest.raises(TypeError, match=rf"^{name}: "):
@@ -196,7 +195,6 @@ def test_a_whole_number_is_needed(name: str) -> None:
 @pytest.mark.parametrize(
     "value",
     ["None", "ADD", "", 0, ["add"], b"add", np.array("add"), np.array(["add"]), np.zeros(2)],
-    ids=repr,
 )
 def test_a_name_is_one_of_a_list(name: str, value: object) -> None:
     with pytest.raises((TypeError, ValueError), match=rf"^{name}: ") as caught:

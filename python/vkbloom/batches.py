@@ -79,7 +79,7 @@ class _Points:
                 self._alone = len(settings)
             else:
                 self._alone = max(0, self._alone - 1)
-                # The first frame waits for no other; nor are more settings taken than were used.
+                # The first frame waits for no other, and whoever uses a few has a few made in vain.
                 self._limit = min(2 * self._limit, POINTS)
                 return _Submitted(batch, settings, time.perf_counter())
 

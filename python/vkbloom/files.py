@@ -55,6 +55,9 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
     if not frames:
         raise ValueError("these Frames hold no framebuffer to save")
     oiio = import_extra("OpenImageIO", "images", "Frames.save")
+    if os.fspath(path) == "":
+        # Such as a shell's variable that is not set. This folder is ".".
+        raise ValueError("path: the name of a file or a folder is needed, not ''")
     target = Path(path)
     check_name(target)
     plan: dict[Path, list[str]]

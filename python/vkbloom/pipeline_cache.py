@@ -30,8 +30,9 @@ def folder() -> Path | None:
             return (Path(local) if local else Path.home() / "AppData/Local") / "vkbloom"
         if sys.platform == "darwin":
             return Path.home() / "Library/Caches/vkbloom"
-        cache = os.environ.get("XDG_CACHE_HOME")
-        return (Path(cache) if cache else Path.home() / ".cache") / "vkbloom"
+        cache = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        # The XDG Base Directory Specification wants relative ones ignored.
+        return (cache if cache.is_absolute() else Path.home() / ".cache") / "vkbloom"
     return None
 
 

@@ -99,10 +99,13 @@ def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
             stream.write(bytes(_LARGEST_HEADER))
             for array in arrays:
                 stream.write(np.ascontiguousarray(array).data)
-    except OSError as error:
+    except BaseException as error:
+        # Ctrl-C too, which a large file leaves time for.
         with contextlib.suppress(OSError):
             temporary.unlink()
-        raise OSError(error.errno, error.strerror, str(file)) from error
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror, str(file)) from error
+        raise
     return temporary
 
 
@@ -226,7 +229,11 @@ def write_whole(file: Path, content: bytes) -> None:
 
 def _meant(file: Path) -> Path:
     """Return the file that a name stands for: links are written through, not replaced."""
-    return Path(os.path.realpath(file))
+    try:
+        return Path(os.path.realpath(file))
+    except OSError as error:
+        # The current folder is not there any more.
+        raise OSError(error.errno, error.strerror, str(file)) from error
 
 
 def _is_readable(oiio: ModuleType, file: Path) -> bool:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import io
 import logging
 import math
 import os
+import queue
+import signal
+import threading
 import typing
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any, Final
 
@@ -43,7 +48,7 @@ _STORE: Final = ".zarr"
     "--out",
     required=True,
     type=click.Path(),
-    help="NAME.zarr: a Zarr store, as is an URL that fsspec knows. Else a folder of image files.",
+    help="NAME.zarr: a Zarr store, as is a URL that fsspec knows. Else a folder of image files.",
 )
 @click.option(
     "--axis",
@@ -266,13 +271,51 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
             yield client
         return
     with (
+        _deaf_loop() as loop,
         distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             # None would still serve at Dask's own port, and warn where that is taken.
             dashboard_address="127.0.0.1:0",
-            silence_logs=logging.ERROR,
+            # What fails comes as an exception; what is cancelled is told as an error.
+            silence_logs=logging.CRITICAL,
+            loop=loop,
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
         yield client
+
+
+@contextmanager
+def _deaf_loop() -> Iterator[Any]:
+    """Give an event loop whose thread, and all that it starts, gets no SIGINT.
+
+    A terminal sends Ctrl-C to every process. This one ends the others in order; where they end by
+    themselves, each says how on standard error.
+    """
+    loop_of = import_extra("tornado.ioloop", "grid", "--workers")
+    started: queue.Queue[Any] = queue.Queue()
+
+    def run() -> None:
+        async def serve() -> None:
+            stopped = asyncio.Event()
+            started.put((loop_of.IOLoop.current(), stopped))
+            await stopped.wait()
+
+        asyncio.run(serve())
+
+    # Else it is started with the first process, and lets SIGINT through for that.
+    resource_tracker.ensure_running()
+    # A thread, and a process that it starts, blocks what blocked the thread that started it.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        thread = threading.Thread(target=run, name="vkbloom-cluster", daemon=True)
+        thread.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    loop, stopped = started.get()
+    try:
+        yield loop
+    finally:
+        loop.add_callback(stopped.set)
+        thread.join()

@@ -96,6 +96,10 @@ def _silenced() -> Iterator[None]:
 
     libpng does so of damaged files, and not through OpenImageIO.
     """
+    if sys.stderr is None:
+        # It was closed before this process began: the descriptor is of something else, or of none.
+        yield
+        return
     sys.stderr.flush()
     try:
         kept = os.dup(_STANDARD_ERROR)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -52,13 +52,13 @@ class CommandWithFile(click.Command):
                 if path is None:
                     raise click.UsageError(f"{FILE_OPTION} needs the name of a file", ctx)
                 # Before the others, which so replace them.
-                found = [*_words(_read(Path(path)), path, self._switches()), *found]
+                found = [*_words(_read(Path(path)), path, self._flags()), *found]
         return super().parse_args(ctx, found)
 
-    def _switches(self) -> set[str]:
-        """Return the flags that can only be given or left out."""
+    def _flags(self) -> dict[str, bool]:
+        """Return the flags by name, and whether there is another one that turns it off."""
         flags = (one for one in self.params if isinstance(one, click.Option) and one.is_flag)
-        return {name for flag in flags if not flag.secondary_opts for name in flag.opts}
+        return {name: bool(flag.secondary_opts) for flag in flags for name in flag.opts}
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -129,7 +129,7 @@ def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, 
     return known[id(value)]
 
 
-def _words(content: Mapping[str, Any], path: str, switches: Container[str]) -> list[str]:
+def _words(content: Mapping[str, Any], path: str, flags: Mapping[str, bool]) -> list[str]:
     """Return what would stand on the command line."""
     words: list[str] = []
     arguments: list[str] = []
@@ -140,7 +140,7 @@ def _words(content: Mapping[str, Any], path: str, switches: Container[str]) -> l
         elif key in _PLAIN_TABLES:
             prefix = "camera-" if key == "camera" else ""
             for name, inner in _table(value, key, path).items():
-                words += _option(_named(name, prefix, path), inner, switches)
+                words += _option(_named(name, prefix, path), inner, path, flags)
         elif key == _ARGUMENTS:
             listed = [value] if isinstance(value, str) else value
             if not isinstance(listed, list):
@@ -149,7 +149,7 @@ def _words(content: Mapping[str, Any], path: str, switches: Container[str]) -> l
         elif f"--{key}" == FILE_OPTION:
             raise ValueError(f"{path}: {key} cannot stand in a file")
         else:
-            words += _option(_named(key, "", path), value, switches)
+            words += _option(_named(key, "", path), value, path, flags)
     return [*words, *arguments]
 
 
@@ -166,12 +166,16 @@ def _named(key: object, prefix: str, path: str) -> str:
     return f"{prefix}{key}"
 
 
-def _option(name: str, value: Any, switches: Container[str]) -> list[str]:
+def _option(name: str, value: Any, path: str, flags: Mapping[str, bool]) -> list[str]:
     option = name.replace("_", "-")
-    if value is False and f"--{option}" in switches:
+    is_flag = f"--{option}" in flags
+    if value is False and is_flag and not flags[f"--{option}"]:
         return []
     if isinstance(value, bool):
         return [f"--{option}" if value else f"--no-{option}"]
+    if is_flag:
+        # What follows a flag is taken for an image.
+        raise ValueError(f"{path}: {name} must be true or false, not {value!r}")
     return [f"--{option}", _spelled(value, "x" if option in _SIZES else ",:")]
 
 

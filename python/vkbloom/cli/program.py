@@ -50,9 +50,20 @@ class Program(click.Group):
             _exit(1, error.format_message())
         except click.Abort:
             _exit(1, "interrupted")
-        except _FAILURES as error:
-            _exit(1, _described(error))
+        except Exception as error:
+            if _is_of_an_interrupt(error):
+                _exit(1, "interrupted")
+            if isinstance(error, _FAILURES):
+                _exit(1, _described(error))
+            raise
         sys.exit(status)
+
+
+def _is_of_an_interrupt(error: BaseException | None) -> bool:
+    """Whether an error came while Ctrl-C was ending something, such as a cluster that starts."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
 
 
 def _described(error: BaseException) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import typing
 from collections.abc import Callable
 from pathlib import Path
@@ -78,7 +79,7 @@ def command(
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
         click.echo(f"Rendering on {renderer.info.summary}")
         # None: shown where standard error is a terminal.
-        disable = True if count is None else None
+        disable = True if count is None or sys.stderr is None else None
         turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
         for index in turn:
             with blaming_the_call():

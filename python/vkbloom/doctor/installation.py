@@ -24,6 +24,8 @@ _EXTRAS: Final = {
     "grid": "to_xarray and grids of settings",
     "cli": "the command line",
     "quality": "quality figures such as SSIM",
+    "notebook": "the explorer, in notebooks and on its own page",
+    "pytest": "frame_regression in tests",
 }
 # Variables of the loader, of Mesa and of this package that change what is rendered, or where.
 _TELLING_VARIABLES: Final = re.compile(

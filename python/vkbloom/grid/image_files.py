@@ -79,10 +79,8 @@ class _FileWriter:
             return
         info = {"adapter": self.layout.adapter, "driver": self.layout.driver}
         frames = Frames({name: array}, timings={}, settings=point.settings, info=info)
-        for written in frames.save(path):
-            # What the format cannot hold becomes an OpenEXR file beside it.
-            if written != path:
-                written.replace(path.with_suffix(".exr"))
+        # What the format cannot hold becomes an OpenEXR file beside it.
+        frames.save(path)
 
     def is_there(self, index: Index) -> bool:
         """Return whether all files of a point are there."""

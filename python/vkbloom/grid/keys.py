@@ -118,7 +118,7 @@ def open_keys(store: Any) -> Keys:
     Parameters
     ----------
     store : str, path-like or zarr.abc.store.Store
-        A folder, which need not be there, an URL that fsspec knows, or a store.
+        A folder, which need not be there, a URL that fsspec knows, or a store.
 
     Returns
     -------
@@ -141,4 +141,4 @@ def open_keys(store: Any) -> Keys:
         store = path
     if isinstance(store, str | os.PathLike):
         return Keys(zarr.storage.LocalStore(Path(store).absolute()))
-    raise TypeError(f"store: a folder, an URL or a Zarr store is needed, not {store!r}")
+    raise TypeError(f"store: a folder, a URL or a Zarr store is needed, not {store!r}")

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     import xarray
@@ -57,7 +60,8 @@ def select(
     ----------
     dataset : xarray.Dataset
     at : mapping of str to object, optional
-        Where to stand along other axes: the nearest number, or that text.
+        Where to stand along other axes: the nearest number, or that text. None is a value that
+        was None.
     shown : sequence of str
 
     Returns
@@ -78,15 +82,27 @@ def select(
             raise ValueError(f"at: {name!r} is one of the axes that are shown")
     for name in axes:
         if name in (at or {}):
-            value = (at or {})[name]
-            is_number = dataset[name].dtype.kind in "iuf"
-            try:
-                dataset = dataset.sel({name: value}, method="nearest" if is_number else None)
-            except (KeyError, TypeError) as error:
-                raise ValueError(f"at: {name} has no value {value!r}") from error
+            dataset = dataset.isel({name: _place(name, dataset[name].values, (at or {})[name])})
         elif name not in shown:
             dataset = dataset.isel({name: 0})
     return dataset
+
+
+def _place(name: str, values: NDArray[Any], value: Any) -> int:
+    """Return where along an axis `select` stands."""
+    is_text = values.dtype.kind not in "biuf"
+    is_number = isinstance(value, Real)
+    if value is None or (is_number and math.isnan(value)):
+        fits = values == "none" if is_text else np.isnan(values)
+    elif is_number and math.isfinite(value) and values.dtype.kind in "iuf":
+        # xarray's own nearest needs values in their order, and without NaN for None.
+        distances = np.abs(values - float(value))
+        fits = distances == np.nanmin(distances)
+    else:
+        fits = values == value if np.ndim(value) == 0 else np.zeros(values.shape, np.bool_)
+    if not fits.any():
+        raise ValueError(f"at: {name} has no value {value!r}")
+    return int(fits.argmax())
 
 
 def label(value: Any) -> str:

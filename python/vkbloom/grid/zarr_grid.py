@@ -60,7 +60,7 @@ def grid_to_zarr(
     source, settings, axes, size, shading, time, attachments, reduce, progress
         As for `vkbloom.Renderer.grid`.
     store : str, path-like or zarr.abc.store.Store
-        A folder, an URL that fsspec knows, or a store. With a `client` all workers must be able
+        A folder, a URL that fsspec knows, or a store. With a `client` all workers must be able
         to write to it.
     client : distributed.Client, optional
         The workers of its cluster render and write; by default this process does.
