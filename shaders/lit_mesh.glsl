@@ -8,5 +8,5 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    colour = vec4(phong(surface_colour(), normalize(view_normal), view_position), 1.0);
+    colour = vec4(phong(surface_colour(), LAMP, normalize(view_normal), view_position), 1.0);
 }

@@ -4,13 +4,15 @@
 const vec3 LIGHT_POSITION = vec3(-5.0, -5.0, 0.0);
 // Colours with a channel this bright count as lamps and get ambient light.
 const float LAMP = 0.9;
+// The same as a half float holds it.
+const float LAMP_IN_HALF = 0.89990234375;
 
-vec3 phong(vec3 colour, vec3 n, vec3 position)
+vec3 phong(vec3 colour, float lamp, vec3 n, vec3 position)
 {
     vec3 l = normalize(LIGHT_POSITION - position);
     vec3 v = normalize(-position);
     vec3 r = reflect(-l, n);
-    vec3 ambient = any(greaterThanEqual(colour, vec3(LAMP))) ? colour * 0.25 : vec3(0.0);
+    vec3 ambient = any(greaterThanEqual(colour, vec3(lamp))) ? colour * 0.25 : vec3(0.0);
     vec3 diffuse = max(dot(n, l), 0.0) * colour;
     vec3 specular = vec3(pow(max(dot(r, v), 0.0), 8.0) * 0.75);
     return ambient + diffuse + specular;

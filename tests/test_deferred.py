@@ -436,6 +436,22 @@ def test_without_bloom_both_systems_show_the_same(
     np.testing.assert_array_equal(forward["depth"], shown["depth"])
 
 
+def test_a_lamp_is_one_in_both_systems(renderer: Renderer) -> None:
+    # 0.9 itself is a lamp, though the G-buffer's half floats hold 0.8999 for it.
+    colours = np.full((3, 3, 3), 0.2)
+    for channel in range(3):
+        colours[channel, :, channel] = (0.89, 0.9, 0.91)
+    wall = screen(colours, (3, 3))
+    assert wall.glow is not None
+    scene = Scene(body=wall.glow, camera=wall.camera)
+    shown = deferred(renderer, scene, None, (3, 3))
+    expected = reference.shade(*(shown[name] for name in GBUFFER[:4]))
+    np.testing.assert_allclose(rgb(shown["scene"]), expected[..., :3], rtol=HALF, atol=1e-5)
+    forward = rgb(renderer.render(scene, None, (3, 3))["scene"]) / 255
+    # Half a level, and what half floats round.
+    np.testing.assert_allclose(np.clip(rgb(shown["scene"]), 0, 1), forward, atol=1 / 255)
+
+
 # HDR
 
 

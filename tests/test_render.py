@@ -18,6 +18,7 @@ from skimage.metrics import structural_similarity
 
 import vkbloom
 from vkbloom import Camera, Renderer, Scene, Separable, reference
+from vkbloom.scene import Mesh
 
 SIZE = (320, 180)
 FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]
@@ -204,6 +205,25 @@ def test_the_body_does_not_hide_the_glow(renderer: Renderer, scene: Scene) -> No
     np.testing.assert_array_equal(
         glow, renderer.render(shown, None, SIZE, attachments="glow")["glow"]
     )
+
+
+def test_of_two_surfaces_in_one_place_the_later_is_seen(renderer: Renderer) -> None:
+    # The depth test is LESS_OR_EQUAL in the forward system.
+    first, second = (screen(colour * np.ones((1, 1, 3)), SIZE).glow for colour in (0.25, 0.5))
+    assert first is not None
+    assert second is not None
+    both = Mesh(
+        np.concatenate((first.vertices, second.vertices)),
+        np.concatenate((first.indices, second.indices + np.uint32(len(first.vertices)))),
+    )
+    camera = screen(np.ones((1, 1, 3)), SIZE).camera
+    seen, alone = (
+        renderer.render(Scene(body=mesh, glow=mesh, camera=camera), None, SIZE)
+        for mesh in (both, second)
+    )
+    for name in ("glow", "scene"):
+        assert rgb(alone[name]).any()
+        np.testing.assert_array_equal(seen[name], alone[name], err_msg=name)
 
 
 def test_depth_is_what_the_projection_says(renderer: Renderer) -> None:

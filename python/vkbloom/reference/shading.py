@@ -35,7 +35,7 @@ def shade(
         + max(N.L, 0) c + 0.75 max(R.V, 0)^8 + brightness
 
     Where the normal is (0, 0, 0) there is no surface, and c + brightness is the result. The
-    formula is that of the forward system's Phong pass.
+    formula is that of the forward system's Phong pass; its 0.9 is rounded to the albedo's dtype.
 
     Parameters
     ----------
@@ -75,7 +75,9 @@ def shade(
     n, to_light, to_camera = _unit(normals), _unit(_LIGHT - places), _unit(-places)
     facing = _dot(n, to_light)
     reflected = 2 * facing * n - to_light
-    ambient = np.where((colour >= _LAMP).any(axis=-1, keepdims=True), _AMBIENT * colour, 0.0)
+    # In the precision of the albedo, so that a lamp of 0.9 stays one as a half float.
+    lamp = float(albedo.dtype.type(_LAMP))
+    ambient = np.where((colour >= lamp).any(axis=-1, keepdims=True), _AMBIENT * colour, 0.0)
     specular = _SPECULAR * np.maximum(_dot(reflected, to_camera), 0) ** _SHININESS
     lit = np.where(is_surface, ambient + np.maximum(facing, 0) * colour + specular, colour)
     rgb = storage("rgba16float")(lit + emitted)
