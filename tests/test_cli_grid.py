@@ -77,6 +77,7 @@ class TestAxes:
             ("blur_scale", "NAME=FIRST:LAST:COUNT"),
             ("blur_sale=1", "no such field"),
             ("radius=1", "no such field"),
+            ("method=separable,pyramid", "no such field"),
             ("blur_scale=1:2", "not a valid float"),
             ("blur_scale=1:2:0", "out of range"),
             ("blur_scale=0:2:3:log", "above 0"),
