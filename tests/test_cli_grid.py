@@ -200,6 +200,14 @@ class TestStores:
         assert told in result.stderr
         assert not out.exists()
 
+    def test_a_reference_of_several_images(self, tmp_path: Path, picture: Path) -> None:
+        arrays = {"glow": noise(9, 12, 3, dtype="float32"), "final": load(picture).pixels}
+        file = tmp_path / "frames.exr"
+        vkbloom.Frames(arrays, timings={}, settings=Separable(), info={}).save(file)
+        result = run(picture, "-o", tmp_path / "a.zarr", "--reduce", f"psnr@{file}")
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert "frames.exr holds several images" in result.stderr
+
     @pytest.mark.parametrize("option", ["--sheet", "--curves"])
     def test_drawings_that_cannot_be_written(
         self, tmp_path: Path, picture: Path, option: str

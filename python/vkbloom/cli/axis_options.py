@@ -151,7 +151,10 @@ def named_reductions(
             values = axis_values(reference.split(","), settings)
             arguments["against"] = {axis: value[0] for axis, value in values.items()}
         elif reference:
-            arguments["against"] = read(reference, 0).pixels
+            stored = read(reference, 0)
+            if len(stored.parts) > 1:
+                raise click.UsageError(f"--reduce {word}: {reference} holds several images")
+            arguments["against"] = stored.pixels
         with blaming_the_call():
             found[name if sign else kind] = REDUCTIONS[kind](**arguments)
     return found
