@@ -79,6 +79,7 @@ class TestAxes:
             ("blur_scale", "NAME=FIRST:LAST:COUNT"),
             ("blur_sale=1", "no such field"),
             ("radius=1", "no such field"),
+            ("method=separable,pyramid", "no such field"),
             ("blur_scale=1:2", "not a valid float"),
             ("blur_scale=1:2:0", "out of range"),
             ("blur_scale=0:2:3:log", "above 0"),
@@ -205,6 +206,14 @@ class TestStores:
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert told in result.stderr
         assert not out.exists()
+
+    def test_a_reference_of_several_images(self, tmp_path: Path, picture: Path) -> None:
+        arrays = {"glow": noise(9, 12, 3, dtype="float32"), "final": load(picture).pixels}
+        file = tmp_path / "frames.exr"
+        vkbloom.Frames(arrays, timings={}, settings=Separable(), info={}).save(file)
+        result = run(picture, "-o", tmp_path / "a.zarr", "--reduce", f"psnr@{file}")
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert "frames.exr holds several images" in result.stderr
 
     @pytest.mark.parametrize("option", ["--sheet", "--curves"])
     def test_drawings_that_cannot_be_written(

@@ -488,6 +488,24 @@ def test_other(frame_regression):
         result.stdout.fnmatch_lines(["*test_other: the first framebuffer that differs is bloom *"])
         assert not (project.path / "bloom_references").exists()
 
+    @pytest.mark.parametrize("folder", ["", "file", "file/below"])
+    def test_reports_that_cannot_be_written(self, project: pytest.Pytester, folder: str) -> None:
+        write(project, ONE)
+        (project.path / "file").write_text("kept")
+        result = run(project, f"--bloom-report={folder}")
+        assert result.ret == pytest.ExitCode.USAGE_ERROR
+        result.stderr.fnmatch_lines([f"ERROR: --bloom-report*{folder}: *"])
+        assert (project.path / "file").read_text() == "kept"
+        assert not (project.path / "index.html").exists()
+
+    def test_a_report_that_cannot_be_written_in_the_end(self, project: pytest.Pytester) -> None:
+        write(project, "def test_it(frame_regression): assert False, 'told'")
+        (project.path / "report" / "index.html").mkdir(parents=True)
+        result = run(project, "--bloom-report=report")
+        result.assert_outcomes(failed=1)
+        assert result.ret == pytest.ExitCode.INTERNAL_ERROR
+        result.stdout.fnmatch_lines(["*told*", "report: report is not written: *index.html'"])
+
     @pytest.mark.parametrize(
         "argument",
         ["atol=-1", "rtol=float('nan')", "fail_percent=101", "hard_fail=-1", "ssim=2", "flip=-1"],

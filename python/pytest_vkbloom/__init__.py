@@ -78,6 +78,8 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError("--bloom-update replaces references, --bloom-add keeps them")
     if config.getoption("bloom_expect_adapter") == "":
         raise pytest.UsageError("--bloom-expect-adapter: a name is needed")
+    if config.getoption("bloom_report") == "":
+        raise pytest.UsageError("--bloom-report: a folder is needed")
     run = _Run(config)
     config.stash[_RUN] = run
     config.pluginmanager.register(run, "vkbloom-run")
@@ -163,15 +165,21 @@ class _Run:
         self._passed: dict[str, set[str]] = {}
         self._partly: set[Path] = set()
         self._page: Path | None = None
+        # Why there is no page.
+        self._reason = ""
         wanted = config.getoption("bloom_report")
         self._report = None if wanted is None else config.invocation_params.dir / wanted
         self.parts = None if self._report is None else self._report / ".parts"
         if self._worker_input is not None:
             given = self._worker_input["vkbloom_parts"]
             self.parts = None if given is None else Path(given)
-        elif self.parts is not None:
+        elif self._report is not None and self.parts is not None:
             # What a run left that was interrupted.
             shutil.rmtree(self.parts, ignore_errors=True)
+            try:
+                self._report.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise pytest.UsageError(f"--bloom-report={wanted}: {error.strerror}") from error
 
     def pytest_deselected(self, items: list[pytest.Item]) -> None:
         """Note whose references cannot be called unused."""
@@ -201,13 +209,17 @@ class _Run:
             self._totals[folder] = total
             self._passed.setdefault(folder, set()).add(report.nodeid)
 
-    def pytest_sessionfinish(self) -> None:
-        """Write the report."""
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Write the report; where that fails, what the tests found is told nevertheless."""
         if self._report is None or self.parts is None or self._worker_input is not None:
             return
         from vkbloom.testing.report import write_report  # noqa: PLC0415  costs start-up time
 
-        self._page = write_report(self._report, self.parts, self._records)
+        try:
+            self._page = write_report(self._report, self.parts, self._records)
+        except OSError as error:
+            self._reason = f"{self._relative(self._report)} is not written: {error}"
+            session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """List references that were written, are missing or are unused; say where the report is."""
@@ -219,6 +231,8 @@ class _Run:
         lines += [f"unused: {self._relative(file)}" for file in self._unused()]
         if self._page is not None:
             lines.append(f"report: {self._relative(self._page)}")
+        if self._reason:
+            lines.append(f"report: {self._reason}")
         if lines:
             terminalreporter.section("vkbloom")
             for line in lines:

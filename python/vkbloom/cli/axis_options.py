@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import typing
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -49,7 +50,10 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     click.UsageError
         A word is none of this.
     """
-    types = {**typing.get_type_hints(type(settings)), "time": float}
+    # Without what belongs to the class: the method is the same at all points.
+    hints = typing.get_type_hints(type(settings))
+    types = {field.name: hints[field.name] for field in dataclasses.fields(settings)}
+    types["time"] = float
     found: dict[str, Sequence[Any]] = {}
     for word in words:
         name, sign, text = word.partition("=")
@@ -147,7 +151,10 @@ def named_reductions(
             values = axis_values(reference.split(","), settings)
             arguments["against"] = {axis: value[0] for axis, value in values.items()}
         elif reference:
-            arguments["against"] = read(reference, 0).pixels
+            stored = read(reference, 0)
+            if len(stored.parts) > 1:
+                raise click.UsageError(f"--reduce {word}: {reference} holds several images")
+            arguments["against"] = stored.pixels
         with blaming_the_call():
             found[name if sign else kind] = REDUCTIONS[kind](**arguments)
     return found
