@@ -207,6 +207,7 @@ def test_the_default_is_the_renderers() -> None:
         ("--bloom-size none", {"bloom_size": None}),
         ("--format rgba16float", {"format": "rgba16float"}),
         ("--format none", {"format": None}),
+        ("--threshold None", {"threshold": None}),
         ("--tonemap none", {"tonemap": "none"}),
         ("--tonemap agx --exposure -1.5", {"tonemap": "agx", "exposure": -1.5}),
         ("--loops 3 --first-tap 0 --texel x", {"loops": 3, "first_tap": 0, "texel": "x"}),

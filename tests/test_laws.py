@@ -156,6 +156,16 @@ def test_every_result_may_be_off() -> None:
     fails(testing.assert_additive, lit, glow, 0.5, probe)
 
 
+def test_a_spread_may_be_off_by_what_its_values_may_be() -> None:
+    # A box of 3 x 3 has the variance 2/3. Its values of 1/9 may be off by 0.001, and so may black:
+    # the variance by 3 * 0.002 * sqrt(6), the deviation by that / (2 sqrt(2/3)), which is 0.009.
+    box, sigma = kernel([[1 / 9] * 3] * 3), math.sqrt(2 / 3)
+    probe = Probe(size=(9, 9), dtype="float64", atol=0.001)
+    for sign in (-1, 1):
+        testing.assert_spread(box, sigma + sign * 0.0089, probe, rtol=0.0)
+        fails(testing.assert_spread, box, sigma + sign * 0.0091, probe, rtol=0.0)
+
+
 class TestBrokenLaws:
     def test_superposition(self) -> None:
         message = fails(testing.assert_superposition, in_floats(lambda image: image**1.1), SMALL)
