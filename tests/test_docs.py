@@ -58,6 +58,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 # As test_grid_cluster.py says: what Dask's cluster leaves behind is its own.
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+# And so is what it says where something else on this machine is served at its usual port.
+@pytest.mark.filterwarnings("ignore:Port:UserWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_code_of_a_page(page: Path, folder: Path) -> None:
     """Run a page's code from top to bottom, as one program."""
