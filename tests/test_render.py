@@ -19,6 +19,7 @@ from skimage.metrics import structural_similarity
 import vkbloom
 from vkbloom import Camera, Renderer, Scene, Separable, reference
 from vkbloom.scene import Mesh
+from vkbloom.skybox import Cubemap
 
 SIZE = (320, 180)
 FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]
@@ -173,6 +174,23 @@ def test_no_clip_plane_cuts_the_sky(
     )
     assert rgb(whole).any()
     np.testing.assert_array_equal(other, whole)
+
+
+@pytest.mark.parametrize(
+    ("side", "level"), [(128, 0.0), (48, math.log2(64 / 48)), (23, math.log2(64 / 23))]
+)
+def test_a_small_frame_sees_the_skys_mip_levels(
+    renderer: Renderer, scene: Scene, side: int, level: float
+) -> None:
+    # Each level has its number as its colour, and one face of 64 texels fills the frame.
+    levels = [
+        np.full((6, 64 >> number, 64 >> number, 4), number, np.float32) for number in range(3)
+    ]
+    camera = Camera(position=(0.0, 0.0, 1e4), rotation=(0.0, 0.0, 0.0), fov=90.0)
+    sky = dataclasses.replace(scene, skybox=Cubemap(tuple(levels)), camera=camera)
+    seen = renderer.render(sky, Separable(bloom=False), (side, side), shading="deferred")["albedo"]
+    # Linear between levels; devices approximate which, lavapipe to 0.04 here.
+    np.testing.assert_allclose(rgb(seen), level, atol=0.1)
 
 
 def test_no_sky_is_black(renderer: Renderer, scene: Scene) -> None:
