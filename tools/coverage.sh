@@ -10,8 +10,8 @@ cd "$(dirname "$0")/.."
 PYTHON=${PYTHON:-python3}
 if [ $# = 0 ]; then
     for name in adapters apply apply_input array_memory batches core_arguments deferred \
-        deferred_passes errors forms graph interruption lifetime out_of_date pipeline_cache \
-        presets readback render scene separable settings skybox textures threads; do
+        deferred_passes errors forms graph interruption lesser_devices lifetime out_of_date \
+        pipeline_cache presets readback render scene separable settings skybox textures threads; do
         set -- "$@" "tests/test_$name.py"
     done
 fi
