@@ -172,8 +172,20 @@ def test_no_settings(renderer: Renderer, scene: Scene) -> None:
 # Taken ahead, and no further
 
 
-def test_settings_are_taken_a_bounded_way_ahead(renderer: Renderer) -> None:
-    taken = 0
+@pytest.mark.parametrize("slow", [0, 1, 2, 5])
+def test_settings_are_taken_a_bounded_way_ahead(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, slow: int
+) -> None:
+    taken = collected = 0
+    took = batches._Points.took
+
+    def took_long(points: Any, seconds: float, count: int) -> None:
+        # The first batches, on whose time the next ones' size depends.
+        nonlocal collected
+        collected += 1
+        took(points, 1e6 if collected <= slow else seconds, count)
+
+    monkeypatch.setattr(batches._Points, "took", took_long)
 
     def endless() -> Iterator[Settings]:
         nonlocal taken

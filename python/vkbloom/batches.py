@@ -79,8 +79,9 @@ class _Points:
                 self._alone = len(settings)
             else:
                 self._alone = max(0, self._alone - 1)
-                # The first frame waits for no other, and whoever uses a few has a few made in vain.
-                self._limit = min(2 * self._limit, POINTS)
+                # The first frame waits for no other, and whoever uses a few has a few made in vain:
+                # twice as many as these, which may be fewer than the limit was.
+                self._limit = min(2 * len(settings), POINTS)
                 return _Submitted(batch, settings, time.perf_counter())
 
     def took(self, seconds: float, count: int) -> None:
