@@ -103,7 +103,7 @@ def test_what_is_shipped_cannot_be_told_to_fail() -> None:
 def test_points_of_every_workload(
     faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # All of them, with VKBLOOM_FAULT_STRIDE=1, take about 20 minutes.
+    # All of them, with VKBLOOM_FAULT_STRIDE=1, take about 25 minutes.
     stride = int(os.environ.get("VKBLOOM_FAULT_STRIDE", "40"))
     rows = walk(faulty, stride)
     show(rows, capsys)
@@ -111,9 +111,9 @@ def test_points_of_every_workload(
     assert sum(row["raised"] for row in rows.values()) > 60
     for name, row in rows.items():
         if stride == 1:
-            # Each was reached, and most have no way round them.
+            # Each was reached, and most have no way round them; closing goes on whatever fails.
             assert row["walked"] >= 0.6 * row["points"] > 0, name
-            assert row["raised"] > 0, name
+            assert row["raised"] > 0 or name == "close", name
 
 
 def test_memory_that_python_does_not_get(
