@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import image_writing
+from vkbloom import image_writing, safe_writing
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import differences, identity
 from vkbloom.grid.memory import chunk_of
@@ -164,9 +164,7 @@ class GridFiles:
         own = self._identity
         if not files.folder.exists() or not any(files.folder.iterdir()):
             files.folder.mkdir(parents=True, exist_ok=True)
-            temporary = index.with_suffix(".partial")
-            temporary.write_text(json.dumps(own, indent=1))
-            temporary.replace(index)
+            safe_writing.write_whole(index, json.dumps(own, indent=1).encode())
             return
         try:
             stored = json.loads(index.read_text())

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import image_reading, image_writing
+from vkbloom import image_reading, image_writing, safe_writing
 from vkbloom.images import Picture
 
 __all__ = ["NAME", "Origin", "Reference", "ReferenceFolder", "cpu_vendor"]
@@ -248,9 +248,7 @@ class ReferenceFolder:
 
     def _write_list(self, name: str, references: Sequence[Mapping[str, Any]]) -> None:
         text = json.dumps({"format": _FORMAT, "references": references}, indent=2)
-        temporary = self.path / f".{name}.json"
-        temporary.write_text(f"{text}\n", encoding="utf-8")
-        temporary.replace(self.file(name))
+        safe_writing.write_whole(self.file(name), f"{text}\n".encode())
 
 
 def check_name(name: str) -> None:
