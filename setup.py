@@ -42,7 +42,7 @@ def modules(shader: Path) -> list[Module]:
             Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",))
             for ours, glsl in FORMATS.items()
         ]
-    if '#include "fullscreen.glsl"' in text:
+    if '#include "lib/fullscreen.glsl"' in text:
         dispatch = Module(f"{shader.stem}_dispatch", shader, ("-DDISPATCH", "-S", "comp"))
         return [Module(name, shader), dispatch]
     return [Module(name, shader)]
@@ -68,7 +68,9 @@ def compile_module(module: Module) -> tuple[int, ...]:
 def write_spirv() -> None:
     """Write spirv.h and spirv.c: an enum of the modules, and their code, one row for each."""
     SPIRV.mkdir(parents=True, exist_ok=True)
-    shaders = sorted(path for path in SHADERS.iterdir() if path.suffix in STAGES)
+    shaders = sorted(
+        (path for path in SHADERS.rglob("*.*") if path.suffix in STAGES), key=lambda path: path.name
+    )
     built = [module for shader in shaders for module in modules(shader)]
     names = {module.name for module in built}
     enum = "".join(f"    VKB_SHADER_{module.name},\n" for module in built)
@@ -130,12 +132,12 @@ setup(
     ext_modules=[
         Extension(
             "vkbloom._core",
-            sources=sorted(str(path) for path in Path("csrc").glob("*.c")),
+            sources=sorted(str(path) for path in Path("csrc").rglob("*.c")),
             depends=[
-                *(str(path) for path in Path("csrc").glob("*.h")),
-                *(str(path) for path in SHADERS.iterdir()),
+                *(str(path) for path in Path("csrc").rglob("*.h")),
+                *(str(path) for path in SHADERS.rglob("*.*")),
             ],
-            include_dirs=["csrc", volk_folder()],
+            include_dirs=["csrc", ".", volk_folder()],
             define_macros=[("VK_NO_PROTOTYPES", None), ("Py_LIMITED_API", "0x030b0000")],
             libraries=[] if os.name == "nt" else ["m", "dl"],
             py_limited_api=True,

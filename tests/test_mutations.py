@@ -94,7 +94,7 @@ def build(mutation: Mutation, tree: Path) -> Path:
         shutil.copytree(ROOT / folder, tree / folder, ignore=ignored)
     for name in ("setup.py", "pyproject.toml", "README.md"):
         shutil.copy(ROOT / name, tree / name)
-    shader = tree / "shaders" / mutation.shader
+    (shader,) = (tree / "shaders").rglob(mutation.shader)
     text = shader.read_text()
     assert text.count(mutation.original) == 1
     shader.write_text(text.replace(mutation.original, mutation.mutated))

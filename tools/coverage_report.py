@@ -20,7 +20,7 @@ LEFT_OUT = {"faults.c", "faults.h"}
 
 def main(tree: Path, listed: Path) -> int:
     """Print a table of lines and branches by file."""
-    counts = sorted(tree.glob("build/**/csrc/*.gcda"))
+    counts = sorted(tree.glob("build/**/csrc/*/*.gcda"))
     lines: dict[str, dict[int, int]] = defaultdict(dict)
     branches: dict[str, list[int]] = defaultdict(list)
     with tempfile.TemporaryDirectory() as folder:
@@ -34,14 +34,15 @@ def main(tree: Path, listed: Path) -> int:
         for report in sorted(Path(folder).glob("*.gcov.json.gz")):
             for each in json.loads(gzip.decompress(report.read_bytes()))["files"]:
                 path = Path(each["file"])
-                if path.parent.name != "csrc" or path.name in LEFT_OUT:
+                if path.parent.parent.name != "csrc" or path.name in LEFT_OUT:
                     continue
+                name = f"{path.parent.name}/{path.name}"
                 for line in each["lines"]:
                     number = line["line_number"]
-                    kept = lines[path.name].get(number, 0)
-                    lines[path.name][number] = kept + line["count"]
-                    branches[path.name] += [branch["count"] for branch in line["branches"]]
-    print(f"{'file':<22}{'lines':>7}{'reached':>9}{'branches':>10}{'taken':>9}")
+                    kept = lines[name].get(number, 0)
+                    lines[name][number] = kept + line["count"]
+                    branches[name] += [branch["count"] for branch in line["branches"]]
+    print(f"{'file':<30}{'lines':>7}{'reached':>9}{'branches':>10}{'taken':>9}")
     missed: list[str] = []
     for name in sorted(lines):
         source = (tree / "csrc" / name).read_text().splitlines()
@@ -62,7 +63,7 @@ def row(name: str, lines: list[int], branches: list[int]) -> None:
     """Print one row of the table."""
     reached = sum(map(bool, lines)) / max(1, len(lines))
     taken = sum(map(bool, branches)) / max(1, len(branches))
-    print(f"{name:<22}{len(lines):>7}{reached:>9.1%}{len(branches):>10}{taken:>9.1%}")
+    print(f"{name:<30}{len(lines):>7}{reached:>9.1%}{len(branches):>10}{taken:>9.1%}")
 
 
 if __name__ == "__main__":

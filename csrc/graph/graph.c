@@ -1,0 +1,255 @@
+#include "graph/graph.h"
+
+#include <string.h>
+
+void vkb_graph_destroy(struct vkb_graph *graph)
+{
+    vkb_free(graph->images);
+    vkb_free(graph->passes);
+    *graph = (struct vkb_graph){0};
+}
+
+bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *row, uint32_t *index,
+                         struct vkb_error *error)
+{
+    if (!vkb_grow(error, &graph->images, &graph->image_capacity, graph->image_count + 1,
+                  sizeof *graph->images))
+        return false;
+    graph->images[graph->image_count] = *row;
+    if (index)
+        *index = graph->image_count;
+    ++graph->image_count;
+    return true;
+}
+
+bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
+                        struct vkb_error *error)
+{
+    if (!vkb_grow(error, &graph->passes, &graph->pass_capacity, graph->pass_count + 1,
+                  sizeof *graph->passes))
+        return false;
+    // Rows are compared byte by byte to find what is out of date, so padding is copied too.
+    memcpy(&graph->passes[graph->pass_count++], row, sizeof *row);
+    return true;
+}
+
+bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
+{
+    if (a->image_count != b->image_count)
+        return false;
+    for (uint32_t i = 0; i < a->image_count; ++i) {
+        const struct vkb_image_row *x = &a->images[i], *y = &b->images[i];
+        if (x->format != y->format || x->width != y->width || x->height != y->height
+            || strcmp(x->name, y->name) != 0)
+            return false;
+    }
+    return true;
+}
+
+static bool share_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
+{
+    return !a->alternative && !b->alternative && a->geometry != VKB_GEOMETRY_DISPATCH
+        && b->geometry != VKB_GEOMETRY_DISPATCH && a->target_count == b->target_count
+        && a->depth == b->depth
+        && memcmp(a->targets, b->targets, a->target_count * sizeof a->targets[0]) == 0;
+}
+
+uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first)
+{
+    uint32_t end = first + 1;
+
+    while (end < graph->pass_count && share_targets(&graph->passes[first], &graph->passes[end]))
+        ++end;
+    return end;
+}
+
+static bool reads(const struct vkb_pass_row *pass, uint32_t image)
+{
+    for (uint32_t i = 0; i < pass->read_count; ++i)
+        if (pass->reads[i] == image)
+            return true;
+    return false;
+}
+
+bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
+{
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        if (pass->targets[i] == image)
+            return true;
+    return pass->depth == image;
+}
+
+bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].blend != VKB_BLEND_NONE && graph->passes[i].depth != image
+            && vkb_pass_writes(&graph->passes[i], image))
+            return true;
+    return false;
+}
+
+enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
+{
+    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
+        return VKB_ACCESS_SAMPLED;
+    return pass->loads ? VKB_ACCESS_DISPATCH_LOADED : VKB_ACCESS_DISPATCH_SAMPLED;
+}
+
+enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (reads(&graph->passes[i], image))
+            return vkb_pass_reads_as(&graph->passes[i]);
+    return graph->images[image].format == VKB_FORMAT_DEPTH32_FLOAT ? VKB_ACCESS_DEPTH_TARGET
+                                                                   : VKB_ACCESS_COPY_SOURCE;
+}
+
+uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, uint32_t end,
+                               struct vkb_target_use *uses)
+{
+    const struct vkb_pass_row *pass = &graph->passes[first];
+    enum vkb_access during = VKB_ACCESS_COLOR_TARGET;
+    uint32_t count = 0;
+
+    for (uint32_t i = first; i < end; ++i)
+        if (graph->passes[i].blend != VKB_BLEND_NONE)
+            during = VKB_ACCESS_COLOR_BLEND;
+    // Depth first: it is the first to be tested.
+    if (pass->depth != VKB_NO_IMAGE) {
+        enum vkb_access rest = vkb_graph_rest(graph, pass->depth);
+        uses[count++] = (struct vkb_target_use){
+            .before = rest,
+            .during = VKB_ACCESS_DEPTH_TARGET,
+            .after = rest == VKB_ACCESS_DEPTH_TARGET ? VKB_ACCESS_NONE : rest,
+        };
+    }
+    for (uint32_t i = 0; i < pass->target_count; ++i) {
+        enum vkb_access rest = vkb_graph_rest(graph, pass->targets[i]);
+        uses[count++] = (struct vkb_target_use){.before = rest, .during = during, .after = rest};
+    }
+    return count;
+}
+
+uint32_t vkb_graph_find(const struct vkb_graph *graph, const char *name)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (graph->images[i].framebuffer && strcmp(graph->images[i].name, name) == 0)
+            return i;
+    return VKB_NO_IMAGE;
+}
+
+uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_image_row *row = &graph->images[image];
+    return row->channels ? row->channels : vkb_formats[row->format].channels;
+}
+
+// Whether something has filled the image before pass `pass_index`.
+static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
+{
+    for (uint32_t i = 0; i < pass_index; ++i)
+        if (vkb_pass_writes(&graph->passes[i], image))
+            return true;
+    return graph->images[image].input;
+}
+
+bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
+                    struct vkb_error *error)
+{
+    if (width == 0 || height == 0 || width > max_side || height > max_side)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "%s: a size of %u x %u is out of this adapter's range, 1 to %u a side",
+                        name, width, height, max_side);
+    return true;
+}
+
+static bool check_image(const struct vkb_graph *graph, uint32_t index, uint32_t max_side,
+                        struct vkb_error *error)
+{
+    const struct vkb_image_row *row = &graph->images[index];
+
+    if (!vkb_check_size(row->name, row->width, row->height, max_side, error))
+        return false;
+    if (row->format == VKB_FORMAT_NONE || row->format >= VKB_FORMAT_COUNT)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: image %s has no format", row->name);
+    for (uint32_t i = 0; i < index; ++i)
+        if (strcmp(graph->images[i].name, row->name) == 0)
+            return vkb_fail(error, VKB_ERROR_GENERAL, "graph: two images are named %s", row->name);
+    return true;
+}
+
+static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uint32_t target,
+                         bool depth, struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = &graph->passes[pass_index];
+    const struct vkb_image_row *row;
+    const uint32_t first = pass->target_count ? pass->targets[0] : pass->depth;
+
+    if (target >= graph->image_count)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has a target that is not there",
+                        pass->name);
+    row = &graph->images[target];
+    if ((row->format == VKB_FORMAT_DEPTH32_FLOAT) != depth)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s: %s has the wrong kind of format",
+                        pass->name, row->name);
+    if (reads(pass, target))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s reads its own target %s",
+                        pass->name, row->name);
+    if (row->width != graph->images[first].width || row->height != graph->images[first].height)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has targets of several sizes",
+                        pass->name);
+    // Earlier writers may only be those that share this pass's render pass.
+    for (uint32_t i = pass_index; i-- > 0;) {
+        if (vkb_graph_group_end(graph, i) > pass_index
+            || (pass->alternative && i == pass_index - 1))
+            continue;
+        if (vkb_pass_writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
+            return vkb_fail(error, VKB_ERROR_GENERAL,
+                            "graph: pass %s writes %s, which pass %s used before", pass->name,
+                            row->name, graph->passes[i].name);
+    }
+    return true;
+}
+
+static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = &graph->passes[index];
+
+    if (pass->target_count > VKB_MAX_TARGETS
+        || pass->read_count > (pass->loads ? VKB_MAX_LOADS : VKB_MAX_READS)
+        || pass->constant_count > VKB_MAX_CONSTANTS
+        || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
+        || (pass->geometry == VKB_GEOMETRY_DISPATCH
+            && (pass->target_count != 1 || pass->depth != VKB_NO_IMAGE || pass->blend
+                || pass->block_width == 0 || pass->block_height == 0)))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
+                        pass->name);
+    if (pass->alternative
+        && (index == 0 || pass->target_count != 1
+            || graph->passes[index - 1].targets[0] != pass->targets[0]))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s is an alternative to nothing",
+                        pass->name);
+    if (pass->textured && (pass->read_count > 0 || !vkb_is_mesh(pass->geometry)))
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "graph: pass %s has textures, but no mesh or images beside them",
+                        pass->name);
+    for (uint32_t i = 0; i < pass->read_count; ++i)
+        if (pass->reads[i] >= graph->image_count || !is_filled(graph, pass->reads[i], index))
+            return vkb_fail(error, VKB_ERROR_GENERAL,
+                            "graph: pass %s reads an image that is not there", pass->name);
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        if (!check_target(graph, index, pass->targets[i], false, error))
+            return false;
+    return pass->depth == VKB_NO_IMAGE || check_target(graph, index, pass->depth, true, error);
+}
+
+bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (!check_image(graph, i, max_side, error))
+            return false;
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (!check_pass(graph, i, error))
+            return false;
+    return true;
+}

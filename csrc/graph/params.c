@@ -1,0 +1,29 @@
+#include "graph/params.h"
+
+#define SKIP_INPUT(block, type, name)
+#define SKIP_VEC4S(block, name, count)
+#define SETTING_ROW(block, name, initial, low, high) \
+    {#name, VKB_VALUE_FLOAT, offsetof(struct vkb_values, block.name), initial, low, high},
+#define BLOCK_ROWS(block, ROWS) ROWS(block, SETTING_ROW, SKIP_INPUT, SKIP_VEC4S)
+#define COUNT_ROW(name, initial, low, high) \
+    {#name, VKB_VALUE_INT, offsetof(struct vkb_values, name), initial, low, high},
+#define REAL_ROW(name, initial, low, high) \
+    {#name, VKB_VALUE_DOUBLE, offsetof(struct vkb_values, name), initial, low, high},
+
+const struct vkb_value_row vkb_value_rows[] = {PARAMETER_BLOCKS(BLOCK_ROWS) COUNT_ROWS(COUNT_ROW)
+                                                   REAL_ROWS(REAL_ROW)};
+const size_t vkb_value_row_count = sizeof vkb_value_rows / sizeof vkb_value_rows[0];
+
+#define SPELLING(name, value, spelling) [value] = #spelling,
+#define SPELLINGS(choice, NAMES) static const char *const choice##_spellings[] = {NAMES(SPELLING)};
+CHOICES(SPELLINGS)
+
+#define CHOICE_ROW(choice, NAMES) \
+    [VKB_CHOICE_##choice] = {#choice, choice##_spellings, \
+                             sizeof choice##_spellings / sizeof choice##_spellings[0]},
+
+const struct vkb_choice_row vkb_choice_rows[VKB_CHOICE_COUNT] = {CHOICES(CHOICE_ROW)};
+
+#define BLOCK_SIZE(block, ROWS) [VKB_BLOCK_##block] = sizeof(struct vkb_##block##_params),
+
+const size_t vkb_block_sizes[] = {[VKB_BLOCK_NONE] = 0, PARAMETER_BLOCKS(BLOCK_SIZE)};

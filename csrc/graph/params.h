@@ -1,0 +1,88 @@
+// shaders/params.h in C: a struct for each parameter block, tables of the settings, and the names
+// that a choice can take.
+#ifndef VKB_PARAMS_H
+#define VKB_PARAMS_H
+
+#include "shaders/params.h"
+
+#include <stddef.h>
+
+// Where std140 starts an array of vec4.
+#define VKB_VEC4 _Alignas(16) float
+
+#define VKB_MEMBER_SETTING(block, name, initial, low, high) float name;
+#define VKB_MEMBER_INPUT(block, type, name)                 type name;
+#define VKB_MEMBER_VEC4S(block, name, count)                VKB_VEC4 name[count][4];
+#define VKB_BLOCK_STRUCT(block, ROWS) \
+    struct vkb_##block##_params { \
+        ROWS(block, VKB_MEMBER_SETTING, VKB_MEMBER_INPUT, VKB_MEMBER_VEC4S) \
+    };
+PARAMETER_BLOCKS(VKB_BLOCK_STRUCT)
+
+#define VKB_BLOCK_MEMBER(block, ROWS) struct vkb_##block##_params block;
+
+// One pass's parameters: those of its own block.
+union vkb_params {
+    PARAMETER_BLOCKS(VKB_BLOCK_MEMBER)
+};
+
+enum vkb_block {
+    VKB_BLOCK_NONE,
+#define VKB_BLOCK_ENUM(block, ROWS) VKB_BLOCK_##block,
+    PARAMETER_BLOCKS(VKB_BLOCK_ENUM)
+#undef VKB_BLOCK_ENUM
+};
+
+extern const size_t vkb_block_sizes[];  // bytes of each block's struct
+
+// All settings that are numbers: the blocks side by side, from which a graph copies them to its
+// passes, and those that shape the graph.
+struct vkb_values {
+    PARAMETER_BLOCKS(VKB_BLOCK_MEMBER)
+#define VKB_COUNT_MEMBER(name, initial, low, high) int name;
+    COUNT_ROWS(VKB_COUNT_MEMBER)
+#undef VKB_COUNT_MEMBER
+#define VKB_REAL_MEMBER(name, initial, low, high) double name;
+    REAL_ROWS(VKB_REAL_MEMBER)
+#undef VKB_REAL_MEMBER
+};
+
+enum vkb_value_type { VKB_VALUE_FLOAT, VKB_VALUE_INT, VKB_VALUE_DOUBLE };
+
+// Where a setting lies in struct vkb_values, its default and its range. A setting that several
+// blocks hold has a row for each.
+struct vkb_value_row {
+    const char *name;
+    enum vkb_value_type type;
+    size_t offset;
+    double initial, low, high;
+};
+
+extern const struct vkb_value_row vkb_value_rows[];
+extern const size_t vkb_value_row_count;
+
+// A setting that is one of a list of names; the names' values count from 0.
+struct vkb_choice_row {
+    const char *name;
+    const char *const *spellings;
+    int count;
+};
+
+enum vkb_choice {
+#define VKB_CHOICE_ENUM(choice, NAMES) VKB_CHOICE_##choice,
+    CHOICES(VKB_CHOICE_ENUM)
+#undef VKB_CHOICE_ENUM
+        VKB_CHOICE_COUNT,
+};
+
+extern const struct vkb_choice_row vkb_choice_rows[VKB_CHOICE_COUNT];
+
+#define VKB_NAME_ENUM(name, value, spelling) name = value,
+enum vkb_composite { COMPOSITE_NAMES(VKB_NAME_ENUM) };
+enum vkb_tonemap { TONEMAP_NAMES(VKB_NAME_ENUM) };
+enum vkb_encoding { ENCODING_NAMES(VKB_NAME_ENUM) };
+enum vkb_texel { TEXEL_NAMES(VKB_NAME_ENUM) };
+enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
+#undef VKB_NAME_ENUM
+
+#endif

@@ -1,0 +1,59 @@
+// Bevy's bloom. Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016),
+// crates/bevy_post_process/src/bloom: sizes in mod.rs, factors in upsampling_pipeline.rs.
+#include "methods/levels.h"
+
+#include <math.h>
+
+// The share of the smaller level in level - 1; of level 0, in the frame.
+static double blend_factor(const struct vkb_settings *settings, uint32_t level, uint32_t count)
+{
+    const struct vkb_values *values = &settings->values;
+    const double intensity = values->composite.intensity, high_pass = values->high_pass_frequency;
+    const double x = level / (count - 1.0);
+    double boost = 1.0 - pow(1.0 - x, 1.0 / (1.0 - values->low_frequency_boost_curvature));
+
+    boost *= values->low_frequency_boost;
+    if (settings->choices[VKB_CHOICE_composite] == COMPOSITE_MIX)
+        boost *= 1.0 - intensity;
+    return (intensity + boost) * (1.0 - fmin(fmax((x - high_pass) / high_pass, 0.0), 1.0));
+}
+
+static void choose_sizes(struct vkb_levels *levels)
+{
+    const struct vkb_size frame = levels->source->buffers;
+    const int height = levels->settings->values.max_mip_dimension;
+    const uint32_t count = (uint32_t)fmax(floor(log2(height)), 2.0) - 1;
+    const double width = floor((double)frame.width * height / frame.height + 0.5);
+    struct vkb_size size = {width < 1.0 ? 1 : (uint32_t)width, (uint32_t)height};
+
+    for (levels->count = 0; levels->count < count; size = vkb_halved(size))
+        levels->sizes[levels->count++] = size;
+}
+
+bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const bool mixed = settings->choices[VKB_CHOICE_composite] == COMPOSITE_MIX;
+    struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
+    uint32_t from = source->glow;
+
+    choose_sizes(&levels);
+    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
+        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
+                              error))
+            return false;
+        struct vkb_pass_row row = level ? vkb_pyramid_row(&levels, VKB_SHADER_pyramid_down_frag,
+                                                          from, levels.downs[level])
+                                        : vkb_prefilter_row(&levels, VKB_SHADER_bevy_prefilter_frag,
+                                                            from, levels.downs[level]);
+        if (!vkb_graph_add_pass(graph, &row, error))
+            return false;
+    }
+    for (uint32_t level = 0; level + 1 < levels.count; ++level) {
+        const double factor = blend_factor(settings, level + 1, levels.count);
+        combination.own[level] = mixed ? 1.0 - factor : 1.0;
+        combination.coarse[level] = factor;
+    }
+    return vkb_levels_combine(&levels, &combination, bloom, error);
+}

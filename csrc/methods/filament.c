@@ -1,0 +1,90 @@
+// Filament's bloom at its low quality. Source: google/filament, filament/src/PostProcessManager.cpp
+// @ 003e5005713c, bloom().
+#include "methods/levels.h"
+
+#include <math.h>
+
+// Sides of level 0 are multiples of this.
+enum { FILAMENT_STEP = 16 };
+
+static uint32_t stepped(double side)
+{
+    const double steps = floor(side / FILAMENT_STEP);
+    return FILAMENT_STEP * (steps < 1.0 ? 1 : (uint32_t)steps);
+}
+
+static void choose_sizes(struct vkb_levels *levels)
+{
+    const struct vkb_values *values = &levels->settings->values;
+    const struct vkb_size frame = levels->source->buffers;
+    const double height = values->resolution;
+    const uint32_t most = (uint32_t)floor(log2(height)) + 1;
+    const uint32_t wanted = (uint32_t)values->levels, count = wanted < most ? wanted : most;
+    struct vkb_size size = {stepped(height * frame.width / frame.height), stepped(height)};
+
+    for (; levels->count < count; size = vkb_halved(size))
+        levels->sizes[levels->count++] = size;
+}
+
+// A 3 x 3 binomial of `from` at the target's pixels; the first one of a frame has the threshold.
+static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32_t to,
+                          struct vkb_error *error)
+{
+    struct vkb_pass_row row =
+        vkb_prefilter_row(levels, VKB_SHADER_filament_prefilter_frag, from, to);
+
+    if (from != levels->source->glow)
+        row.constants[1] = 0;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+// Halves the frame until level 0 is more than half of it; *image is what level 0 reads.
+static bool add_halvings(const struct vkb_levels *levels, uint32_t *image, struct vkb_error *error)
+{
+    const struct vkb_size least = levels->sizes[0];
+    struct vkb_size size = levels->source->buffers;
+
+    *image = levels->source->glow;
+    for (uint32_t i = 0; 2 * least.width < size.width || 2 * least.height < size.height; ++i) {
+        const uint32_t from = *image;
+        size = vkb_halved(size);
+        if (!vkb_levels_step(levels, "half_%u", i, size, image, error)
+            || !add_reduction(levels, from, *image, error))
+            return false;
+    }
+    return true;
+}
+
+static bool add_down(const struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
+{
+    const uint32_t from = levels->downs[level - 1];
+    const struct vkb_size above = levels->sizes[level - 1];
+    const bool even = above.width % 2 == 0 && above.height % 2 == 0;
+    struct vkb_pass_row row =
+        vkb_pyramid_row(levels, even ? VKB_SHADER_filament_down_frag : VKB_SHADER_pyramid_down_frag,
+                        from, levels->downs[level]);
+
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+bool vkb_add_filament(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                      struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
+    uint32_t reduced;
+
+    choose_sizes(&levels);
+    if (!add_halvings(&levels, &reduced, error))
+        return false;
+    for (uint32_t level = 0; level < levels.count; ++level)
+        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
+                              error)
+            || !(level ? add_down(&levels, level, error)
+                       : add_reduction(&levels, reduced, levels.downs[0], error)))
+            return false;
+    combination.last_kernel = UPSAMPLE_LINEAR;
+    combination.target_step = true;
+    combination.gain = 1.0 / levels.count;
+    return vkb_levels_combine(&levels, &combination, bloom, error);
+}

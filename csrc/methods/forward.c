@@ -1,0 +1,58 @@
+// The forward system: the glow mesh into a buffer of its own, blurred, added to the lit scene.
+#include "methods/methods.h"
+
+// The bloom buffers of the forward system, whatever the frame's size. Published methods have rules
+// of their own, which start from the frame.
+static const struct vkb_size FORWARD_BUFFERS = {256, 256};
+
+static struct vkb_size buffer_size(const struct vkb_settings *settings, struct vkb_size frame)
+{
+    if (!settings->bloom_width && settings->values.bloom_scale == 1.0
+        && !vkb_is_published(settings))
+        return FORWARD_BUFFERS;
+    return vkb_bloom_size(settings, frame);
+}
+
+static bool add_scene(const struct vkb_scene_source *source, const struct vkb_mesh_params *params,
+                      struct vkb_graph *graph, uint32_t *scene, struct vkb_error *error)
+{
+    uint32_t depth;
+
+    if (!vkb_add_target(graph, "scene", VKB_FORMAT_RGBA8_UNORM, source->size, true, scene, error)
+        || !vkb_add_target(graph, "depth", VKB_FORMAT_DEPTH32_FLOAT, source->size, true, &depth,
+                           error))
+        return false;
+    if (source->has_sky) {
+        struct vkb_pass_row sky = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX,
+                                                VKB_SHADER_skybox_frag, *scene, depth, params);
+        if (!vkb_graph_add_pass(graph, &sky, error))
+            return false;
+    }
+    struct vkb_pass_row body =
+        vkb_scene_row("scene", VKB_GEOMETRY_BODY, VKB_SHADER_phong_frag, *scene, depth, params);
+    return vkb_add_mesh(&body, source->body_textured, VKB_SHADER_phong_textured_frag, graph, error);
+}
+
+bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
+                       struct vkb_graph *graph, struct vkb_error *error)
+{
+    const struct vkb_mesh_params params = vkb_scene_params(source);
+    uint32_t scene, bloom = VKB_NO_IMAGE;
+
+    if (settings->values.bloom) {
+        struct vkb_bloom_source glow = {
+            .buffers = buffer_size(settings, source->size),
+            .final = source->size,
+            .format = settings->format ? settings->format : VKB_FORMAT_RGBA8_UNORM,
+        };
+        struct vkb_mesh_params lamp = params;
+        // 8 bits have no room for radiance: the intensity is the deferred system's.
+        lamp.glow_intensity = 1.0f;
+        if (!vkb_add_glow(settings, source, &lamp, glow.format, glow.buffers, true,
+                          vkb_threshold_mode(settings), graph, &glow.glow, error)
+            || !vkb_add_bloom(settings, &glow, graph, &bloom, error))
+            return false;
+    }
+    return add_scene(source, &params, graph, &scene, error)
+        && vkb_add_composite(settings, scene, bloom, graph->images[scene].format, graph, error);
+}

@@ -1,0 +1,49 @@
+// Keijiro Takahashi's KinoBloom, version 2, high quality. Source: keijiro/KinoBloom @ 0a04c43fa47d,
+// Assets/Kino/Bloom/Bloom.cs.
+#include "methods/levels.h"
+
+#include <math.h>
+
+// The number of levels and the tent's step both follow from the frame's height and the radius, so
+// that a blur is as wide in a small frame as in a large one.
+static double choose_sizes(struct vkb_levels *levels)
+{
+    const double radius = levels->settings->values.pyramid.radius;
+    const double lg = log2(levels->source->buffers.height) + radius - 8.0;
+    const uint32_t count = (uint32_t)fmin(fmax(trunc(lg), 1.0), VKB_MAX_LEVELS);
+    struct vkb_size size = levels->source->buffers;
+
+    while (levels->count < count)
+        levels->sizes[levels->count++] = size = vkb_halved(size);
+    return 0.5 + lg - trunc(lg);
+}
+
+bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
+    uint32_t from;
+
+    combination.radius = choose_sizes(&levels);
+    if (!vkb_levels_image(&levels, "bright", 0, source->buffers, &from, error))
+        return false;
+    struct vkb_pass_row prefilter =
+        vkb_prefilter_row(&levels, VKB_SHADER_kino_prefilter_frag, source->glow, from);
+    prefilter.constants[2] = settings->values.anti_flicker;
+    prefilter.constant_count = 3;
+    if (!vkb_graph_add_pass(graph, &prefilter, error))
+        return false;
+    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
+        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
+                              error))
+            return false;
+        struct vkb_pass_row row =
+            vkb_pyramid_row(&levels, VKB_SHADER_box_down_frag, from, levels.downs[level]);
+        row.constants[1] = settings->values.anti_flicker && level == 0;
+        row.constant_count = 2;
+        if (!vkb_graph_add_pass(graph, &row, error))
+            return false;
+    }
+    return vkb_levels_combine(&levels, &combination, bloom, error);
+}

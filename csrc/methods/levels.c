@@ -1,0 +1,236 @@
+#include "methods/levels.h"
+
+#include <stdio.h>
+
+struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse)
+{
+    struct vkb_combination combination = {
+        .kernel = kernel,
+        .last_kernel = kernel,
+        .radius = 1.0,
+        .gain = 1.0,
+    };
+
+    for (int level = 0; level < VKB_MAX_LEVELS; ++level) {
+        combination.own[level] = own;
+        combination.coarse[level] = coarse;
+    }
+    return combination;
+}
+
+static uint32_t half(uint32_t side)
+{
+    return side > 1 ? side / 2 : 1;
+}
+
+struct vkb_size vkb_halved(struct vkb_size size)
+{
+    return (struct vkb_size){half(size.width), half(size.height)};
+}
+
+void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count)
+{
+    struct vkb_size size = above;
+
+    while (levels->count < count) {
+        size = vkb_halved(size);
+        if (levels->count > 0 && size.width == 1 && size.height == 1)
+            break;
+        levels->sizes[levels->count++] = size;
+    }
+}
+
+static bool add_image(const struct vkb_levels *levels, const char *name, uint32_t number,
+                      struct vkb_size size, bool framebuffer, uint32_t *image,
+                      struct vkb_error *error)
+{
+    char numbered[VKB_NAME_SIZE];
+
+    snprintf(numbered, sizeof numbered, name, number);
+    return vkb_add_target(levels->graph, numbered, levels->source->format, size, framebuffer, image,
+                          error);
+}
+
+bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
+                      struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    return add_image(levels, name, number, size, true, image, error);
+}
+
+bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
+                     struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    return add_image(levels, name, number, size, false, image, error);
+}
+
+struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                     uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_fullscreen_row(levels->graph->images[to].name, fragment, to);
+
+    row.reads[0] = from;
+    row.read_count = 1;
+    // Never the sampler's filter: lavapipe's is good to 8 bits, and the errors of a chain add up.
+    row.constants[0] = SAMPLING_FETCH;
+    row.constant_count = 1;
+    return row;
+}
+
+struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                    uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
+
+    row.block = VKB_BLOCK_pyramid;
+    row.params.pyramid.target_width = sampling.width;
+    row.params.pyramid.target_height = sampling.height;
+    row.params.pyramid.limit = sampling.limit;
+    return row;
+}
+
+struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                      uint32_t from, uint32_t to)
+{
+    const struct vkb_settings *settings = levels->settings;
+    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
+
+    row.constants[1] = settings->thresholded;
+    row.constant_count = 2;
+    row.block = VKB_BLOCK_prefilter;
+    row.params.prefilter = settings->values.prefilter;
+    if (!settings->thresholded) {
+        row.params.prefilter.threshold = 0.0f;
+        row.params.prefilter.knee = 0.0f;
+    }
+    row.params.prefilter.target_width = sampling.width;
+    row.params.prefilter.target_height = sampling.height;
+    row.params.prefilter.limit = sampling.limit;
+    return row;
+}
+
+static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *kernel,
+                     enum vkb_mode direction, double step, uint32_t from, uint32_t to,
+                     struct vkb_error *error)
+{
+    struct vkb_pass_row row = vkb_fetching_row(levels, VKB_SHADER_blur_frag, from, to);
+    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
+    struct vkb_blur_params *params = &row.params.blur;
+    const bool whole = vkb_same_size(levels->graph, from, to) && step == 1.0;
+
+    row.block = VKB_BLOCK_blur;
+    params->blur_scale = (float)step;
+    params->blur_strength = params->layer_scale = params->layer_strength = 1.0f;
+    params->step_ratio = 1.0f;
+    params->target_width = sampling.width;
+    params->target_height = sampling.height;
+    params->limit = sampling.limit;
+    for (uint32_t i = 0; i < kernel->count; ++i)
+        params->weights[i / 4][i % 4] = kernel->weights[i];
+    row.constants[0] = direction;
+    row.constants[1] = (int32_t)kernel->count - 1;
+    row.constants[2] = 1;
+    row.constants[3] = TEXEL_OWN;
+    row.constants[4] = whole ? SAMPLING_WHOLE : SAMPLING_FETCH;
+    row.constant_count = 5;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                     const struct vkb_kernel *kernel, struct vkb_error *error)
+{
+    const struct vkb_size size = levels->sizes[level];
+    const uint32_t width = levels->graph->images[from].width;
+    const uint32_t height = levels->graph->images[from].height;
+    const struct vkb_size middle = {size.width, kernel->whole_rows ? height : size.height};
+    const double across = kernel->across > 0.0 ? kernel->across : (double)width / size.width;
+    const double down = (double)middle.height / size.height;
+    uint32_t step;
+
+    return vkb_levels_step(levels, "down_%u_across", level, middle, &step, error)
+        && add_blur(levels, kernel, DIRECTION_HORIZONTAL, across, from, step, error)
+        && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
+        && add_blur(levels, kernel, DIRECTION_VERTICAL, down, step, levels->downs[level], error);
+}
+
+// From the smaller level `from` to `to`, to which the level `own` is added, if there is one.
+static bool add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
+                   enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
+                   double coarse_share, struct vkb_error *error)
+{
+    struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_up_frag, from, to);
+    struct vkb_pyramid_params *params = &row.params.pyramid;
+    const struct vkb_image_row *smaller = &levels->graph->images[from];
+    const struct vkb_image_row *larger = &levels->graph->images[to];
+
+    row.constants[1] = own != VKB_NO_IMAGE;
+    row.constants[2] = kernel;
+    row.constant_count = 3;
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row.reads[1] = own != VKB_NO_IMAGE ? own : from;
+    row.read_count = 2;
+    params->step_x = params->step_y = (float)combination->radius;
+    if (combination->target_step) {
+        params->step_x = (float)((double)smaller->width / larger->width);
+        params->step_y = (float)((double)smaller->height / larger->height);
+    }
+    params->own = (float)own_share;
+    params->coarse = (float)coarse_share;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+// Sums of levels where the format holds them. In rgba8unorm, which ends at 1, each image holds its
+// sum divided by what a flat 1 becomes there (`whole`), and the bloom is multiplied by it.
+bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
+                        uint32_t *bloom, struct vkb_error *error)
+{
+    const bool means = levels->source->format == VKB_FORMAT_RGBA8_UNORM;
+    uint32_t top = levels->downs[levels->count - 1];
+    double below = 1.0;
+
+    for (uint32_t level = levels->count - 1; level-- > 0;) {
+        const uint32_t from = top;
+        const double own = combination->own[level], coarse = combination->coarse[level];
+        const double whole = means ? own + coarse * below : 1.0;
+        if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &top, error)
+            || !add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
+                       own / whole, coarse * below / whole, error))
+            return false;
+        below = whole;
+    }
+    return vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
+        && add_up(levels, combination, combination->last_kernel, top, *bloom, VKB_NO_IMAGE, 0.0,
+                  combination->gain * below, error);
+}
+
+bool vkb_levels_gather(const struct vkb_levels *levels, const double shares[GATHERED_LEVELS],
+                       uint32_t *bloom, struct vkb_error *error)
+{
+    static const struct vkb_combination enlarging = {0};
+    const struct vkb_size size = levels->sizes[0];
+    double whole = 0.0;
+    uint32_t sum;
+
+    for (int level = 0; level < GATHERED_LEVELS; ++level)
+        whole += shares[level];
+    if (levels->source->format != VKB_FORMAT_RGBA8_UNORM)
+        whole = 1.0;
+    if (!vkb_levels_image(levels, "up_%u", 0, size, &sum, error))
+        return false;
+    struct vkb_pass_row row =
+        vkb_fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], sum);
+    row.read_count = GATHERED_LEVELS;
+    row.block = VKB_BLOCK_gather;
+    for (int level = 0; level < GATHERED_LEVELS; ++level) {
+        row.reads[level] = levels->downs[level];
+        row.params.gather.shares[level / 4][level % 4] = (float)(shares[level] / whole);
+    }
+    row.params.gather.target_width = (int)size.width;
+    row.params.gather.target_height = (int)size.height;
+    row.params.gather.limit = vkb_formats[levels->source->format].limit;
+    return vkb_graph_add_pass(levels->graph, &row, error)
+        && vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
+        && add_up(levels, &enlarging, UPSAMPLE_LINEAR, sum, *bloom, VKB_NO_IMAGE, 0.0, whole,
+                  error);
+}

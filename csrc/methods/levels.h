@@ -1,0 +1,79 @@
+// What the methods with levels of falling size share: the images of a chain, its pass rows, and the
+// way up again.
+#ifndef VKB_LEVELS_H
+#define VKB_LEVELS_H
+
+#include "methods/methods.h"
+
+enum { VKB_MAX_LEVELS = 16 };
+
+struct vkb_levels {
+    const struct vkb_settings *settings;
+    const struct vkb_bloom_source *source;
+    struct vkb_graph *graph;
+    struct vkb_size sizes[VKB_MAX_LEVELS];
+    uint32_t downs[VKB_MAX_LEVELS];
+    uint32_t count;
+};
+
+// How levels become the bloom: up_k = own[k] down_k + coarse[k] U(up_k+1) with up_N-1 = down_N-1,
+// bloom = gain * V(up_0).
+struct vkb_combination {
+    enum vkb_mode kernel, last_kernel;  // U and V, of UPSAMPLE_*
+    double radius;                      // of a tent, in texels of the smaller level
+    bool target_step;                   // instead, one texel of the larger level
+    double own[VKB_MAX_LEVELS], coarse[VKB_MAX_LEVELS];
+    double gain;
+};
+
+// The same `own` and `coarse` for all levels.
+struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse);
+
+// Half of a size, floored, never under 1 a side.
+struct vkb_size vkb_halved(struct vkb_size size);
+
+// Appends sizes until `count` of them are there, each half of the one before; a level of 1 x 1 ends
+// the chain, unless it is the first.
+void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count);
+
+// An image in the format of the bloom buffers; `number` is put into the name, if that has a %u.
+bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
+                      struct vkb_size size, uint32_t *image, struct vkb_error *error);
+
+// The same image as a step that is no framebuffer.
+bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
+                     struct vkb_size size, uint32_t *image, struct vkb_error *error);
+
+// A pass from one image to another, its taps filtered by hand, with no block yet; and with the
+// pyramid's or the prefilter's.
+struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                     uint32_t from, uint32_t to);
+struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                    uint32_t from, uint32_t to);
+struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
+                                      uint32_t from, uint32_t to);
+
+// A separable blur on the way down.
+struct vkb_kernel {
+    const float *weights;  // w0..
+    uint32_t count;
+    double across;  // distance of the taps of the first, horizontal, pass in texels of its source;
+                    // 0: one pixel of the level
+    bool whole_rows;  // the first pass keeps the height of its source, which the second one reduces
+};
+
+// Adds the image down_`level` and the two passes that blur `from` into it.
+bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                     const struct vkb_kernel *kernel, struct vkb_error *error);
+
+// The pass "up_0": the sum of shares[k] down_k, each of the five levels enlarged bilinearly to the
+// size of the first one; then "bloom", which is that enlarged. In rgba8unorm, which ends at 1, up_0
+// is divided by the sum of the shares, and the bloom multiplied by it.
+bool vkb_levels_gather(const struct vkb_levels *levels, const double shares[GATHERED_LEVELS],
+                       uint32_t *bloom, struct vkb_error *error);
+
+// The passes up_N-2 ... up_0 and "bloom".
+bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
+                        uint32_t *bloom, struct vkb_error *error);
+
+#endif

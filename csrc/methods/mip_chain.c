@@ -1,0 +1,67 @@
+// The contract's own chains: the pyramid, which adds each level on the way up, and dual Kawase,
+// which does not.
+#include "methods/levels.h"
+
+static bool add_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
+{
+    const uint32_t from = level ? levels->downs[level - 1] : levels->source->glow;
+
+    if (!vkb_levels_image(levels, "down_%u", level, levels->sizes[level], &levels->downs[level],
+                          error))
+        return false;
+    struct vkb_pass_row row =
+        vkb_pyramid_row(levels, VKB_SHADER_pyramid_down_frag, from, levels->downs[level]);
+    row.constants[1] = levels->settings->values.firefly_filter && level == 0;
+    row.constant_count = 2;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                     struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
+
+    vkb_levels_halve(&levels, source->buffers, (uint32_t)settings->values.levels);
+    for (uint32_t level = 0; level < levels.count; ++level)
+        if (!add_down(&levels, level, error))
+            return false;
+    combination.radius = settings->values.pyramid.radius;
+    combination.gain = 1.0 / levels.count;
+    return vkb_levels_combine(&levels, &combination, bloom, error);
+}
+
+static bool add_kawase(const struct vkb_levels *levels, enum vkb_shader fragment, uint32_t from,
+                       uint32_t to, struct vkb_error *error)
+{
+    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
+    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
+
+    row.block = VKB_BLOCK_kawase;
+    row.params.kawase = (struct vkb_kawase_params){
+        .offset = levels->settings->values.kawase.offset,
+        .target_width = sampling.width,
+        .target_height = sampling.height,
+        .limit = sampling.limit,
+    };
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+bool vkb_add_dual_kawase(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                         struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    uint32_t from = source->glow, to;
+
+    vkb_levels_halve(&levels, source->buffers, (uint32_t)settings->values.levels);
+    for (uint32_t level = 0; level < levels.count; ++level, from = to)
+        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &to, error)
+            || !add_kawase(&levels, VKB_SHADER_kawase_down_frag, from, to, error))
+            return false;
+    for (uint32_t level = levels.count - 1; level-- > 0; from = to)
+        if (!vkb_levels_image(&levels, "up_%u", level, levels.sizes[level], &to, error)
+            || !add_kawase(&levels, VKB_SHADER_kawase_up_frag, from, to, error))
+            return false;
+    return vkb_levels_image(&levels, "bloom", 0, source->final, bloom, error)
+        && add_kawase(&levels, VKB_SHADER_kawase_up_frag, from, *bloom, error);
+}

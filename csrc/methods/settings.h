@@ -1,0 +1,47 @@
+// What the user asked for, in C: filled by arguments.c, read by what makes rows.
+#ifndef VKB_SETTINGS_H
+#define VKB_SETTINGS_H
+
+#include "vulkan/format.h"
+#include "graph/params.h"
+
+#include <stdbool.h>
+
+// Every method: METHOD(name in C, name in Python and of its vkb_add_ function, published). A
+// published method starts from the whole frame: it reduces and thresholds in its own way.
+#define VKB_METHODS(METHOD) \
+    METHOD(SEPARABLE, separable, false) \
+    METHOD(PYRAMID, pyramid, false) \
+    METHOD(DUAL_KAWASE, dual_kawase, false) \
+    METHOD(BEVY, bevy, true) \
+    METHOD(KINO, kino, true) \
+    METHOD(FILAMENT, filament, true) \
+    METHOD(URP, urp, true) \
+    METHOD(HDRP, hdrp, true) \
+    METHOD(UNREAL, unreal, true)
+
+enum vkb_method {
+#define VKB_METHOD_ENUM(constant, name, published) VKB_METHOD_##constant,
+    VKB_METHODS(VKB_METHOD_ENUM)
+#undef VKB_METHOD_ENUM
+        VKB_METHOD_COUNT,
+};
+
+struct vkb_layer {
+    float scale, strength;
+};
+
+struct vkb_settings {
+    enum vkb_method method;
+    struct vkb_values values;  // the numbers, where vkb_value_rows puts them
+    int choices[VKB_CHOICE_COUNT];
+    bool thresholded;                    // else the threshold and the knee do not count
+    uint32_t bloom_width, bloom_height;  // 0: by bloom_scale
+    enum vkb_format format;              // VKB_FORMAT_NONE: by the source
+    float weights[MAX_WEIGHTS];
+    uint32_t weight_count;
+    struct vkb_layer layers[MAX_LAYERS];
+    uint32_t layer_count;
+};
+
+#endif

@@ -1,0 +1,90 @@
+// What the shadings share: their names, and the rows that draw a scene's meshes.
+#include "methods/methods.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const struct shading {
+    const char *name;
+    bool (*build)(const struct vkb_settings *, const struct vkb_scene_source *, struct vkb_graph *,
+                  struct vkb_error *);
+} shadings[] = {
+    {"forward", vkb_build_forward},
+    {"deferred", vkb_build_deferred},
+};
+
+bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
+                     const struct vkb_scene_source *source, struct vkb_graph *graph,
+                     struct vkb_error *error)
+{
+    for (size_t i = 0; i < sizeof shadings / sizeof shadings[0]; ++i)
+        if (strcmp(shadings[i].name, shading) == 0)
+            return shadings[i].build(settings, source, graph, error);
+    return vkb_fail(error, VKB_ERROR_VALUE, "shading: there is no %s", shading);
+}
+
+struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source)
+{
+    struct vkb_mesh_params params;
+
+    // From zero, padding included: rows are compared byte by byte.
+    memset(&params, 0, sizeof params);
+    vkb_scene_matrices(&source->camera, source->time,
+                       (double)source->size.width / source->size.height, &params);
+    return params;
+}
+
+struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
+                                  enum vkb_shader fragment, uint32_t target, uint32_t depth,
+                                  const struct vkb_mesh_params *params)
+{
+    struct vkb_pass_row row = vkb_fullscreen_row(name, fragment, target);
+
+    row.geometry = geometry;
+    row.vertex = geometry == VKB_GEOMETRY_SKYBOX ? VKB_SHADER_skybox_vert : VKB_SHADER_mesh_vert;
+    row.depth = depth;
+    row.load = VKB_LOAD_CLEAR;
+    row.block = VKB_BLOCK_mesh;
+    row.params.mesh = *params;
+    return row;
+}
+
+bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_shader textured,
+                  struct vkb_graph *graph, struct vkb_error *error)
+{
+    struct vkb_pass_row second;
+
+    if (!vkb_graph_add_pass(graph, row, error))
+        return false;
+    if (!has_textures)
+        return true;
+    memcpy(&second, row, sizeof second);
+    snprintf(second.name, sizeof second.name, "%.16s_textured", row->name);
+    second.textured = true;
+    second.vertex = VKB_SHADER_mesh_textured_vert;
+    second.shader = textured;
+    return vkb_graph_add_pass(graph, &second, error);
+}
+
+bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_source *source,
+                  const struct vkb_mesh_params *params, enum vkb_format format,
+                  struct vkb_size size, bool framebuffer, enum vkb_mode threshold,
+                  struct vkb_graph *graph, uint32_t *glow, struct vkb_error *error)
+{
+    uint32_t depth;
+
+    if (!vkb_add_target(graph, "glow", format, size, framebuffer, glow, error)
+        || !vkb_add_target(graph, "glow_depth", VKB_FORMAT_DEPTH32_FLOAT, size, framebuffer, &depth,
+                           error))
+        return false;
+    struct vkb_pass_row row =
+        vkb_scene_row("glow", VKB_GEOMETRY_GLOW, VKB_SHADER_glow_frag, *glow, depth, params);
+    row.constants[0] = threshold;
+    row.constant_count = 1;
+    row.params.mesh.limit = vkb_formats[format].limit;
+    if (threshold != THRESHOLD_NONE) {
+        row.params.mesh.threshold = settings->values.mesh.threshold;
+        row.params.mesh.knee = settings->values.mesh.knee;
+    }
+    return vkb_add_mesh(&row, source->glow_textured, VKB_SHADER_glow_textured_frag, graph, error);
+}

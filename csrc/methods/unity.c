@@ -1,0 +1,95 @@
+// The blooms of Unity's two pipelines. Source: Unity-Technologies/Graphics; URP:
+// com.unity.render-pipelines.universal, BloomPostProcessPass.cs @ 13e28e026298, Bloom.shader
+// @ 00d472fae509; HDRP: com.unity.render-pipelines.high-definition, HDRenderPipeline.PostProcess.cs
+// @ 0148835ea9ba, BloomBlur.compute @ 0e4ca4d79b2c.
+#include "methods/levels.h"
+
+#include <math.h>
+
+// Half-kernels: URP's binomial of 12 without its outer terms, HDRP's binomial of 8.
+static const float urp_weights[] = {0.22702703f, 0.19459459f, 0.12162162f, 0.05405405f,
+                                    0.01621622f};
+static const float hdrp_weights[] = {0.2734375f, 0.21875f, 0.109375f, 0.03125f, 0.00390625f};
+
+enum { WEIGHT_COUNT = 5 };
+
+// Frames smaller than this are "small" to HDRP.
+enum { HDRP_LEAST_WIDTH = 800, HDRP_LEAST_HEIGHT = 450 };
+
+// u_k = lerp(d_k, U(u_k+1), s): both pipelines squeeze the scatter into 0.05 to 0.95.
+static struct vkb_combination scattered(const struct vkb_settings *settings, enum vkb_mode kernel)
+{
+    const double share = 0.05 + 0.9 * settings->values.scatter;
+    return vkb_combine(kernel, 1.0 - share, share);
+}
+
+// As many levels as halve `side`, less `spared`, from 1 to `most`.
+static uint32_t level_count(uint32_t width, uint32_t height, double spared, int most)
+{
+    const double count = floor(log2(fmax(width, height)) - spared);
+    return (uint32_t)fmin(fmax(count, 1.0), most);
+}
+
+bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                 struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_combination combination = scattered(settings, UPSAMPLE_LINEAR);
+    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .across = 2.0};
+    struct vkb_size size = vkb_halved(source->buffers);
+    const uint32_t count = level_count(size.width, size.height, 1.0, settings->values.iterations);
+
+    for (; levels.count < count; size = vkb_halved(size))
+        levels.sizes[levels.count++] = size;
+    if (!vkb_levels_image(&levels, "down_%u", 0, levels.sizes[0], &levels.downs[0], error))
+        return false;
+    struct vkb_pass_row row =
+        vkb_prefilter_row(&levels, VKB_SHADER_urp_prefilter_frag, source->glow, levels.downs[0]);
+    if (!vkb_graph_add_pass(graph, &row, error))
+        return false;
+    for (uint32_t level = 1; level < count; ++level)
+        if (!vkb_levels_blur(&levels, level, levels.downs[level - 1], &kernel, error))
+            return false;
+    return vkb_levels_combine(&levels, &combination, bloom, error);
+}
+
+// W / 2^(k + 1), rounded, halves to even.
+static uint32_t rounded(uint32_t side, uint32_t level)
+{
+    const double size = rint(ldexp(side, -(int)level - 1));
+    return size < 1.0 ? 1 : (uint32_t)size;
+}
+
+bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_size frame = source->buffers;
+    // In small frames the cubic filter is too wide for the last levels.
+    const bool cubic = settings->values.high_quality_filtering && frame.width >= HDRP_LEAST_WIDTH
+                    && frame.height >= HDRP_LEAST_HEIGHT;
+    struct vkb_combination combination =
+        scattered(settings, cubic ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR);
+    const struct vkb_kernel kernel = {
+        .weights = hdrp_weights,
+        .count = WEIGHT_COUNT,
+        .whole_rows = true,
+    };
+    const uint32_t count = level_count(frame.width, frame.height, 2.0, VKB_MAX_LEVELS);
+    uint32_t from;
+
+    for (; levels.count < count; ++levels.count)
+        levels.sizes[levels.count] = (struct vkb_size){rounded(frame.width, levels.count),
+                                                       rounded(frame.height, levels.count)};
+    if (!vkb_levels_step(&levels, "reduced", 0, levels.sizes[0], &from, error))
+        return false;
+    struct vkb_pass_row row =
+        vkb_prefilter_row(&levels, VKB_SHADER_hdrp_prefilter_frag, source->glow, from);
+    if (!vkb_graph_add_pass(graph, &row, error))
+        return false;
+    for (uint32_t level = 0; level < count; from = levels.downs[level++])
+        if (!vkb_levels_blur(&levels, level, from, &kernel, error))
+            return false;
+    combination.last_kernel = UPSAMPLE_CUBIC;
+    return vkb_levels_combine(&levels, &combination, bloom, error);
+}

@@ -1,0 +1,55 @@
+// three.js' UnrealBloomPass. Source: mrdoob/three.js, examples/jsm/postprocessing/
+// UnrealBloomPass.js, the form with the kernels of #31528 and the factor of #32517.
+#include "methods/levels.h"
+
+#include <math.h>
+
+enum { UNREAL_LONGEST = 22 };
+
+// Taps of each level's half-kernel, the centre counted; a third of it is the deviation.
+static const uint32_t tap_counts[GATHERED_LEVELS] = {6, 10, 14, 18, UNREAL_LONGEST};
+
+// The levels' shares for a radius of 0; one of 1 mirrors them at 0.6.
+static const double bloom_factors[GATHERED_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
+
+static struct vkb_size rounded_half(struct vkb_size size)
+{
+    return (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
+}
+
+static bool add_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                      struct vkb_error *error)
+{
+    float weights[UNREAL_LONGEST];
+    const double deviation = tap_counts[level] / 3.0;
+    const struct vkb_kernel kernel = {.weights = weights, .count = tap_counts[level]};
+
+    for (uint32_t i = 0; i < kernel.count; ++i)
+        weights[i] = (float)(0.39894 * exp(-0.5 * i * i / (deviation * deviation)) / deviation);
+    return vkb_levels_blur(levels, level, from, &kernel, error);
+}
+
+bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    double shares[GATHERED_LEVELS];
+    struct vkb_size size = source->buffers;
+    uint32_t from;
+
+    for (; levels.count < GATHERED_LEVELS; ++levels.count) {
+        const double factor = bloom_factors[levels.count];
+        levels.sizes[levels.count] = size = rounded_half(size);
+        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.pyramid.radius;
+    }
+    if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
+        return false;
+    struct vkb_pass_row row =
+        vkb_prefilter_row(&levels, VKB_SHADER_unreal_prefilter_frag, source->glow, from);
+    if (!vkb_graph_add_pass(graph, &row, error))
+        return false;
+    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])
+        if (!add_level(&levels, level, from, error))
+            return false;
+    return vkb_levels_gather(&levels, shares, bloom, error);
+}

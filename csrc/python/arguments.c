@@ -1,0 +1,385 @@
+// Python's settings, cameras and images as the core's structs. All functions return false with an
+// exception set.
+#include "python/module.h"
+
+#include <math.h>
+#include <string.h>
+
+// The attributes of a settings object that are read here; the values' rows come last.
+enum attribute {
+    ATTRIBUTE_METHOD,
+    ATTRIBUTE_THRESHOLD,
+    ATTRIBUTE_FORMAT,
+    ATTRIBUTE_BLOOM_SIZE,
+    ATTRIBUTE_WEIGHTS,
+    ATTRIBUTE_LAYERS,
+    ATTRIBUTE_CHOICES,
+    ATTRIBUTE_VALUES = ATTRIBUTE_CHOICES + VKB_CHOICE_COUNT,
+};
+
+static const char *attribute_name(size_t attribute)
+{
+    static const char *const names[ATTRIBUTE_CHOICES] = {
+        [ATTRIBUTE_METHOD] = "method",   [ATTRIBUTE_THRESHOLD] = "threshold",
+        [ATTRIBUTE_FORMAT] = "format",   [ATTRIBUTE_BLOOM_SIZE] = "bloom_size",
+        [ATTRIBUTE_WEIGHTS] = "weights", [ATTRIBUTE_LAYERS] = "layers",
+    };
+
+    return attribute < ATTRIBUTE_CHOICES ? names[attribute]
+         : attribute < ATTRIBUTE_VALUES  ? vkb_choice_rows[attribute - ATTRIBUTE_CHOICES].name
+                                         : vkb_value_rows[attribute - ATTRIBUTE_VALUES].name;
+}
+
+bool vkb_make_attributes(struct vkb_module_state *state)
+{
+    const size_t count = ATTRIBUTE_VALUES + vkb_value_row_count;
+
+    state->lacking = PyDict_New();
+    state->attributes = PyTuple_New((Py_ssize_t)count);
+    for (size_t i = 0; state->attributes && i < count; ++i) {
+        PyObject *name = PyUnicode_InternFromString(attribute_name(i));
+        if (!name || PyTuple_SetItem(state->attributes, (Py_ssize_t)i, name) < 0)
+            return false;
+    }
+    return state->attributes && state->lacking;
+}
+
+// A settings object that is being read. Most types of settings lack most attributes, and asking in
+// vain takes far longer than asking, so that is done once a type.
+struct reader {
+    const struct vkb_module_state *state;
+    PyObject *object;
+    PyObject *lacking;  // bytes: by attribute, whether the object's type is known to lack it
+    bool learning;
+};
+
+static bool begin_reading(const struct vkb_module_state *state, PyObject *object,
+                          struct reader *reader)
+{
+    PyObject *type = (PyObject *)Py_TYPE(object);
+    const Py_ssize_t count = PyTuple_Size(state->attributes);
+    PyObject *known = PyDict_GetItemWithError(state->lacking, type);
+
+    *reader = (struct reader){.state = state, .object = object, .learning = !known};
+    if (known) {
+        reader->lacking = Py_NewRef(known);
+        return true;
+    }
+    if (PyErr_Occurred() || !(reader->lacking = PyBytes_FromStringAndSize(NULL, count)))
+        return false;
+    memset(PyBytes_AsString(reader->lacking), 0, (size_t)count);
+    return true;
+}
+
+static bool end_reading(struct reader *reader, bool done)
+{
+    if (done && reader->learning)
+        done = PyDict_SetItem(reader->state->lacking, (PyObject *)Py_TYPE(reader->object),
+                              reader->lacking)
+            == 0;
+    Py_DECREF(reader->lacking);
+    return done;
+}
+
+// The attribute, or NULL: without an exception where the object lacks it.
+static PyObject *optional_attribute(const struct reader *reader, size_t attribute)
+{
+    char *lacking = PyBytes_AsString(reader->lacking) + attribute;
+
+    if (*lacking)
+        return NULL;
+    PyObject *name = PyTuple_GetItem(reader->state->attributes, (Py_ssize_t)attribute);
+    PyObject *value = PyObject_GetAttr(reader->object, name);
+    if (!value && PyErr_ExceptionMatches(PyExc_AttributeError)) {
+        PyErr_Clear();
+        *lacking = 1;
+    }
+    return value;
+}
+
+bool vkb_require_tuple(PyObject *object, const char *what)
+{
+    if (!PyTuple_Check(object))
+        PyErr_Format(PyExc_TypeError, "%s: a tuple is needed, not %R", what, object);
+    return PyTuple_Check(object);
+}
+
+static void store_value(struct vkb_values *values, const struct vkb_value_row *row, double number)
+{
+    char *place = (char *)values + row->offset;
+
+    switch (row->type) {
+    case VKB_VALUE_FLOAT:
+        *(float *)place = (float)number;
+        break;
+    case VKB_VALUE_INT:
+        *(int *)place = (int)number;
+        break;
+    case VKB_VALUE_DOUBLE:
+        *(double *)place = number;
+        break;
+    }
+}
+
+static bool out_of_range(const char *name, PyObject *value, double low, double high)
+{
+    PyObject *from = PyFloat_FromDouble(low), *to = PyFloat_FromDouble(high);
+
+    if (from && to)
+        PyErr_Format(PyExc_ValueError, "%s: %R is out of range, %R to %R", name, value, from, to);
+    Py_XDECREF(from);
+    Py_XDECREF(to);
+    return false;
+}
+
+// None keeps the default.
+static bool read_value(const struct reader *reader, size_t index, struct vkb_values *values)
+{
+    const struct vkb_value_row *row = &vkb_value_rows[index];
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_VALUES + index);
+    bool done = true;
+
+    store_value(values, row, row->initial);
+    if (!value)
+        return !PyErr_Occurred();
+    if (value != Py_None) {
+        double number = PyFloat_AsDouble(value);
+        done = !PyErr_Occurred();
+        if (done && !(number >= row->low && number <= row->high))
+            done = out_of_range(row->name, value, row->low, row->high);
+        if (done)
+            store_value(values, row, number);
+    }
+    Py_DECREF(value);
+    return done;
+}
+
+static bool read_choice(const struct reader *reader, int index, int *choice)
+{
+    const struct vkb_choice_row *row = &vkb_choice_rows[index];
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_CHOICES + (size_t)index);
+
+    *choice = 0;
+    if (!value)
+        return !PyErr_Occurred();
+    for (int i = 0; PyUnicode_Check(value) && i < row->count; ++i)
+        if (PyUnicode_CompareWithASCIIString(value, row->spellings[i]) == 0) {
+            *choice = i;
+            Py_DECREF(value);
+            return true;
+        }
+    PyErr_Format(PyExc_ValueError, "%s: there is no %R", row->name, value);
+    Py_DECREF(value);
+    return false;
+}
+
+static bool read_format(const struct reader *reader, enum vkb_format *format)
+{
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_FORMAT);
+
+    *format = VKB_FORMAT_NONE;
+    if (!value)
+        return !PyErr_Occurred();
+    if (value != Py_None) {
+        PyObject *text = PyUnicode_Check(value) ? PyUnicode_AsUTF8String(value) : NULL;
+        if (text)
+            *format = vkb_format_by_name(PyBytes_AsString(text));
+        Py_XDECREF(text);
+        if (!PyErr_Occurred()
+            && (*format == VKB_FORMAT_NONE || *format == VKB_FORMAT_DEPTH32_FLOAT))
+            PyErr_Format(PyExc_ValueError, "format: %R is no format of bloom buffers", value);
+    }
+    Py_DECREF(value);
+    return !PyErr_Occurred();
+}
+
+static bool read_size(const struct reader *reader, struct vkb_settings *settings)
+{
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_BLOOM_SIZE);
+    bool done = true;
+
+    if (!value)
+        return !PyErr_Occurred();
+    if (value != Py_None) {
+        done = vkb_require_tuple(value, "bloom_size")
+            && PyArg_ParseTuple(value, "II;bloom_size must be (width, height)",
+                                &settings->bloom_width, &settings->bloom_height);
+        if (done && (settings->bloom_width == 0 || settings->bloom_height == 0)) {
+            PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, 1 a side at least",
+                         value);
+            done = false;
+        }
+    }
+    Py_DECREF(value);
+    return done;
+}
+
+static bool read_method(const struct reader *reader, enum vkb_method *method)
+{
+#define METHOD_NAME(constant, name, published) [VKB_METHOD_##constant] = #name,
+    static const char *const names[VKB_METHOD_COUNT] = {VKB_METHODS(METHOD_NAME)};
+#undef METHOD_NAME
+    PyObject *value = PyObject_GetAttr(
+        reader->object, PyTuple_GetItem(reader->state->attributes, ATTRIBUTE_METHOD));
+
+    if (!value)
+        return false;
+    for (int i = 0; PyUnicode_Check(value) && i < VKB_METHOD_COUNT; ++i)
+        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0) {
+            *method = (enum vkb_method)i;
+            Py_DECREF(value);
+            return true;
+        }
+    PyErr_Format(PyExc_ValueError, "method: there is no %R", value);
+    Py_DECREF(value);
+    return false;
+}
+
+static bool read_weights(const struct reader *reader, struct vkb_settings *settings)
+{
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_WEIGHTS);
+
+    if (!value)
+        return !PyErr_Occurred();
+    Py_ssize_t count = PySequence_Size(value);
+    if (count < 1 || count > MAX_WEIGHTS) {
+        if (!PyErr_Occurred())
+            PyErr_Format(PyExc_ValueError, "weights: %zd weights are out of range, 1 to %d", count,
+                         MAX_WEIGHTS);
+        Py_DECREF(value);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
+        PyObject *item = PySequence_GetItem(value, i);
+        if (item)
+            settings->weights[i] = (float)PyFloat_AsDouble(item);
+        Py_XDECREF(item);
+    }
+    settings->weight_count = (uint32_t)count;
+    Py_DECREF(value);
+    return !PyErr_Occurred();
+}
+
+static bool read_layers(const struct reader *reader, struct vkb_settings *settings)
+{
+    PyObject *value = optional_attribute(reader, ATTRIBUTE_LAYERS);
+
+    if (!value)
+        return !PyErr_Occurred();
+    Py_ssize_t count = PySequence_Size(value);
+    if (count < 1 || count > MAX_LAYERS) {
+        if (!PyErr_Occurred())
+            PyErr_Format(PyExc_ValueError, "layers: %zd layers are out of range, 1 to %d", count,
+                         MAX_LAYERS);
+        Py_DECREF(value);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
+        PyObject *item = PySequence_GetItem(value, i);
+        struct vkb_layer *layer = &settings->layers[i];
+        if (item && vkb_require_tuple(item, "layers")
+            && PyArg_ParseTuple(item, "ff;layers must hold (scale, strength)", &layer->scale,
+                                &layer->strength)
+            && !(isfinite(layer->scale) && isfinite(layer->strength)))
+            PyErr_Format(PyExc_ValueError, "layers: %R is not finite", item);
+        Py_XDECREF(item);
+    }
+    settings->layer_count = (uint32_t)count;
+    Py_DECREF(value);
+    return !PyErr_Occurred();
+}
+
+static bool read_all(const struct reader *reader, struct vkb_settings *settings)
+{
+    memset(settings, 0, sizeof *settings);
+    for (size_t i = 0; i < vkb_value_row_count; ++i)
+        if (!read_value(reader, i, &settings->values))
+            return false;
+    for (int i = 0; i < VKB_CHOICE_COUNT; ++i)
+        if (!read_choice(reader, i, &settings->choices[i]))
+            return false;
+
+    PyObject *threshold = optional_attribute(reader, ATTRIBUTE_THRESHOLD);
+    settings->thresholded = threshold && threshold != Py_None;
+    Py_XDECREF(threshold);
+    return !PyErr_Occurred() && read_method(reader, &settings->method)
+        && read_format(reader, &settings->format) && read_size(reader, settings)
+        && read_weights(reader, settings) && read_layers(reader, settings);
+}
+
+bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
+                       struct vkb_settings *settings)
+{
+    struct reader reader;
+
+    return begin_reading(state, object, &reader)
+        && end_reading(&reader, read_all(&reader, settings));
+}
+
+bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)
+{
+    double *p = camera->position, *r = camera->rotation;
+
+    return PyArg_ParseTuple(tuple, "(ddd)(ddd)ddd", &p[0], &p[1], &p[2], &r[0], &r[1], &r[2],
+                            &camera->fov, &camera->near, &camera->far);
+}
+
+// NumPy marks unaligned arrays with a prefix.
+char vkb_element_code(const Py_buffer *view)
+{
+    const char *format = view->format ? view->format : "B";
+
+    if (*format == '@' || *format == '=')
+        ++format;
+    return strlen(format) == 1 ? *format : 0;
+}
+
+bool vkb_has_element(const Py_buffer *view, const char *codes)
+{
+    char code = vkb_element_code(view);
+    return code && strchr(codes, code);
+}
+
+enum vkb_format vkb_pixel_format(char code)
+{
+    return code == 'B' ? VKB_FORMAT_RGBA8_UNORM
+         : code == 'e' ? VKB_FORMAT_RGBA16_FLOAT
+                       : VKB_FORMAT_RGBA32_FLOAT;
+}
+
+bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
+{
+    Py_buffer *view = &image->view;
+
+    if (PyObject_GetBuffer(array, view, PyBUF_STRIDES | PyBUF_FORMAT) < 0)
+        return false;
+    image->held = true;
+    if (!vkb_has_element(view, "Bef")) {
+        PyErr_SetString(PyExc_TypeError, "image: an array of uint8, float16 or float32 is needed");
+        return false;
+    }
+    if (view->ndim != 3 || view->shape[0] < 1 || view->shape[1] < 1
+        || (view->shape[2] != 3 && view->shape[2] != 4) || view->shape[0] > INT32_MAX
+        || view->shape[1] > INT32_MAX) {
+        PyErr_SetString(PyExc_ValueError, "image: a shape of (H, W, 3) or (H, W, 4) is needed");
+        return false;
+    }
+    image->input = (struct vkb_input){
+        .memory = view->buf,
+        .row_stride = view->strides[0],
+        .pixel_stride = view->strides[1],
+        .channel_stride = view->strides[2],
+        .format = vkb_pixel_format(vkb_element_code(view)),
+        .width = (uint32_t)view->shape[1],
+        .height = (uint32_t)view->shape[0],
+        .channels = (uint32_t)view->shape[2],
+    };
+    return true;
+}
+
+void vkb_release_image(struct vkb_held_image *image)
+{
+    if (image->held)
+        PyBuffer_Release(&image->view);
+    image->held = false;
+}

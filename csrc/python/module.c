@@ -1,0 +1,284 @@
+// The extension module: its state, its exceptions, the tables of the settings.
+#include "python/module.h"
+
+#include "graph/params.h"
+
+#include <string.h>
+
+struct vkb_module_state *vkb_module_state(PyObject *module)
+{
+    return PyModule_GetState(module);
+}
+
+static bool set_steal(PyObject *object, const char *name, PyObject *value)
+{
+    if (!value)
+        return false;
+    int result = PyObject_SetAttrString(object, name, value);
+    Py_DECREF(value);
+    return result == 0;
+}
+
+PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error)
+{
+    // The exception of what interrupted is there already.
+    if (error->kind == VKB_ERROR_INTERRUPTED)
+        return NULL;
+    PyObject *type = state->errors[error->kind];
+    // Where a long message is cut, a character may be, too.
+    PyObject *message =
+        PyUnicode_DecodeUTF8(error->message, (Py_ssize_t)strlen(error->message), "replace");
+    if (error->kind == VKB_ERROR_VALUE) {
+        if (message)
+            PyErr_SetObject(type, message);
+        Py_XDECREF(message);
+        return NULL;
+    }
+    PyObject *exception = message ? PyObject_CallFunctionObjArgs(type, message, NULL) : NULL;
+    const bool from_vulkan = error->call[0] != '\0';
+    if (exception
+        && set_steal(exception, "vk_call",
+                     from_vulkan ? PyUnicode_FromString(error->call) : Py_NewRef(Py_None))
+        && set_steal(exception, "vk_result",
+                     from_vulkan ? PyLong_FromLong(error->result) : Py_NewRef(Py_None)))
+        PyErr_SetObject(type, exception);
+    Py_XDECREF(exception);
+    Py_XDECREF(message);
+    return NULL;
+}
+
+PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
+{
+    return Py_BuildValue("(ssssNy#)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
+                         adapter->driver_info,
+                         PyUnicode_FromFormat("%u.%u.%u",
+                                              VK_API_VERSION_MAJOR(adapter->api_version),
+                                              VK_API_VERSION_MINOR(adapter->api_version),
+                                              VK_API_VERSION_PATCH(adapter->api_version)),
+                         (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE);
+}
+
+static PyObject *adapters(PyObject *module, PyObject *unused)
+{
+    struct vkb_instance instance;
+    struct vkb_adapter_info found[VKB_MAX_ADAPTERS];
+    struct vkb_error error = {0};
+    uint32_t count = 0;
+    bool done;
+
+    (void)unused;
+    Py_BEGIN_ALLOW_THREADS
+    done = vkb_instance_create(&instance, false, &error);
+    if (done) {
+        done = vkb_adapters_list(&instance, found, &count, &error);
+        vkb_instance_destroy(&instance);
+    }
+    Py_END_ALLOW_THREADS
+    if (!done)
+        return vkb_raise(vkb_module_state(module), &error);
+
+    PyObject *list = PyList_New(0);
+    for (uint32_t i = 0; list && i < count; ++i) {
+        PyObject *tuple = vkb_adapter_tuple(&found[i]);
+        if (!tuple || PyList_Append(list, tuple) < 0)
+            Py_CLEAR(list);
+        Py_XDECREF(tuple);
+    }
+    return list;
+}
+
+static PyMethodDef functions[] = {
+    {"adapters", adapters, METH_NOARGS, "Describes the adapters that can run vkbloom."},
+    {"describe", vkb_describe, METH_VARARGS, "The graph of a scene's frame as lists and dicts."},
+#ifdef VKBLOOM_FAULTS
+    {"arm_fault", vkb_fault_arm, METH_VARARGS,
+     "arm_fault(n, result, names): the n-th call of those names (\"\": of all) answers result."},
+    {"fault_state", vkb_fault_state, METH_NOARGS,
+     "(calls since then, the one that failed or \"\", blocks, validation messages)"},
+#endif
+    {0},
+};
+
+static bool add_steal(PyObject *module, const char *name, PyObject *value)
+{
+    int result = PyModule_AddObjectRef(module, name, value);
+    Py_XDECREF(value);
+    return result == 0;
+}
+
+// {name: (default, low, high)}
+static PyObject *value_table(void)
+{
+    PyObject *table = PyDict_New();
+
+    for (size_t i = 0; table && i < vkb_value_row_count; ++i) {
+        const struct vkb_value_row *row = &vkb_value_rows[i];
+        PyObject *entry =
+            row->type == VKB_VALUE_INT
+                ? Py_BuildValue("(iii)", (int)row->initial, (int)row->low, (int)row->high)
+                : Py_BuildValue("(ddd)", row->initial, row->low, row->high);
+        if (!entry || PyDict_SetItemString(table, row->name, entry) < 0)
+            Py_CLEAR(table);
+        Py_XDECREF(entry);
+    }
+    return table;
+}
+
+static PyObject *name_tuple(const char *const *names, Py_ssize_t count)
+{
+    PyObject *tuple = PyTuple_New(count);
+
+    for (Py_ssize_t i = 0; tuple && i < count; ++i) {
+        PyObject *name = PyUnicode_FromString(names[i]);
+        if (!name || PyTuple_SetItem(tuple, i, name) < 0)
+            Py_CLEAR(tuple);
+    }
+    return tuple;
+}
+
+// {name: (spelling, ...)}
+static PyObject *choice_table(void)
+{
+    PyObject *table = PyDict_New();
+
+    for (size_t i = 0; table && i < VKB_CHOICE_COUNT; ++i) {
+        const struct vkb_choice_row *row = &vkb_choice_rows[i];
+        PyObject *names = name_tuple(row->spellings, row->count);
+        if (!names || PyDict_SetItemString(table, row->name, names) < 0)
+            Py_CLEAR(table);
+        Py_XDECREF(names);
+    }
+    return table;
+}
+
+// The exceptions under vkbloom.Error, by kind; each may have a built-in class as a second base.
+static const struct error_row {
+    enum vkb_error_kind kind;
+    const char *name;
+    const char *doc;
+} error_rows[] = {
+    {VKB_ERROR_GENERAL, "Error",
+     "Something failed in the core; base of the package's own exceptions.\n\n"
+     "Attributes\n----------\n"
+     "vk_call : str or None\n    The Vulkan call that failed.\n"
+     "vk_result : int or None\n    The VkResult that it answered."},
+    {VKB_ERROR_ADAPTER_NOT_FOUND, "AdapterNotFoundError",
+     "No adapter fits; says what was found, what is missing and what to install."},
+    {VKB_ERROR_DEVICE_LOST, "DeviceLostError",
+     "The device went away or hung; the renderer can only be closed."},
+    {VKB_ERROR_OUT_OF_MEMORY, "OutOfMemoryError", "The host or the device has no memory left."},
+    {VKB_ERROR_VALIDATION, "ValidationError", "The validation layer objected to a Vulkan call."},
+    {VKB_ERROR_SHADER, "ShaderError", "The driver refused a shader."},
+};
+
+static PyObject *second_base(enum vkb_error_kind kind)
+{
+    switch (kind) {
+    case VKB_ERROR_ADAPTER_NOT_FOUND:
+        return PyExc_RuntimeError;
+    case VKB_ERROR_OUT_OF_MEMORY:
+        return PyExc_MemoryError;
+    default:
+        return NULL;
+    }
+}
+
+static PyObject *new_error(const struct vkb_module_state *state, const struct error_row *row)
+{
+    PyObject *error = state->errors[VKB_ERROR_GENERAL], *second = second_base(row->kind);
+    PyObject *name = PyUnicode_FromFormat("vkbloom.%s", row->name);
+    PyObject *bases = error ? second ? PyTuple_Pack(2, error, second) : PyTuple_Pack(1, error)
+                            : PyTuple_Pack(1, PyExc_Exception);
+    // Also without a Vulkan call behind it an exception has the two attributes.
+    PyObject *members = Py_BuildValue("{sOsO}", "vk_call", Py_None, "vk_result", Py_None);
+    PyObject *type = NULL;
+
+    if (name && bases && members) {
+        PyObject *text = PyUnicode_AsUTF8String(name);
+        if (text)
+            type = PyErr_NewExceptionWithDoc(PyBytes_AsString(text), row->doc, bases, members);
+        Py_XDECREF(text);
+    }
+    Py_XDECREF(name);
+    Py_XDECREF(bases);
+    Py_XDECREF(members);
+    return type;
+}
+
+static int execute(PyObject *module)
+{
+    struct vkb_module_state *state = vkb_module_state(module);
+
+    for (size_t i = 0; i < sizeof error_rows / sizeof error_rows[0]; ++i) {
+        const struct error_row *row = &error_rows[i];
+        state->errors[row->kind] = new_error(state, row);
+        if (!state->errors[row->kind]
+            || PyModule_AddObjectRef(module, row->name, state->errors[row->kind]) < 0)
+            return -1;
+    }
+    state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
+    state->renderer_type = PyType_FromModuleAndSpec(module, &vkb_renderer_spec, NULL);
+    state->batch_type = PyType_FromModuleAndSpec(module, &vkb_batch_spec, NULL);
+    if (!state->renderer_type || !state->batch_type
+        || PyModule_AddObjectRef(module, "Renderer", state->renderer_type) < 0)
+        return -1;
+    return vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
+                && add_steal(module, "CHOICES", choice_table())
+                && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
+                && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
+             ? 0
+             : -1;
+}
+
+static int traverse(PyObject *module, visitproc visit, void *arg)
+{
+    struct vkb_module_state *state = vkb_module_state(module);
+
+    Py_VISIT(state->renderer_type);
+    Py_VISIT(state->batch_type);
+    Py_VISIT(state->attributes);
+    Py_VISIT(state->lacking);
+    for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
+        Py_VISIT(state->errors[i]);
+    return 0;
+}
+
+static int clear(PyObject *module)
+{
+    struct vkb_module_state *state = vkb_module_state(module);
+
+    Py_CLEAR(state->renderer_type);
+    Py_CLEAR(state->batch_type);
+    Py_CLEAR(state->attributes);
+    Py_CLEAR(state->lacking);
+    for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
+        Py_CLEAR(state->errors[i]);
+    return 0;
+}
+
+static void free_module(void *module)
+{
+    clear(module);
+}
+
+static PyModuleDef_Slot slots[] = {
+    {Py_mod_exec, execute},
+    {0},
+};
+
+static PyModuleDef definition = {
+    PyModuleDef_HEAD_INIT,
+    .m_name = "vkbloom._core",
+    .m_doc = "The C core: adapters, the Renderer type, the tables of the settings.",
+    .m_size = sizeof(struct vkb_module_state),
+    .m_methods = functions,
+    .m_slots = slots,
+    .m_traverse = traverse,
+    .m_clear = clear,
+    .m_free = free_module,
+};
+
+PyMODINIT_FUNC PyInit__core(void)
+{
+    return PyModuleDef_Init(&definition);
+}

@@ -1,0 +1,142 @@
+// What the files that speak Python share: module.c, renderer.c, batch.c, array_memory.c,
+// arguments.c, scene_arguments.c, describe.c, and faults.c in test builds. The only header of the
+// core that includes Python.h.
+#ifndef VKB_MODULE_H
+#define VKB_MODULE_H
+
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
+#include "variants/forms.h"
+#include "run/frame.h"
+#include "methods/methods.h"
+
+#include <stdatomic.h>
+
+struct vkb_module_state {
+    PyObject *renderer_type, *batch_type;
+    PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
+    PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
+    PyObject *lacking;  // dict of type to bytes: which of those its objects lack
+};
+
+struct vkb_module_state *vkb_module_state(PyObject *module);
+
+// Raises the exception that fits; returns NULL.
+PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
+
+// (name, type, driver, driver_info, api_version, driver UUID as bytes)
+PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
+
+extern PyType_Spec vkb_renderer_spec, vkb_batch_spec;
+
+// A batch's flight that nobody waits for any more, with what it writes to until it is over.
+struct vkb_cargo {
+    struct vkb_flight *flight;  // NULL: over
+    void (*release)(struct vkb_cargo *cargo);
+    struct vkb_cargo *next;
+};
+
+struct vkb_renderer {
+    PyObject_HEAD
+    PyThread_type_lock lock;   // held, without the GIL, around all that touches the device
+    unsigned long holder;      // the thread that holds it, 0: none; read and written with the GIL
+    PyThreadState *thread;     // that thread's, while it has given the GIL back
+    struct vkb_cargo *adrift;  // touched with the GIL
+    long process;              // that opened it: the device is no other's, not even a forked one's
+    atomic_bool open;          // changed with the lock, looked at without
+    PyObject *array_memory;    // a capsule, which the arrays hold too; NULL: closed
+    PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
+    size_t pipeline_count;     // made so far; read and written with the GIL
+    enum vkb_forms forms;
+    struct vkb_device device;
+    struct vkb_frame frame;
+};
+
+// Fails where the renderer is closed or another process's, or its device lost.
+bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *error);
+
+// Takes the renderer's lock and gives the GIL back, and the other way round. Waiting for the lock
+// can be interrupted by a signal; then, and where a signal's handler asks for what the thread that
+// it interrupted has, the first one fails, with the GIL. The second one gives up what is adrift and
+// over.
+bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
+void vkb_renderer_leave(struct vkb_renderer *renderer);
+
+// Whether this is the process that opened the renderer.
+bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
+// Takes the cargo over, whose flight may be in the air.
+void vkb_renderer_set_adrift(struct vkb_renderer *renderer, struct vkb_cargo *cargo);
+
+// Whose the device is: this process's number, whatever it was forked from.
+long vkb_current_process(void);
+
+// Memory for large arrays that the device writes to without a copy; false with an exception set.
+bool vkb_array_memory_create(struct vkb_renderer *renderer);
+// Before the device goes, with the GIL; arrays keep what they have.
+void vkb_array_memory_close(struct vkb_renderer *renderer);
+// The pages that the array's memory is in; NULL: it is not the renderer's. With the GIL.
+struct vkb_page_run *vkb_array_pages(const struct vkb_renderer *renderer, const void *memory);
+// Method of the Renderer: new_array(empty, shape, dtype), what empty(shape, dtype) makes there.
+PyObject *vkb_new_array(PyObject *renderer, PyObject *arguments);
+
+// Methods of the Renderer: a new Batch of points of one scene or of one image.
+PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_batch_of_image(PyObject *renderer, PyObject *arguments);
+
+// Makes what vkb_read_settings keeps in the state; false with an exception set.
+bool vkb_make_attributes(struct vkb_module_state *state);
+
+// A settings object's attributes; one that it lacks keeps its default. Objects of one type have the
+// same attributes. False with an exception set.
+bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
+                       struct vkb_settings *settings);
+
+// Whether it is a tuple, as PyArg_ParseTuple must have it; else with a TypeError set.
+bool vkb_require_tuple(PyObject *object, const char *what);
+
+// (position, rotation, fov, near, far), the first two of three numbers each.
+bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
+
+// The buffer protocol's code of the element type; 0 for anything but one number in this machine's
+// byte order.
+char vkb_element_code(const Py_buffer *view);
+bool vkb_has_element(const Py_buffer *view, const char *codes);
+
+// The format of pixels whose channels have that element type: B, e or f.
+enum vkb_format vkb_pixel_format(char code);
+
+// A scene's arrays, held until vkb_release_scene, which may be called on a zeroed or half-read one.
+struct vkb_held_scene {
+    struct vkb_scene_data data;
+    Py_buffer *views;
+    size_t view_count;
+};
+
+// (serial, body, glow or None, sky levels, textures); a mesh is (vertices, indices, emission or
+// None, texcoords or None, surfaces), a surface (index count, base texture, emission texture), a
+// texture (levels, address mode across, down, magnification, minification, mipmap filter).
+bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
+void vkb_release_scene(struct vkb_held_scene *scene);
+
+// An image's pixels, held until vkb_release_image, which may be called on a zeroed or half-read
+// one.
+struct vkb_held_image {
+    struct vkb_input input;
+    Py_buffer view;
+    bool held;
+};
+
+// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides.
+bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
+void vkb_release_image(struct vkb_held_image *image);
+
+// The graph of a scene's frame as Python data: describe(settings, size, has_sky, shading).
+PyObject *vkb_describe(PyObject *module, PyObject *arguments);
+
+#ifdef VKBLOOM_FAULTS
+PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);
+PyObject *vkb_fault_state(PyObject *module, PyObject *unused);
+#endif
+
+#endif

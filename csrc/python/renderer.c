@@ -1,0 +1,368 @@
+// The Renderer type: a device and all that lives on it.
+#include "python/module.h"
+
+#ifndef _WIN32
+#include <unistd.h>
+#endif
+
+static struct vkb_module_state *state_of(PyObject *self)
+{
+    return PyType_GetModuleState(Py_TYPE(self));
+}
+
+long vkb_current_process(void)
+{
+#ifdef _WIN32
+    return 0;  // nothing forks there
+#else
+    return (long)getpid();
+#endif
+}
+
+bool vkb_renderer_is_ours(const struct vkb_renderer *self)
+{
+    return self->process == vkb_current_process();
+}
+
+static bool require_ours(const struct vkb_renderer *self, struct vkb_error *error)
+{
+    return vkb_renderer_is_ours(self)
+        || vkb_fail(error, VKB_ERROR_VALUE,
+                    "the renderer was opened in another process (%ld), from which this one (%ld) "
+                    "was forked; open one here",
+                    self->process, vkb_current_process());
+}
+
+// The device's question between the slices of a wait: whether a signal's handler raised.
+static bool interrupted(void *asked)
+{
+    struct vkb_renderer *self = asked;
+
+    PyEval_RestoreThread(self->thread);
+    const bool raised = PyErr_CheckSignals() < 0;
+    self->thread = PyEval_SaveThread();
+    return raised;
+}
+
+static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
+{
+    const long long slice = 50000;  // microseconds
+    PyLockStatus status = PyThread_acquire_lock_timed(self->lock, 0, 0);
+
+    while (status != PY_LOCK_ACQUIRED) {
+        Py_BEGIN_ALLOW_THREADS
+        status = PyThread_acquire_lock_timed(self->lock, slice, 0);
+        Py_END_ALLOW_THREADS
+        if (status != PY_LOCK_ACQUIRED && PyErr_CheckSignals() < 0)
+            return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
+    }
+    return true;
+}
+
+// Takes out of what is adrift what is over. With the lock and the GIL, or without a device.
+static struct vkb_cargo *take_over(struct vkb_renderer *self)
+{
+    struct vkb_cargo **link = &self->adrift, *over = NULL;
+
+    while (*link) {
+        struct vkb_cargo *cargo = *link;
+        // Without a device all is over; one that was left behind at work keeps what it has.
+        if (self->device.handle
+            && !(self->open && vkb_frame_drop(&self->device, &self->frame, cargo->flight))) {
+            link = &cargo->next;
+            continue;
+        }
+        *link = cargo->next;
+        cargo->next = over;
+        over = cargo;
+    }
+    return over;
+}
+
+// With the GIL, without the lock: it runs Python's code, which may wait for another thread that
+// waits for the renderer. An exception that is set stays.
+static void release_all(struct vkb_cargo *over)
+{
+    PyObject *type, *value, *traceback;
+
+    if (!over)
+        return;
+    PyErr_Fetch(&type, &value, &traceback);
+    while (over) {
+        struct vkb_cargo *next = over->next;
+        over->release(over);
+        over = next;
+    }
+    PyErr_Restore(type, value, traceback);
+}
+
+void vkb_renderer_set_adrift(struct vkb_renderer *self, struct vkb_cargo *cargo)
+{
+    cargo->next = self->adrift;
+    self->adrift = cargo;
+}
+
+bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
+{
+    if (!require_ours(self, error))
+        return false;
+    if (self->holder == PyThread_get_thread_ident())
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "the renderer is at work in this thread, which a signal's handler or a "
+                        "finalizer has interrupted");
+    if (!acquire_lock(self, error))
+        return false;
+    self->holder = PyThread_get_thread_ident();
+    self->thread = PyEval_SaveThread();
+    return true;
+}
+
+void vkb_renderer_leave(struct vkb_renderer *self)
+{
+    PyEval_RestoreThread(self->thread);
+    if (self->open)
+        self->pipeline_count = self->frame.pipelines.entry_count;
+    struct vkb_cargo *over = take_over(self);
+    self->holder = 0;
+    PyThread_release_lock(self->lock);
+    release_all(over);
+}
+
+// create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
+// earlier run's pipeline cache, or None.
+static bool create(struct vkb_renderer *self, const char *adapter, bool validation,
+                   const char *forms, PyObject *read_cache, struct vkb_error *error)
+{
+    bool done;
+    char *data = NULL;
+    Py_ssize_t size = 0;
+
+    Py_BEGIN_ALLOW_THREADS
+    done = vkb_device_create(&self->device, adapter, validation, error);
+    Py_END_ALLOW_THREADS
+    if (!done)
+        return false;
+    self->forms = vkb_forms_by_name(forms, &self->device);
+    if (self->forms == VKB_FORMS_COUNT) {
+        vkb_device_destroy(&self->device);
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "VKBLOOM_FORM: %s is not one of auto, fragment, cpu, gpu", forms);
+    }
+    PyObject *cache = PyObject_CallFunction(read_cache, "y#", self->device.adapter.driver_uuid,
+                                            (Py_ssize_t)VK_UUID_SIZE);
+    if (cache && cache != Py_None && PyBytes_AsStringAndSize(cache, &data, &size) < 0)
+        Py_CLEAR(cache);
+    if (!cache) {
+        vkb_device_destroy(&self->device);
+        return false;
+    }
+    Py_BEGIN_ALLOW_THREADS
+    done = vkb_frame_create(&self->device, data, (size_t)size, &self->frame, error)
+        && vkb_instance_check(&self->device.instance, error);
+    if (!done) {
+        vkb_frame_destroy(&self->device, &self->frame);
+        vkb_device_destroy(&self->device);
+    }
+    Py_END_ALLOW_THREADS
+    Py_DECREF(cache);
+    return done;
+}
+
+static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject *keywords)
+{
+    const char *adapter, *forms;
+    int validation;
+    double frame_seconds;
+    PyObject *read_cache;
+    struct vkb_error error = {0};
+
+    if (keywords && PyDict_Size(keywords) > 0) {
+        PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
+        return NULL;
+    }
+    if (!PyArg_ParseTuple(arguments, "spsdO:Renderer", &adapter, &validation, &forms,
+                          &frame_seconds, &read_cache))
+        return NULL;
+    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
+    struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
+    if (!self)
+        return NULL;
+    self->process = vkb_current_process();
+    self->lock = PyThread_allocate_lock();
+    if (!self->lock)
+        PyErr_NoMemory();
+    else if (vkb_array_memory_create(self))
+        self->open = create(self, adapter, validation, forms, read_cache, &error);
+    if (self->open) {
+        self->device.interrupted = interrupted;
+        self->device.asked = self;
+        self->device.frame_seconds = frame_seconds;
+        return (PyObject *)self;
+    }
+    if (error.kind != VKB_OK)
+        vkb_raise(PyType_GetModuleState(type), &error);
+    Py_DECREF(self);
+    return NULL;
+}
+
+// With the lock, without the GIL. With the validation layer, an object left behind is a message
+// here. A device that hangs is left as it is, with all that it may still use.
+static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
+{
+    struct vkb_error ignored;
+
+    if (!self->open)
+        return true;
+    if (self->device.hung) {
+        self->device.frame_seconds = 0.0;  // one slice
+        if (!vkb_frame_land(&self->device, &self->frame, &ignored)) {
+            self->open = false;
+            return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
+                            "the device is still at work; what it uses is kept until the process "
+                            "ends");
+        }
+    }
+    self->open = false;
+    vkb_frame_destroy(&self->device, &self->frame);
+    PyEval_RestoreThread(self->thread);
+    vkb_array_memory_close(self);
+    self->thread = PyEval_SaveThread();
+    // The instance stays readable after its end: the messages are the renderer's own memory.
+    vkb_device_destroy(&self->device);
+    return vkb_instance_check(&self->device.instance, error);
+}
+
+static void dealloc(PyObject *object)
+{
+    struct vkb_renderer *self = (struct vkb_renderer *)object;
+    PyTypeObject *type = Py_TYPE(object);
+    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
+    struct vkb_error error = {0};
+
+    self->device.interrupted = NULL;
+    if (vkb_renderer_is_ours(self)) {
+        self->thread = PyEval_SaveThread();
+        destroy(self, &error);
+        PyEval_RestoreThread(self->thread);
+    }
+    self->open = false;
+    // A device that hangs, or another process's, is left behind, and with it what the driver may
+    // still use: what is adrift, and this object, to which the messenger brings its messages.
+    if (self->device.handle)
+        return;
+    release_all(take_over(self));
+    Py_CLEAR(self->array_context);
+    Py_CLEAR(self->array_memory);
+    if (self->lock)
+        PyThread_free_lock(self->lock);
+    release(self);
+    Py_DECREF(type);
+}
+
+bool vkb_require_open(const struct vkb_renderer *self, struct vkb_error *error)
+{
+    if (!self->open)
+        return vkb_fail(error, VKB_ERROR_VALUE, "the renderer is closed");
+    if (!require_ours(self, error))
+        return false;
+    if (self->device.lost)
+        return vkb_fail(error, VKB_ERROR_DEVICE_LOST, "the device was lost; close the renderer");
+    return true;
+}
+
+static PyObject *close_renderer(PyObject *object, PyObject *unused)
+{
+    struct vkb_renderer *self = (struct vkb_renderer *)object;
+    struct vkb_error error = {0};
+    bool done = true;
+
+    (void)unused;
+    if (!vkb_renderer_is_ours(self)) {
+        // Forgotten here, and left as it is to the process that opened it.
+        self->open = false;
+        Py_RETURN_NONE;
+    }
+    if (!vkb_renderer_enter(self, &error))
+        return vkb_raise(state_of(object), &error);
+    // A wait that is interrupted leaves the renderer open; another failure changes nothing.
+    if (self->open && !self->device.hung)
+        done = vkb_frame_land(&self->device, &self->frame, &error)
+            || error.kind != VKB_ERROR_INTERRUPTED;
+    if (done)
+        done = destroy(self, &error);
+    vkb_renderer_leave(self);
+    return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
+}
+
+static PyObject *pipeline_cache(PyObject *object, PyObject *unused)
+{
+    struct vkb_renderer *self = (struct vkb_renderer *)object;
+    struct vkb_error error = {0};
+    void *data = NULL;
+    size_t size = 0;
+
+    (void)unused;
+    if (!vkb_renderer_enter(self, &error))
+        return vkb_raise(state_of(object), &error);
+    const bool done =
+        vkb_require_open(self, &error)
+        && vkb_pipelines_save(&self->device, &self->frame.pipelines, &data, &size, &error);
+    vkb_renderer_leave(self);
+    PyObject *bytes = done ? PyBytes_FromStringAndSize(data, (Py_ssize_t)size)
+                           : vkb_raise(state_of(object), &error);
+    vkb_free(data);
+    return bytes;
+}
+
+static PyObject *get_closed(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyBool_FromLong(!((struct vkb_renderer *)object)->open);
+}
+
+static PyObject *get_info(PyObject *object, void *unused)
+{
+    (void)unused;
+    return vkb_adapter_tuple(&((struct vkb_renderer *)object)->device.adapter);
+}
+
+static PyObject *get_pipeline_count(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyLong_FromSize_t(((struct vkb_renderer *)object)->pipeline_count);
+}
+
+static PyMethodDef methods[] = {
+    {"close", close_renderer, METH_NOARGS, "Gives all back; may be called twice."},
+    {"render", vkb_batch_of_scene, METH_VARARGS,
+     "render(scene, camera, size, shading, time, glow_intensity, names) -> Batch"},
+    {"apply", vkb_batch_of_image, METH_VARARGS, "apply(image, names) -> Batch"},
+    {"new_array", vkb_new_array, METH_VARARGS,
+     "new_array(empty, shape, dtype): what empty(shape, dtype) makes, in memory that is used "
+     "again."},
+    {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
+    {0},
+};
+
+static PyGetSetDef attributes[] = {
+    {"closed", get_closed, NULL, "Whether close() was called.", NULL},
+    {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
+    {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},
+    {0},
+};
+
+static PyType_Slot slots[] = {
+    {Py_tp_new, new_renderer},
+    {Py_tp_dealloc, dealloc},
+    {Py_tp_methods, methods},
+    {Py_tp_getset, attributes},
+    {Py_tp_doc, "A device and all that lives on it; vkbloom.Renderer wraps it."},
+    {0},
+};
+
+PyType_Spec vkb_renderer_spec = {
+    .name = "vkbloom._core.Renderer",
+    .basicsize = sizeof(struct vkb_renderer),
+    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE,
+    .slots = slots,
+};

@@ -1,0 +1,78 @@
+// Runs graphs: what is out of date is recorded, timed and submitted; later it is waited for, and
+// the images that are wanted come back to the host.
+#ifndef VKB_FRAME_H
+#define VKB_FRAME_H
+
+#include "run/flight.h"
+#include "graph/graph.h"
+#include "run/pipeline.h"
+#include "scene/scene.h"
+#include "run/slots.h"
+#include "run/upload.h"
+
+// The passes of the point that was recorded last, and what its source was.
+struct vkb_previous {
+    struct vkb_graph graph;  // without images
+    uint64_t source;
+};
+
+// Everything that lives from frame to frame. What the flights share is changed by the device in the
+// order of the submissions, and by the host only when nothing is in the air.
+struct vkb_frame {
+    struct vkb_flights flights;
+    struct vkb_pipelines pipelines;
+    struct vkb_scene scene;
+    struct vkb_upload upload;
+    struct vkb_slots slots;
+    struct vkb_previous previous;
+    bool stale;  // something failed: the images are made anew before anything is recorded
+};
+
+// What graphs start from; what they do not use is NULL.
+struct vkb_frame_source {
+    const struct vkb_scene_data *scene;
+    const struct vkb_input *input;
+};
+
+struct vkb_timing {
+    char name[VKB_NAME_SIZE];
+    double seconds;  // NaN: the queue has no timestamps
+};
+
+// Destroying a zeroed or half-built object is fine.
+bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, size_t cache_size,
+                      struct vkb_frame *frame, struct vkb_error *error);
+void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame);
+
+// One graph to run. `timings` has room for every pass of the graph and gets the render passes that
+// ran. All of it must stay where it is until the flight is over.
+struct vkb_point {
+    struct vkb_graph graph;
+    struct vkb_output *outputs;
+    uint32_t output_count;
+    struct vkb_timing *timings;
+    uint32_t timing_count;
+    uint32_t first_span;  // of its timings, in the flight's timer
+};
+
+// Records what the points' outputs need and is out of date, point after point, and hands it to the
+// device. All points have the same images (vkb_graph_same_images). The source is read before this
+// returns. A failure leaves no flight, the frame usable, unless the device is lost, and earlier
+// flights as they were.
+bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
+                      const struct vkb_frame_source *source, struct vkb_point *points,
+                      uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error);
+
+// Waits for the flight and fills its points' outputs and timings. *over: whether the device is done
+// with it, which it need not be after a failure.
+bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
+                       struct vkb_flight *flight, bool *over, struct vkb_error *error);
+
+// Gives up a flight that nobody wants any more, without a wait; false where the device may still
+// be at work on it.
+bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight);
+
+// Waits for all flights.
+bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error);
+
+#endif

@@ -1,0 +1,138 @@
+#include "run/pages.h"
+
+// So much stays idle at the most, the latest of it: three 4K images of half floats and some.
+#define KEPT_BYTES ((size_t)256 << 20)
+
+// From so much on, memory starts where the system's large pages do, of which fewer have to be
+// given, zeroed and pinned.
+#define LARGE_BYTES ((size_t)4 << 20)
+#define LARGE_PAGE  ((size_t)2 << 20)
+#define SMALL_PAGE  ((size_t)4096)
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+static void advise(const struct vkb_page_run *run)
+{
+#ifdef MADV_HUGEPAGE
+    // Where the system has none, nothing is lost.
+    if (run->size >= LARGE_BYTES)
+        (void)madvise(run->memory, run->size, MADV_HUGEPAGE);
+#else
+    (void)run;
+#endif
+}
+
+static struct vkb_page_run *create_run(const struct vkb_device *device, size_t size,
+                                       struct vkb_error *error)
+{
+    const size_t page = device && device->import_alignment > SMALL_PAGE
+                          ? (size_t)device->import_alignment
+                          : SMALL_PAGE;
+    const size_t align = size >= LARGE_BYTES && LARGE_PAGE > page ? LARGE_PAGE : page;
+    struct vkb_page_run *run = vkb_alloc(error, 1, sizeof *run);
+
+    if (!run)
+        return NULL;
+    if (size > SIZE_MAX - align - page
+        || !(run->start = vkb_alloc(error, 1, size + align + page))) {
+        vkb_free(run);
+        return NULL;
+    }
+    run->memory = (void *)(((uintptr_t)run->start + align - 1) / align * align);
+    run->size = (size + page - 1) / page * page;
+    advise(run);
+    return run;
+}
+
+static void destroy_run(const struct vkb_device *device, struct vkb_page_run *run)
+{
+    if (device)
+        vkb_buffer_destroy(device, &run->buffer);
+    vkb_free(run->start);
+    vkb_free(run);
+}
+
+// Takes out of the list the run that `memory` is in.
+static struct vkb_page_run *unlink_run(struct vkb_page_run **list, const void *memory)
+{
+    while (*list && (*list)->memory != memory)
+        list = &(*list)->next;
+    struct vkb_page_run *run = *list;
+    if (run)
+        *list = run->next;
+    return run;
+}
+
+// An eighth more than is needed is still a fit: sizes that change a little share runs.
+static struct vkb_page_run *find_idle(const struct vkb_pages *pages, size_t size)
+{
+    struct vkb_page_run *found = NULL;
+
+    for (struct vkb_page_run *run = pages->idle; run; run = run->next)
+        if (run->size >= size && run->size - size <= size / 8 + SMALL_PAGE
+            && (!found || run->size < found->size))
+            found = run;
+    return found;
+}
+
+void *vkb_pages_take(struct vkb_pages *pages, size_t size)
+{
+    struct vkb_page_run *run = find_idle(pages, size);
+
+    if (run) {
+        unlink_run(&pages->idle, run->memory);
+        pages->idle_size -= run->size;
+    } else if (!(run = create_run(pages->device, size, &pages->error))) {
+        return NULL;
+    }
+    run->next = pages->taken;
+    pages->taken = run;
+    return run->memory;
+}
+
+static void drop_oldest(struct vkb_pages *pages)
+{
+    struct vkb_page_run *oldest = pages->idle;
+
+    while (oldest->next)
+        oldest = oldest->next;
+    unlink_run(&pages->idle, oldest->memory);
+    pages->idle_size -= oldest->size;
+    destroy_run(pages->device, oldest);
+}
+
+void vkb_pages_give_back(struct vkb_pages *pages, void *memory)
+{
+    struct vkb_page_run *run = unlink_run(&pages->taken, memory);
+
+    // Nobody asks a closed one for more.
+    if (!pages->device) {
+        destroy_run(NULL, run);
+        return;
+    }
+    run->next = pages->idle;
+    pages->idle = run;
+    pages->idle_size += run->size;
+    while (pages->idle_size > KEPT_BYTES)
+        drop_oldest(pages);
+}
+
+struct vkb_page_run *vkb_pages_find(const struct vkb_pages *pages, const void *memory)
+{
+    struct vkb_page_run *run = pages->taken;
+
+    while (run && (uintptr_t)memory - (uintptr_t)run->memory >= run->size)
+        run = run->next;
+    return run;
+}
+
+void vkb_pages_close(struct vkb_pages *pages)
+{
+    while (pages->idle)
+        drop_oldest(pages);
+    for (struct vkb_page_run *run = pages->taken; run; run = run->next)
+        vkb_buffer_destroy(pages->device, &run->buffer);
+    pages->device = NULL;
+}

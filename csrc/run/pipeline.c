@@ -1,0 +1,555 @@
+#include "run/pipeline.h"
+
+#include "scene/scene.h"
+
+#include <string.h>
+
+// Keys are compared byte by byte: fill them from zero, padding included.
+struct render_pass_key {
+    enum vkb_format formats[VKB_MAX_TARGETS];
+    enum vkb_format depth_format;
+    uint32_t target_count;
+    enum vkb_load load;
+    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
+    uint32_t use_count;
+};
+
+struct vkb_render_pass_entry {
+    struct render_pass_key key;
+    VkRenderPass handle;
+};
+
+struct pipeline_key {
+    enum vkb_shader vertex, shader;
+    enum vkb_geometry geometry;
+    enum vkb_binding_kind bindings;
+    bool textured;
+    enum vkb_blend blend;
+    uint32_t target_count;
+    uint32_t constant_count;
+    int32_t constants[VKB_MAX_CONSTANTS];
+    VkRenderPass render_pass;
+};
+
+struct vkb_pipeline_entry {
+    struct pipeline_key key;
+    VkPipeline handle;
+};
+
+static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
+                           struct vkb_error *error)
+{
+    return VK(error,
+              device->vk.vkCreateSampler(device->handle,
+                                         &(VkSamplerCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
+                                             .magFilter = filter,
+                                             .minFilter = filter,
+                                             .mipmapMode = filter == VK_FILTER_LINEAR
+                                                             ? VK_SAMPLER_MIPMAP_MODE_LINEAR
+                                                             : VK_SAMPLER_MIPMAP_MODE_NEAREST,
+                                             .addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .maxLod = VK_LOD_CLAMP_NONE,
+                                         },
+                                         NULL, sampler));
+}
+
+static const struct binding_kind {
+    VkDescriptorType read;
+    uint32_t most_reads;
+    bool target;
+    VkShaderStageFlags parameter_stages, image_stages;
+} binding_kinds[VKB_BINDING_KINDS] = {
+    [VKB_BINDINGS_DRAW] =
+        {
+            .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .most_reads = VKB_MAX_READS,
+            .parameter_stages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT,
+            .image_stages = VK_SHADER_STAGE_FRAGMENT_BIT,
+        },
+    [VKB_BINDINGS_DISPATCH] =
+        {
+            .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .most_reads = VKB_MAX_READS,
+            .target = true,
+            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+        },
+    [VKB_BINDINGS_LOAD] =
+        {
+            .read = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .most_reads = VKB_MAX_LOADS,
+            .target = true,
+            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+        },
+};
+
+static bool create_layouts(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                           enum vkb_binding_kind kind, uint32_t images, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    const struct binding_kind *types = &binding_kinds[kind];
+    VkDescriptorSetLayoutBinding bindings[VKB_MAX_READS + 2] = {
+        {
+            .binding = 0,
+            .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
+            .descriptorCount = 1,
+            .stageFlags = types->parameter_stages,
+        },
+    };
+    const uint32_t count = 1 + images + types->target;
+
+    for (uint32_t i = 1; i < count; ++i)
+        bindings[i] = (VkDescriptorSetLayoutBinding){
+            .binding = i,
+            .descriptorType = i <= images ? types->read : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .descriptorCount = 1,
+            .stageFlags = types->image_stages,
+        };
+    return VK(error, vk->vkCreateDescriptorSetLayout(
+                         device->handle,
+                         &(VkDescriptorSetLayoutCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
+                             .bindingCount = count,
+                             .pBindings = bindings,
+                         },
+                         NULL, &pipelines->set_layouts[kind][images]))
+        && VK(error,
+              vk->vkCreatePipelineLayout(device->handle,
+                                         &(VkPipelineLayoutCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                             .setLayoutCount = 1,
+                                             .pSetLayouts = &pipelines->set_layouts[kind][images],
+                                         },
+                                         NULL, &pipelines->layouts[kind][images]));
+}
+
+bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_data,
+                          size_t cache_size, struct vkb_pipelines *pipelines,
+                          struct vkb_error *error)
+{
+    *pipelines = (struct vkb_pipelines){0};
+    bool done = VK(error, device->vk.vkCreatePipelineCache(
+                              device->handle,
+                              &(VkPipelineCacheCreateInfo){
+                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
+                                  .initialDataSize = cache_size,
+                                  .pInitialData = cache_data,
+                              },
+                              NULL, &pipelines->cache))
+             && create_sampler(device, VK_FILTER_LINEAR, &pipelines->filter, error)
+             && create_sampler(device, VK_FILTER_NEAREST, &pipelines->nearest, error);
+
+    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
+        for (uint32_t images = 0; done && images <= binding_kinds[kind].most_reads; ++images)
+            done = create_layouts(device, pipelines, (enum vkb_binding_kind)kind, images, error);
+    if (!done)
+        vkb_pipelines_destroy(device, pipelines);
+    return done;
+}
+
+void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines *pipelines)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    for (size_t i = 0; i < pipelines->entry_count; ++i)
+        vk->vkDestroyPipeline(device->handle, pipelines->entries[i].handle, NULL);
+    for (size_t i = 0; i < pipelines->render_pass_count; ++i)
+        vk->vkDestroyRenderPass(device->handle, pipelines->render_passes[i].handle, NULL);
+    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
+        for (uint32_t i = 0; i <= VKB_MAX_READS; ++i) {
+            vk->vkDestroyPipelineLayout(device->handle, pipelines->layouts[kind][i], NULL);
+            vk->vkDestroyDescriptorSetLayout(device->handle, pipelines->set_layouts[kind][i], NULL);
+        }
+    for (uint32_t i = 0; i < VKB_SHADER_COUNT; ++i)
+        vk->vkDestroyShaderModule(device->handle, pipelines->modules[i], NULL);
+    vk->vkDestroySampler(device->handle, pipelines->filter, NULL);
+    vk->vkDestroySampler(device->handle, pipelines->nearest, NULL);
+    vk->vkDestroyPipelineCache(device->handle, pipelines->cache, NULL);
+    vkb_free(pipelines->entries);
+    vkb_free(pipelines->render_passes);
+    *pipelines = (struct vkb_pipelines){0};
+}
+
+bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
+                        void **data, size_t *size, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    *data = NULL;
+    if (!VK(error, vk->vkGetPipelineCacheData(device->handle, pipelines->cache, size, NULL)))
+        return false;
+    *data = vkb_alloc(error, *size, 1);
+    if (!*data)
+        return false;
+    if (VK(error, vk->vkGetPipelineCacheData(device->handle, pipelines->cache, size, *data)))
+        return true;
+    vkb_free(*data);
+    *data = NULL;
+    return false;
+}
+
+static bool get_module(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                       enum vkb_shader shader, VkShaderModule *module, struct vkb_error *error)
+{
+    VkShaderModule *kept = &pipelines->modules[shader];
+
+    if (!*kept
+        && !VK(error, device->vk.vkCreateShaderModule(
+                          device->handle,
+                          &(VkShaderModuleCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                              .codeSize = vkb_spirv[shader].size,
+                              .pCode = vkb_spirv[shader].code,
+                          },
+                          NULL, kept)))
+        return false;
+    *module = *kept;
+    return true;
+}
+
+static VkAttachmentDescription describe_attachment(enum vkb_format format, enum vkb_load load,
+                                                   const struct vkb_target_use *use)
+{
+    enum vkb_access last = use->after == VKB_ACCESS_NONE ? use->during : use->after;
+
+    return (VkAttachmentDescription){
+        .format = vkb_formats[format].vk,
+        .samples = VK_SAMPLE_COUNT_1_BIT,
+        .loadOp =
+            load == VKB_LOAD_CLEAR ? VK_ATTACHMENT_LOAD_OP_CLEAR : VK_ATTACHMENT_LOAD_OP_DONT_CARE,
+        // Depth is stored too, where the forward system's source drops it: it is a framebuffer
+        // here.
+        .storeOp = VK_ATTACHMENT_STORE_OP_STORE,
+        .stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE,
+        .stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE,
+        .initialLayout = VK_IMAGE_LAYOUT_UNDEFINED,
+        .finalLayout = vkb_access_layout(last),
+    };
+}
+
+static bool create_render_pass(const struct vkb_device *device, const struct render_pass_key *key,
+                               VkRenderPass *handle, struct vkb_error *error)
+{
+    VkAttachmentDescription attachments[VKB_MAX_TARGETS + 1];
+    VkAttachmentReference references[VKB_MAX_TARGETS];
+    VkSubpassDependency dependencies[VKB_MAX_DEPENDENCIES];
+    const bool depth = key->depth_format != VKB_FORMAT_NONE;
+    // Uses name the depth first, attachments the colours.
+    const struct vkb_target_use *colour_uses = key->uses + depth;
+
+    for (uint32_t i = 0; i < key->target_count; ++i) {
+        attachments[i] = describe_attachment(key->formats[i], key->load, &colour_uses[i]);
+        references[i] = (VkAttachmentReference){i, vkb_access_layout(VKB_ACCESS_COLOR_TARGET)};
+    }
+    if (depth)
+        attachments[key->target_count] =
+            describe_attachment(key->depth_format, VKB_LOAD_CLEAR, &key->uses[0]);
+    return VK(error,
+              device->vk.vkCreateRenderPass(
+                  device->handle,
+                  &(VkRenderPassCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO,
+                      .attachmentCount = key->target_count + depth,
+                      .pAttachments = attachments,
+                      .subpassCount = 1,
+                      .pSubpasses =
+                          &(VkSubpassDescription){
+                              .pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS,
+                              .colorAttachmentCount = key->target_count,
+                              .pColorAttachments = references,
+                              .pDepthStencilAttachment =
+                                  depth ? &(VkAttachmentReference){key->target_count,
+                                                                   vkb_access_layout(
+                                                                       VKB_ACCESS_DEPTH_TARGET)}
+                                        : NULL,
+                          },
+                      .dependencyCount =
+                          vkb_subpass_dependencies(key->uses, key->use_count, dependencies),
+                      .pDependencies = dependencies,
+                  },
+                  NULL, handle));
+}
+
+bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                               const struct vkb_graph *graph, uint32_t first, uint32_t end,
+                               VkRenderPass *render_pass, struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = &graph->passes[first];
+    struct render_pass_key key;
+
+    memset(&key, 0, sizeof key);
+    key.target_count = pass->target_count;
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        key.formats[i] = graph->images[pass->targets[i]].format;
+    if (pass->depth != VKB_NO_IMAGE)
+        key.depth_format = graph->images[pass->depth].format;
+    key.load = pass->load;
+    key.use_count = vkb_graph_target_uses(graph, first, end, key.uses);
+
+    for (size_t i = 0; i < pipelines->render_pass_count; ++i)
+        if (memcmp(&pipelines->render_passes[i].key, &key, sizeof key) == 0) {
+            *render_pass = pipelines->render_passes[i].handle;
+            return true;
+        }
+    if (!vkb_grow(error, &pipelines->render_passes, &pipelines->render_pass_capacity,
+                  pipelines->render_pass_count + 1, sizeof *pipelines->render_passes)
+        || !create_render_pass(device, &key, render_pass, error))
+        return false;
+    struct vkb_render_pass_entry *entry = &pipelines->render_passes[pipelines->render_pass_count++];
+    memcpy(&entry->key, &key, sizeof key);
+    entry->handle = *render_pass;
+    return true;
+}
+
+// The fixed state that each kind of geometry asks for.
+static const struct geometry_state {
+    VkCullModeFlags cull;
+    bool depth_test, depth_write;
+} geometry_states[] = {
+    [VKB_GEOMETRY_FULLSCREEN] = {.cull = VK_CULL_MODE_NONE},
+    [VKB_GEOMETRY_SKYBOX] = {.cull = VK_CULL_MODE_FRONT_BIT, .depth_test = true},
+    [VKB_GEOMETRY_BODY] =
+        {
+            .cull = VK_CULL_MODE_BACK_BIT,
+            .depth_test = true,
+            .depth_write = true,
+        },
+    [VKB_GEOMETRY_GLOW] =
+        {
+            .cull = VK_CULL_MODE_BACK_BIT,
+            .depth_test = true,
+            .depth_write = true,
+        },
+};
+
+// Colours are added, the target keeps its alpha: the forward system's SRC_ALPHA, DST_ALPHA comes to
+// the same for an alpha of 1 in rgba8unorm, and would make it 2 in a float format.
+static const VkPipelineColorBlendAttachmentState blend_states[] = {
+    [VKB_BLEND_NONE] = {.colorWriteMask = 0xf},
+    [VKB_BLEND_ADD] =
+        {
+            .blendEnable = VK_TRUE,
+            .srcColorBlendFactor = VK_BLEND_FACTOR_ONE,
+            .dstColorBlendFactor = VK_BLEND_FACTOR_ONE,
+            .colorBlendOp = VK_BLEND_OP_ADD,
+            .srcAlphaBlendFactor = VK_BLEND_FACTOR_ZERO,
+            .dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
+            .alphaBlendOp = VK_BLEND_OP_ADD,
+            .colorWriteMask = 0xf,
+        },
+};
+
+static bool create_compute(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                           const struct vkb_pass_row *pass, const VkSpecializationInfo *constants,
+                           VkPipeline *pipeline, struct vkb_error *error)
+{
+    VkShaderModule module;
+
+    return get_module(device, pipelines, pass->shader, &module, error)
+        && VK(error, device->vk.vkCreateComputePipelines(
+                         device->handle, pipelines->cache, 1,
+                         &(VkComputePipelineCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                             .stage =
+                                 {
+                                     .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                                     .stage = VK_SHADER_STAGE_COMPUTE_BIT,
+                                     .module = module,
+                                     .pName = "main",
+                                     .pSpecializationInfo = constants,
+                                 },
+                             .layout = vkb_pipelines_layout(pipelines, pass),
+                         },
+                         NULL, pipeline));
+}
+
+static bool create_graphics(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                            const struct vkb_pass_row *pass, const VkSpecializationInfo *constants,
+                            VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
+{
+    const struct geometry_state *state = &geometry_states[pass->geometry];
+    const bool is_mesh = vkb_is_mesh(pass->geometry);
+    VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
+    const uint32_t bindings = pass->textured ? VKB_VERTEX_BINDINGS : is_mesh;
+    const uint32_t attributes =
+        pass->textured ? VKB_TEXTURED_ATTRIBUTES : is_mesh * VKB_VERTEX_ATTRIBUTES;
+    VkShaderModule vertex, fragment;
+
+    if (!get_module(device, pipelines, pass->vertex, &vertex, error)
+        || !get_module(device, pipelines, pass->shader, &fragment, error))
+        return false;
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        blends[i] = blend_states[pass->blend];
+    return VK(error,
+              device->vk.vkCreateGraphicsPipelines(
+                  device->handle, pipelines->cache, 1,
+                  &(VkGraphicsPipelineCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO,
+                      .stageCount = 2,
+                      .pStages =
+                          (VkPipelineShaderStageCreateInfo[]){
+                              {
+                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                                  .stage = VK_SHADER_STAGE_VERTEX_BIT,
+                                  .module = vertex,
+                                  .pName = "main",
+                              },
+                              {
+                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                                  .stage = VK_SHADER_STAGE_FRAGMENT_BIT,
+                                  .module = fragment,
+                                  .pName = "main",
+                                  .pSpecializationInfo = constants,
+                              },
+                          },
+                      .pVertexInputState =
+                          &(VkPipelineVertexInputStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
+                              .vertexBindingDescriptionCount = bindings,
+                              .pVertexBindingDescriptions = vkb_vertex_bindings,
+                              .vertexAttributeDescriptionCount = attributes,
+                              .pVertexAttributeDescriptions = vkb_vertex_attributes,
+                          },
+                      .pInputAssemblyState =
+                          &(VkPipelineInputAssemblyStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
+                              .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST,
+                          },
+                      .pViewportState =
+                          &(VkPipelineViewportStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO,
+                              .viewportCount = 1,
+                              .scissorCount = 1,
+                          },
+                      .pRasterizationState =
+                          &(VkPipelineRasterizationStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO,
+                              .polygonMode = VK_POLYGON_MODE_FILL,
+                              .cullMode = state->cull,
+                              .frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE,
+                              .lineWidth = 1.0f,
+                          },
+                      .pMultisampleState =
+                          &(VkPipelineMultisampleStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
+                              .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT,
+                          },
+                      .pDepthStencilState =
+                          &(VkPipelineDepthStencilStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
+                              .depthTestEnable = state->depth_test,
+                              .depthWriteEnable = state->depth_write,
+                              .depthCompareOp = VK_COMPARE_OP_LESS_OR_EQUAL,
+                          },
+                      .pColorBlendState =
+                          &(VkPipelineColorBlendStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
+                              .attachmentCount = pass->target_count,
+                              .pAttachments = blends,
+                          },
+                      .pDynamicState =
+                          &(VkPipelineDynamicStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO,
+                              .dynamicStateCount = 2,
+                              .pDynamicStates = (VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT,
+                                                                   VK_DYNAMIC_STATE_SCISSOR},
+                          },
+                      .layout = vkb_pipelines_layout(pipelines, pass),
+                      .renderPass = render_pass,
+                  },
+                  NULL, pipeline));
+}
+
+static bool create_pipeline(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                            const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                            VkPipeline *pipeline, struct vkb_error *error)
+{
+    VkSpecializationMapEntry map[VKB_MAX_CONSTANTS];
+
+    for (uint32_t i = 0; i < pass->constant_count; ++i)
+        map[i] = (VkSpecializationMapEntry){i, i * (uint32_t)sizeof(int32_t), sizeof(int32_t)};
+    VkSpecializationInfo constants = {
+        .mapEntryCount = pass->constant_count,
+        .pMapEntries = map,
+        .dataSize = sizeof pass->constants,
+        .pData = pass->constants,
+    };
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH)
+        return create_compute(device, pipelines, pass, &constants, pipeline, error);
+    return create_graphics(device, pipelines, pass, &constants, render_pass, pipeline, error);
+}
+
+bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                       const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                       VkPipeline *pipeline, struct vkb_error *error)
+{
+    struct pipeline_key key;
+
+    memset(&key, 0, sizeof key);
+    key.vertex = pass->vertex;
+    key.shader = pass->shader;
+    key.geometry = pass->geometry;
+    key.bindings = vkb_pass_binding_kind(pass);
+    key.textured = pass->textured;
+    key.blend = pass->blend;
+    key.target_count = pass->target_count;
+    key.constant_count = pass->constant_count;
+    memcpy(key.constants, pass->constants, sizeof key.constants);
+    key.render_pass = render_pass;
+
+    for (size_t i = 0; i < pipelines->entry_count; ++i)
+        if (memcmp(&pipelines->entries[i].key, &key, sizeof key) == 0) {
+            *pipeline = pipelines->entries[i].handle;
+            return true;
+        }
+    if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
+                  pipelines->entry_count + 1, sizeof *pipelines->entries)
+        || !create_pipeline(device, pipelines, pass, render_pass, pipeline, error))
+        return false;
+    struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];
+    memcpy(&entry->key, &key, sizeof key);
+    entry->handle = *pipeline;
+    return true;
+}
+
+VkSampler vkb_pipelines_sampler(const struct vkb_device *device,
+                                const struct vkb_pipelines *pipelines, enum vkb_format format)
+{
+    return vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT)
+             ? pipelines->filter
+             : pipelines->nearest;
+}
+
+uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
+{
+    return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
+}
+
+enum vkb_binding_kind vkb_pass_binding_kind(const struct vkb_pass_row *pass)
+{
+    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
+        return VKB_BINDINGS_DRAW;
+    return pass->loads ? VKB_BINDINGS_LOAD : VKB_BINDINGS_DISPATCH;
+}
+
+VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
+{
+    return pass->geometry == VKB_GEOMETRY_DISPATCH ? VK_PIPELINE_BIND_POINT_COMPUTE
+                                                   : VK_PIPELINE_BIND_POINT_GRAPHICS;
+}
+
+VkDescriptorSetLayout vkb_pipelines_set_layout(const struct vkb_pipelines *pipelines,
+                                               const struct vkb_pass_row *pass)
+{
+    return pipelines->set_layouts[vkb_pass_binding_kind(pass)][vkb_pass_descriptor_images(pass)];
+}
+
+VkPipelineLayout vkb_pipelines_layout(const struct vkb_pipelines *pipelines,
+                                      const struct vkb_pass_row *pass)
+{
+    return pipelines->layouts[vkb_pass_binding_kind(pass)][vkb_pass_descriptor_images(pass)];
+}

@@ -1,0 +1,138 @@
+#include "run/readback.h"
+
+#include <string.h>
+
+#define READBACK_USAGE VK_BUFFER_USAGE_TRANSFER_DST_BIT
+
+void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback)
+{
+    vkb_readback_release(device, readback);
+    vkb_buffer_destroy(device, &readback->staging);
+    vkb_free(readback->imports);
+    *readback = (struct vkb_readback){0};
+}
+
+// They are a buffer from its first use on.
+static bool import_pages(const struct vkb_device *device, struct vkb_output *output)
+{
+    struct vkb_page_run *run = output->pages;
+    VkDeviceSize start = 0;
+
+    if (!run->buffer.handle
+        && !vkb_buffer_import(device, READBACK_USAGE, run->memory, run->size, &run->buffer, &start))
+        return false;
+    output->imported = run->buffer.handle;
+    output->offset = start + (VkDeviceSize)((char *)output->memory - (char *)run->memory);
+    return true;
+}
+
+static bool import(const struct vkb_device *device, struct vkb_readback *readback, size_t size,
+                   struct vkb_output *output)
+{
+    const size_t pixel_size = vkb_pixel_size(output->format);
+    struct vkb_buffer *buffer = &readback->imports[readback->import_count];
+
+    // The device writes whole pixels, to multiples of their size.
+    if (output->channels != vkb_formats[output->format].channels
+        || (uintptr_t)output->memory % pixel_size != 0)
+        return false;
+    if (output->pages)
+        return import_pages(device, output);
+    if (!vkb_buffer_import(device, READBACK_USAGE, output->memory, size, buffer, &output->offset))
+        return false;
+    output->imported = buffer->handle;
+    ++readback->import_count;
+    return true;
+}
+
+bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
+                       enum vkb_format format, uint32_t width, uint32_t height,
+                       struct vkb_output *output, struct vkb_error *error)
+{
+    output->format = format;
+    output->pixels = (size_t)width * height;
+    output->imported = VK_NULL_HANDLE;
+    const size_t size = output->pixels * vkb_pixel_size(format);
+    if (size >= VKB_IMPORTED_BYTES) {
+        if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
+                      readback->import_count + 1, sizeof *readback->imports))
+            return false;
+        if (import(device, readback, size, output))
+            return true;
+    }
+    output->offset = readback->used;
+    // Offsets of image copies must be multiples of the pixel size, 16 at the most.
+    readback->used += (size + 15) & ~(size_t)15;
+    return true;
+}
+
+bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
+                          struct vkb_error *error)
+{
+    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, READBACK_USAGE, readback->used,
+                              &readback->staging, error);
+}
+
+void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
+                         const struct vkb_readback *readback, struct vkb_image *image,
+                         const struct vkb_output *output)
+{
+    VkBufferImageCopy copy = {
+        .bufferOffset = output->offset,
+        .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
+        .imageExtent = {image->width, image->height, 1},
+    };
+
+    vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
+    device->vk.vkCmdCopyImageToBuffer(
+        commands, image->handle, vkb_access_layout(VKB_ACCESS_COPY_SOURCE),
+        output->imported ? output->imported : readback->staging.handle, 1, &copy);
+}
+
+bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
+                      struct vkb_error *error)
+{
+    return readback->used == 0 || vkb_buffer_invalidate(device, &readback->staging, error);
+}
+
+// The first three of four channels of each pixel; compiled once for each size of a channel, so that
+// no copy has a variable size.
+static inline void drop_alpha(unsigned char *to, const unsigned char *from, size_t pixels,
+                              size_t size)
+{
+    // The alpha goes where the next pixel's red comes after it, so that a pixel is one move.
+    for (size_t i = 1; i < pixels; ++i, to += 3 * size, from += 4 * size)
+        memcpy(to, from, 4 * size);
+    memcpy(to, from, 3 * size);
+}
+
+void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
+{
+    const struct vkb_format_info *format = &vkb_formats[output->format];
+
+    if (output->imported)
+        return;
+    const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
+    if (output->channels == format->channels) {
+        memcpy(output->memory, from, output->pixels * vkb_pixel_size(output->format));
+        return;
+    }
+    switch (format->channel_size) {
+    case 1:
+        drop_alpha(output->memory, from, output->pixels, 1);
+        break;
+    case 2:
+        drop_alpha(output->memory, from, output->pixels, 2);
+        break;
+    default:
+        drop_alpha(output->memory, from, output->pixels, 4);
+        break;
+    }
+}
+
+void vkb_readback_release(const struct vkb_device *device, struct vkb_readback *readback)
+{
+    while (readback->import_count > 0)
+        vkb_buffer_destroy(device, &readback->imports[--readback->import_count]);
+    readback->used = 0;
+}

@@ -1,0 +1,224 @@
+#include "run/slots.h"
+
+#include <string.h>
+
+// Keys are compared byte by byte: fill them from zero, padding included.
+struct framebuffer_key {
+    VkRenderPass render_pass;
+    uint64_t images[VKB_MAX_TARGETS + 1];
+};
+
+struct vkb_framebuffer_entry {
+    struct framebuffer_key key;
+    VkFramebuffer handle;
+};
+
+// Destroys the framebuffers of an image that goes; 0 is the id of no image.
+static void destroy_framebuffers(const struct vkb_device *device, struct vkb_slots *slots,
+                                 uint64_t image_id)
+{
+    for (size_t i = image_id ? slots->framebuffer_count : 0; i-- > 0;) {
+        struct vkb_framebuffer_entry *entry = &slots->framebuffers[i];
+        bool uses = false;
+        for (uint32_t target = 0; target <= VKB_MAX_TARGETS; ++target)
+            uses |= entry->key.images[target] == image_id;
+        if (!uses)
+            continue;
+        device->vk.vkDestroyFramebuffer(device->handle, entry->handle, NULL);
+        *entry = slots->framebuffers[--slots->framebuffer_count];
+    }
+}
+
+void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots)
+{
+    for (size_t i = 0; i < slots->count; ++i) {
+        struct vkb_slot *slot = slots->slots[i];
+        destroy_framebuffers(device, slots, slot->image_id);
+        vkb_image_destroy(device, &slot->image);
+        vkb_free(slot->recipe);
+        vkb_free(slot);
+    }
+    vkb_free(slots->slots);
+    vkb_free(slots->framebuffers);
+    // The clock goes on: nothing made later may be taken for something made before.
+    *slots = (struct vkb_slots){.clock = slots->clock};
+}
+
+static VkImageUsageFlags image_usage(enum vkb_format format)
+{
+    return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
+         | VK_IMAGE_USAGE_SAMPLED_BIT
+         | (format == VKB_FORMAT_DEPTH32_FLOAT
+                ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
+                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_STORAGE_BIT);
+}
+
+static bool check_format(const struct vkb_device *device, const struct vkb_graph *graph,
+                         uint32_t image, struct vkb_error *error)
+{
+    const enum vkb_format format = graph->images[image].format;
+    const VkFormatFeatureFlags features = format == VKB_FORMAT_DEPTH32_FLOAT
+                                            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
+                                            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT
+                                                  | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT
+                                                  | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
+
+    if (!vkb_device_supports(device, format, features))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
+                        device->adapter.name, vkb_formats[format].name);
+    if (vkb_graph_blends(graph, image)
+        && !vkb_device_supports(device, format, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT))
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "the adapter %s cannot add up layers in %s images, but in %s it can",
+                        device->adapter.name, vkb_formats[format].name,
+                        vkb_formats[VKB_FORMAT_RGBA16_FLOAT].name);
+    return true;
+}
+
+bool vkb_slots_check(const struct vkb_device *device, const struct vkb_graph *graph,
+                     struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (!check_format(device, graph, i, error))
+            return false;
+    return true;
+}
+
+// The image from the host: written by it in place where the device reads that as fast.
+static bool is_mapped(const struct vkb_device *device, const struct vkb_image_row *row)
+{
+    const VkFormatFeatureFlags features = VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT
+                                        | VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT
+                                        | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
+
+    return row->input
+        && vkb_device_shares_image(device, vkb_formats[row->format].vk, image_usage(row->format),
+                                   features, row->width, row->height);
+}
+
+static struct vkb_slot *find_slot(const struct vkb_slots *slots, const char *name)
+{
+    for (size_t i = 0; i < slots->count; ++i)
+        if (strcmp(slots->slots[i]->name, name) == 0)
+            return slots->slots[i];
+    return NULL;
+}
+
+static struct vkb_slot *add_slot(struct vkb_slots *slots, const char *name, struct vkb_error *error)
+{
+    struct vkb_slot *slot;
+
+    if (!vkb_grow(error, &slots->slots, &slots->capacity, slots->count + 1,
+                  sizeof(struct vkb_slot *))
+        || !(slot = vkb_alloc(error, 1, sizeof *slot)))
+        return NULL;
+    memcpy(slot->name, name, sizeof slot->name);
+    slots->slots[slots->count++] = slot;
+    return slot;
+}
+
+static bool fits(const struct vkb_image *image, const struct vkb_image_row *row)
+{
+    return image->handle && image->format == row->format && image->width == row->width
+        && image->height == row->height;
+}
+
+bool vkb_slots_replaces(const struct vkb_slots *slots, const struct vkb_image_row *row)
+{
+    const struct vkb_slot *slot = find_slot(slots, row->name);
+
+    return slot && slot->image.handle && !fits(&slot->image, row);
+}
+
+struct vkb_slot *vkb_slots_find(const struct vkb_slots *slots, const struct vkb_image_row *row)
+{
+    struct vkb_slot *slot = find_slot(slots, row->name);
+
+    return slot && fits(&slot->image, row) ? slot : NULL;
+}
+
+bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
+                       const struct vkb_image_row *row, struct vkb_slot **resolved,
+                       struct vkb_error *error)
+{
+    struct vkb_slot *slot = find_slot(slots, row->name);
+
+    if (!slot && !(slot = add_slot(slots, row->name, error)))
+        return false;
+    *resolved = slot;
+    if (fits(&slot->image, row))
+        return true;
+    slot->valid = false;
+    destroy_framebuffers(device, slots, slot->image_id);
+    slot->image_id = ++slots->clock;
+    vkb_image_destroy(device, &slot->image);
+    return vkb_image_create(device,
+                            &(struct vkb_image_spec){
+                                .format = row->format,
+                                .width = row->width,
+                                .height = row->height,
+                                .layers = 1,
+                                .levels = 1,
+                                .usage = image_usage(row->format),
+                                .mapped = is_mapped(device, row),
+                            },
+                            &slot->image, error);
+}
+
+bool vkb_slot_up_to_date(const struct vkb_slot *slot, const void *recipe, size_t size)
+{
+    return slot->valid && slot->recipe_size == size && memcmp(slot->recipe, recipe, size) == 0;
+}
+
+bool vkb_slot_begin_writing(struct vkb_slots *slots, struct vkb_slot *slot, const void *recipe,
+                            size_t size, struct vkb_error *error)
+{
+    slot->valid = false;
+    slot->version = ++slots->clock;
+    if (!vkb_grow(error, &slot->recipe, &slot->recipe_capacity, size, 1))
+        return false;
+    if (size)
+        memcpy(slot->recipe, recipe, size);
+    slot->recipe_size = size;
+    return true;
+}
+
+bool vkb_slots_framebuffer(const struct vkb_device *device, struct vkb_slots *slots,
+                           struct vkb_slot **targets, uint32_t target_count,
+                           VkRenderPass render_pass, VkFramebuffer *framebuffer,
+                           struct vkb_error *error)
+{
+    struct framebuffer_key key;
+    VkImageView views[VKB_MAX_TARGETS + 1];
+
+    memset(&key, 0, sizeof key);
+    key.render_pass = render_pass;
+    for (uint32_t i = 0; i < target_count; ++i) {
+        views[i] = targets[i]->image.view;
+        key.images[i] = targets[i]->image_id;
+    }
+    for (size_t i = 0; i < slots->framebuffer_count; ++i)
+        if (memcmp(&slots->framebuffers[i].key, &key, sizeof key) == 0) {
+            *framebuffer = slots->framebuffers[i].handle;
+            return true;
+        }
+    if (!vkb_grow(error, &slots->framebuffers, &slots->framebuffer_capacity,
+                  slots->framebuffer_count + 1, sizeof *slots->framebuffers)
+        || !VK(error, device->vk.vkCreateFramebuffer(
+                          device->handle,
+                          &(VkFramebufferCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO,
+                              .renderPass = render_pass,
+                              .attachmentCount = target_count,
+                              .pAttachments = views,
+                              .width = targets[0]->image.width,
+                              .height = targets[0]->image.height,
+                              .layers = 1,
+                          },
+                          NULL, framebuffer)))
+        return false;
+    struct vkb_framebuffer_entry *entry = &slots->framebuffers[slots->framebuffer_count++];
+    memcpy(&entry->key, &key, sizeof key);
+    entry->handle = *framebuffer;
+    return true;
+}

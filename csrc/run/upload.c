@@ -1,0 +1,221 @@
+#include "run/upload.h"
+
+#include <string.h>
+
+void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload)
+{
+    vkb_buffer_destroy(device, &upload->staging);
+    vkb_free(upload->rows);
+    vkb_free(upload->packed);
+    *upload = (struct vkb_upload){0};
+}
+
+// A channel of 1 in each format, as bytes.
+static const void *channel_one(enum vkb_format format)
+{
+    static const uint8_t byte = 255;
+    static const uint16_t half = 0x3c00;
+    static const float single = 1.0f;
+
+    return format == VKB_FORMAT_RGBA8_UNORM  ? (const void *)&byte
+         : format == VKB_FORMAT_RGBA16_FLOAT ? (const void *)&half
+                                             : (const void *)&single;
+}
+
+// The next two are compiled once for each size of a channel, so that no copy has a variable size.
+
+// A row of RGB pixels without gaps.
+static inline void pack_rgb(unsigned char *to, const unsigned char *from, uint32_t width,
+                            const void *one, size_t size)
+{
+    for (uint32_t x = 1; x < width; ++x, to += 4 * size, from += 3 * size) {
+        // With the next pixel's red, which is there, a pixel is one move.
+        memcpy(to, from, 4 * size);
+        memcpy(to + 3 * size, one, size);
+    }
+    memcpy(to, from, 3 * size);
+    memcpy(to + 3 * size, one, size);
+}
+
+static inline void pack_strided(unsigned char *to, const unsigned char *from,
+                                const struct vkb_input *input, const void *one, size_t size)
+{
+    for (uint32_t x = 0; x < input->width; ++x, to += 4 * size, from += input->pixel_stride) {
+        for (uint32_t channel = 0; channel < input->channels; ++channel)
+            memcpy(to + channel * size, from + channel * input->channel_stride, size);
+        if (input->channels == 3)
+            memcpy(to + 3 * size, one, size);
+    }
+}
+
+static bool is_contiguous(const struct vkb_input *input)
+{
+    const ptrdiff_t size = vkb_formats[input->format].channel_size;
+
+    return input->channel_stride == size && input->pixel_stride == input->channels * size;
+}
+
+static const unsigned char *input_row(const struct vkb_input *input, uint32_t y)
+{
+    return (const unsigned char *)input->memory + y * input->row_stride;
+}
+
+static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t y)
+{
+    const unsigned char *from = input_row(input, y);
+    const void *one = channel_one(input->format);
+    const bool contiguous = is_contiguous(input);
+
+    if (contiguous && input->channels == 4) {
+        memcpy(to, from, (size_t)input->width * vkb_pixel_size(input->format));
+        return;
+    }
+    switch (vkb_formats[input->format].channel_size) {
+    case 1:
+        contiguous ? pack_rgb(to, from, input->width, one, 1)
+                   : pack_strided(to, from, input, one, 1);
+        break;
+    case 2:
+        contiguous ? pack_rgb(to, from, input->width, one, 2)
+                   : pack_strided(to, from, input, one, 2);
+        break;
+    default:
+        contiguous ? pack_rgb(to, from, input->width, one, 4)
+                   : pack_strided(to, from, input, one, 4);
+        break;
+    }
+}
+
+static unsigned char *kept_row(const struct vkb_upload *upload, uint32_t y)
+{
+    return upload->pixels + y * upload->row_pitch;
+}
+
+static bool row_differs(const struct vkb_upload *upload, const struct vkb_input *input, uint32_t y)
+{
+    const size_t size = (size_t)input->width * vkb_pixel_size(input->format);
+
+    if (input->channels == 4 && is_contiguous(input))
+        return memcmp(kept_row(upload, y), input_row(input, y), size) != 0;
+    pack_row(upload->packed, input, y);
+    return memcmp(kept_row(upload, y), upload->packed, size) != 0;
+}
+
+enum { COUNTED_AT_ONCE = 32768 };  // a sum of so many fits the narrow counters below
+
+static struct vkb_specials count_halves(const uint16_t *bits, size_t count)
+{
+    // As wide as what is counted, so that compilers keep to vectors of that width.
+    uint16_t special = 0, infinite = 0;
+
+    for (size_t i = 0; i < count; ++i) {
+        special = (uint16_t)(special + ((bits[i] & 0x7c00) == 0x7c00));
+        infinite = (uint16_t)(infinite + ((bits[i] & 0x7fff) == 0x7c00));
+    }
+    return (struct vkb_specials){(uint64_t)(special - infinite), infinite};
+}
+
+static struct vkb_specials count_singles(const uint32_t *bits, size_t count)
+{
+    uint32_t special = 0, infinite = 0;
+
+    for (size_t i = 0; i < count; ++i) {
+        special += (bits[i] & 0x7f800000) == 0x7f800000;
+        infinite += (bits[i] & 0x7fffffff) == 0x7f800000;
+    }
+    return (struct vkb_specials){special - infinite, infinite};
+}
+
+static struct vkb_specials count_row(const struct vkb_upload *upload, uint32_t y)
+{
+    const size_t count = (size_t)upload->width * 4;
+    const void *row = kept_row(upload, y);
+    struct vkb_specials sum = {0};
+
+    for (size_t i = 0; upload->format != VKB_FORMAT_RGBA8_UNORM && i < count;
+         i += COUNTED_AT_ONCE) {
+        const size_t part = count - i < COUNTED_AT_ONCE ? count - i : COUNTED_AT_ONCE;
+        const struct vkb_specials found = upload->format == VKB_FORMAT_RGBA16_FLOAT
+                                            ? count_halves((const uint16_t *)row + i, part)
+                                            : count_singles((const uint32_t *)row + i, part);
+        sum.nan += found.nan;
+        sum.inf += found.inf;
+    }
+    return sum;
+}
+
+void vkb_upload_forget(struct vkb_upload *upload)
+{
+    upload->format = VKB_FORMAT_NONE;
+}
+
+static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *input)
+{
+    return upload->format == input->format && upload->width == input->width
+        && upload->height == input->height && upload->channels == input->channels;
+}
+
+// Memory for an image of another kind than the last.
+static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
+                    const struct vkb_input *input, const struct vkb_image *image,
+                    struct vkb_error *error)
+{
+    const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
+
+    vkb_upload_forget(upload);
+    if (!vkb_grow(error, &upload->rows, &upload->row_capacity, input->height, sizeof *upload->rows)
+        || !vkb_grow(error, &upload->packed, &upload->packed_capacity, row_size, 1))
+        return false;
+    // Cached memory: it is compared with the next image.
+    if (!image->mapped
+        && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                               row_size * input->height, &upload->staging, error))
+        return false;
+    upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
+    upload->row_pitch = image->mapped ? image->row_pitch : row_size;
+    upload->format = input->format;
+    upload->width = input->width;
+    upload->height = input->height;
+    upload->channels = input->channels;
+    return true;
+}
+
+bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
+                      struct vkb_flights *flights, const struct vkb_input *input,
+                      const struct vkb_image *image, bool *changed, struct vkb_error *error)
+{
+    const bool fresh = !holds_such(upload, input);
+    uint32_t first = 0;
+
+    while (!fresh && first < input->height && !row_differs(upload, input, first))
+        ++first;
+    *changed = first < input->height;
+    if (!*changed)
+        return true;
+    if (!vkb_flights_land(device, flights, error)
+        || (fresh && !prepare(device, upload, input, image, error)))
+        return false;
+    for (uint32_t y = first; y < input->height; ++y) {
+        pack_row(kept_row(upload, y), input, y);
+        upload->rows[y] = count_row(upload, y);
+    }
+    upload->specials = (struct vkb_specials){0};
+    for (uint32_t y = 0; y < input->height; ++y) {
+        upload->specials.nan += upload->rows[y].nan;
+        upload->specials.inf += upload->rows[y].inf;
+    }
+    return image->mapped || vkb_buffer_flush(device, &upload->staging, error);
+}
+
+void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,
+                       const struct vkb_upload *upload, struct vkb_image *image)
+{
+    VkBufferImageCopy copy = {
+        .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+        .imageExtent = {image->width, image->height, 1},
+    };
+
+    vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_TARGET);
+    device->vk.vkCmdCopyBufferToImage(commands, upload->staging.handle, image->handle,
+                                      vkb_access_layout(VKB_ACCESS_COPY_TARGET), 1, &copy);
+}

@@ -1,0 +1,260 @@
+#include "scene/scene.h"
+
+#include <math.h>
+#include <string.h>
+
+const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES] = {
+    {0, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, position)},
+    {1, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, normal)},
+    {2, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, colour)},
+    {3, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, emission)},
+    {4, 1, VK_FORMAT_R32G32B32A32_SFLOAT, 0},
+};
+
+const VkVertexInputBindingDescription vkb_vertex_bindings[VKB_VERTEX_BINDINGS] = {
+    {0, sizeof(struct vkb_vertex), VK_VERTEX_INPUT_RATE_VERTEX},
+    {1, VKB_TEXCOORDS * sizeof(float), VK_VERTEX_INPUT_RATE_VERTEX},
+};
+
+static size_t vertex_bytes(const struct vkb_mesh_data *data)
+{
+    return data->vertex_count * sizeof(struct vkb_vertex);
+}
+
+static size_t texcoord_bytes(const struct vkb_mesh_data *data)
+{
+    return data->surface_count ? data->vertex_count * VKB_TEXCOORDS * sizeof *data->texcoords : 0;
+}
+
+static size_t index_bytes(const struct vkb_mesh_data *data)
+{
+    return data->index_count * sizeof *data->indices;
+}
+
+static VkDeviceSize mesh_size(const struct vkb_mesh_data *data)
+{
+    return vkb_staging_size(vertex_bytes(data)) + vkb_staging_size(texcoord_bytes(data))
+         + vkb_staging_size(index_bytes(data));
+}
+
+static VkDeviceSize scene_size(const struct vkb_scene_data *data)
+{
+    VkDeviceSize size =
+        mesh_size(&data->body) + mesh_size(&data->glow) + vkb_staging_picture_size(&data->sky);
+
+    for (uint32_t i = 0; i < data->texture_count; ++i)
+        size += vkb_staging_picture_size(&data->textures[i].picture);
+    return size;
+}
+
+static VkDeviceSize stage_vertices(struct vkb_staging *staging, const struct vkb_mesh_data *data)
+{
+    static const float none[3];
+    VkDeviceSize offset;
+    struct vkb_vertex *vertices = vkb_stage(staging, vertex_bytes(data), &offset);
+
+    for (size_t i = 0; i < data->vertex_count; ++i) {
+        memcpy(&vertices[i], data->vertices + VKB_GIVEN_FLOATS * i,
+               offsetof(struct vkb_vertex, emission));
+        memcpy(vertices[i].emission, data->emission ? data->emission + 3 * i : none, sizeof none);
+    }
+    return offset;
+}
+
+static VkDeviceSize stage_bytes(struct vkb_staging *staging, const void *data, size_t size)
+{
+    VkDeviceSize offset;
+
+    memcpy(vkb_stage(staging, size, &offset), data, size);
+    return offset;
+}
+
+static bool load_surfaces(const struct vkb_device *device, VkCommandBuffer commands,
+                          struct vkb_staging *staging, const struct vkb_mesh_data *data,
+                          struct vkb_mesh *mesh, struct vkb_error *error)
+{
+    if (data->surface_count == 0)
+        return true;
+    mesh->surfaces = vkb_alloc(error, data->surface_count, sizeof *mesh->surfaces);
+    if (!mesh->surfaces)
+        return false;
+    memcpy(mesh->surfaces, data->surfaces, data->surface_count * sizeof *mesh->surfaces);
+    mesh->surface_count = data->surface_count;
+    for (uint32_t i = 0; i < mesh->surface_count; ++i)
+        mesh->plain_count -= mesh->surfaces[i].index_count;
+    const VkDeviceSize texcoords = stage_bytes(staging, data->texcoords, texcoord_bytes(data));
+    return vkb_staging_load_buffer(device, commands, staging, texcoords, texcoord_bytes(data),
+                                   VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->texcoords, error);
+}
+
+static bool load_mesh(const struct vkb_device *device, VkCommandBuffer commands,
+                      struct vkb_staging *staging, const struct vkb_mesh_data *data,
+                      struct vkb_mesh *mesh, struct vkb_error *error)
+{
+    mesh->plain_count = data->index_count;
+    if (data->index_count == 0)
+        return true;
+    const VkDeviceSize vertices = stage_vertices(staging, data);
+    const VkDeviceSize indices = stage_bytes(staging, data->indices, index_bytes(data));
+    return vkb_staging_load_buffer(device, commands, staging, vertices, vertex_bytes(data),
+                                   VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->vertices, error)
+        && vkb_staging_load_buffer(device, commands, staging, indices, index_bytes(data),
+                                   VK_BUFFER_USAGE_INDEX_BUFFER_BIT, &mesh->indices, error)
+        && load_surfaces(device, commands, staging, data, mesh, error);
+}
+
+static bool load_textures(const struct vkb_device *device, VkCommandBuffer commands,
+                          struct vkb_staging *staging, const struct vkb_scene_data *data,
+                          struct vkb_scene *scene, struct vkb_error *error)
+{
+    if (data->texture_count == 0)
+        return true;
+    scene->textures = vkb_alloc(error, data->texture_count, sizeof *scene->textures);
+    if (!scene->textures)
+        return false;
+    scene->texture_count = data->texture_count;
+    for (uint32_t i = 0; i < data->texture_count; ++i)
+        if (!vkb_texture_load(device, commands, staging, &data->textures[i], &scene->textures[i],
+                              error))
+            return false;
+    return true;
+}
+
+static bool check_indices(const struct vkb_device *device, const struct vkb_mesh_data *data,
+                          struct vkb_error *error)
+{
+    uint32_t largest = 0;
+
+    for (uint32_t i = 0; i < data->index_count; ++i)
+        if (data->indices[i] > largest)
+            largest = data->indices[i];
+    if (data->index_count > 0 && largest >= data->vertex_count)
+        return vkb_fail(error, VKB_ERROR_VALUE, "scene: index %u is beyond the mesh's %u vertices",
+                        largest, data->vertex_count);
+    if (largest > device->limits.maxDrawIndexedIndexValue)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "scene: index %u is beyond this adapter's limit of %u", largest,
+                        device->limits.maxDrawIndexedIndexValue);
+    return true;
+}
+
+bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *commands,
+                     const struct vkb_scene_data *data, struct vkb_scene *scene,
+                     struct vkb_error *error)
+{
+    struct vkb_staging *staging = &scene->staging;
+
+    if (!check_indices(device, &data->body, error) || !check_indices(device, &data->glow, error))
+        return false;
+    vkb_scene_destroy(device, scene);
+    bool done = vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                  scene_size(data), &staging->buffer, error)
+             && vkb_commands_begin(device, commands, error)
+             && load_mesh(device, commands->buffer, staging, &data->body, &scene->body, error)
+             && load_mesh(device, commands->buffer, staging, &data->glow, &scene->glow, error)
+             && vkb_staging_load_picture(device, commands->buffer, staging, "skybox", &data->sky,
+                                         &scene->sky, error)
+             && load_textures(device, commands->buffer, staging, data, scene, error)
+             && vkb_buffer_flush(device, &staging->buffer, error);
+    if (done)
+        vkb_barrier_record_upload(device, commands->buffer);
+    else
+        vkb_scene_destroy(device, scene);
+    return done;
+}
+
+void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data *data,
+                   struct vkb_scene *scene)
+{
+    vkb_buffer_destroy(device, &scene->staging.buffer);
+    scene->staging.used = 0;
+    scene->serial = data->serial;
+}
+
+static void destroy_mesh(const struct vkb_device *device, struct vkb_mesh *mesh)
+{
+    vkb_buffer_destroy(device, &mesh->vertices);
+    vkb_buffer_destroy(device, &mesh->texcoords);
+    vkb_buffer_destroy(device, &mesh->indices);
+    vkb_free(mesh->surfaces);
+}
+
+void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
+{
+    vkb_buffer_destroy(device, &scene->staging.buffer);
+    destroy_mesh(device, &scene->body);
+    destroy_mesh(device, &scene->glow);
+    vkb_image_destroy(device, &scene->sky);
+    for (uint32_t i = 0; i < scene->texture_count; ++i)
+        vkb_texture_destroy(device, &scene->textures[i]);
+    vkb_free(scene->textures);
+    *scene = (struct vkb_scene){0};
+}
+
+// Matrices are column by column: m[column][row].
+typedef double matrix[4][4];
+
+static void set_identity(matrix m)
+{
+    memset(m, 0, sizeof(matrix));
+    for (int i = 0; i < 4; ++i)
+        m[i][i] = 1.0;
+}
+
+// m = m * translation
+static void translate(matrix m, double x, double y, double z)
+{
+    for (int row = 0; row < 4; ++row)
+        m[3][row] += m[0][row] * x + m[1][row] * y + m[2][row] * z;
+}
+
+// m = m * rotation by `angle` radians around axis 0, 1 or 2
+static void rotate(matrix m, int axis, double angle)
+{
+    const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+    const double c = cos(angle), s = sin(angle);
+
+    for (int row = 0; row < 4; ++row) {
+        double at_a = m[a][row], at_b = m[b][row];
+        m[a][row] = c * at_a + s * at_b;
+        m[b][row] = c * at_b - s * at_a;
+    }
+}
+
+static void store(matrix m, float out[4][4])
+{
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row)
+            out[column][row] = (float)m[column][row];
+}
+
+void vkb_scene_matrices(const struct vkb_camera *camera, double time, double aspect,
+                        struct vkb_mesh_params *params)
+{
+    const double pi = 3.14159265358979323846;
+    const double degree = pi / 180.0, turn = 2.0 * pi;
+    const double focal = 1.0 / tan(camera->fov * degree / 2.0);
+    const double near = camera->near, far = camera->far;
+    matrix m;
+
+    // Perspective with y down and depth 0..1 (the forward system's camera).
+    memset(m, 0, sizeof m);
+    m[0][0] = focal / aspect;
+    m[1][1] = focal;
+    m[2][2] = far / (near - far);
+    m[2][3] = -1.0;
+    m[3][2] = near * far / (near - far);
+    store(m, params->projection);
+
+    set_identity(m);
+    translate(m, camera->position[0], camera->position[1], camera->position[2]);
+    for (int axis = 0; axis < 3; ++axis)
+        rotate(m, axis, camera->rotation[axis] * degree);
+    store(m, params->view);
+
+    set_identity(m);
+    translate(m, 0.25 * sin(turn * time), -1.0, 0.25 * cos(turn * time));
+    rotate(m, 0, -0.15 * sin(turn * time));
+    rotate(m, 1, turn * time);
+    store(m, params->model);
+}

@@ -1,0 +1,52 @@
+// What the files of forms share: forms.c has the table, blur_forms.c and level_forms.c what stands
+// in it for blurs and for levels.
+#ifndef VKB_FORM_H
+#define VKB_FORM_H
+
+#include "variants/forms.h"
+#include "methods/methods.h"
+
+// The choice of forms for one graph: the passes of `plain` to those of `graph`.
+struct vkb_form_choice {
+    enum vkb_forms forms;
+    const struct vkb_device *device;
+    struct vkb_graph plain;
+    struct vkb_graph *graph;
+};
+
+// A form adds what runs for a pass; false in *fits, and nothing added, where it does not suit it.
+typedef bool vkb_form_add(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+                          bool *fits, struct vkb_error *error);
+
+// A blur's lines, whole taps and enlarged lines; an image's whole bloom in strips and tiles.
+vkb_form_add vkb_add_line, vkb_add_whole_taps, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines,
+    vkb_add_tiles;
+// Levels of exactly half and twice a size.
+vkb_form_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
+
+// A shader that is compiled for each format that it loads from.
+#define VKB_BY_FORMAT(shader) \
+    { \
+        [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
+        [VKB_FORMAT_RGBA16_FLOAT] = VKB_SHADER_##shader##_rgba16float, \
+        [VKB_FORMAT_RGBA32_FLOAT] = VKB_SHADER_##shader##_rgba32float, \
+    }
+
+// What an image of the format gives back of what is stored.
+extern const enum vkb_mode vkb_stored_as[VKB_FORMAT_COUNT];
+
+bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
+// The last pass whose one target the image is; NULL: there is none.
+const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image);
+// The extraction of an image's bright parts in its own size and format that writes `image`, if any.
+const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_t image);
+
+// Makes a dispatch of a pass over all pixels.
+void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
+                       uint32_t block_height);
+// A pass over all pixels of one target: on processors drawn, where its texels cannot be loaded, on
+// GPUs a compute shader, for some of them (made to compute) draw slowly.
+bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
+                        const struct vkb_pass_row *pass, struct vkb_error *error);
+
+#endif

@@ -1,0 +1,197 @@
+#include "variants/form.h"
+
+#include <string.h>
+
+static const char *const form_names[VKB_FORMS_COUNT] = {
+    [VKB_FORMS_FRAGMENT] = "fragment",
+    [VKB_FORMS_CPU] = "cpu",
+    [VKB_FORMS_GPU] = "gpu",
+};
+
+enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *device)
+{
+    int forms = 0;
+
+    if (strcmp(name, "auto") == 0)
+        forms = device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_FORMS_CPU
+                                                                           : VKB_FORMS_GPU;
+    else
+        while (forms < VKB_FORMS_COUNT && strcmp(form_names[forms], name) != 0)
+            ++forms;
+    return forms < VKB_FORMS_COUNT && !device->dispatch ? VKB_FORMS_FRAGMENT
+                                                        : (enum vkb_forms)forms;
+}
+
+const enum vkb_mode vkb_stored_as[VKB_FORMAT_COUNT] = {
+    [VKB_FORMAT_RGBA8_UNORM] = STORED_UNORM8,
+    [VKB_FORMAT_RGBA16_FLOAT] = STORED_HALF,
+    [VKB_FORMAT_RGBA32_FLOAT] = STORED_SINGLE,
+};
+
+bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
+{
+    uint32_t writers = 0;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        for (uint32_t target = 0; target < graph->passes[i].target_count; ++target)
+            writers += graph->passes[i].targets[target] == image;
+    return writers == 1;
+}
+
+void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
+                       uint32_t block_height)
+{
+    row->geometry = VKB_GEOMETRY_DISPATCH;
+    row->vertex = (enum vkb_shader)0;
+    row->shader = shader;
+    row->block_width = block_width;
+    row->block_height = block_height;
+}
+
+const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_pass_row *writer = NULL;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].target_count == 1 && graph->passes[i].targets[0] == image)
+            writer = &graph->passes[i];
+    return writer;
+}
+
+const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
+
+    return pass && pass->shader == VKB_SHADER_extract_frag && pass->constants[1] == SAMPLING_WHOLE
+                && graph->images[pass->reads[0]].format == graph->images[image].format
+             ? pass
+             : NULL;
+}
+
+static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(blend_comp);
+static const enum vkb_shader bright_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(bright_comp);
+
+// A composite whose images have one size and format.
+static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF
+        && pass->constants[4] == BLOOM_OWN && vkb_same_size(graph, pass->reads[0], pass->targets[0])
+        && vkb_same_size(graph, pass->reads[1], pass->targets[0])
+        && graph->images[pass->reads[0]].format == graph->images[pass->reads[1]].format;
+}
+
+// An extraction in the image's own size.
+static bool brightens(const struct vkb_pass_row *pass)
+{
+    return pass->shader == VKB_SHADER_extract_frag && pass->constants[1] == SAMPLING_WHOLE;
+}
+
+// A pass that needs the texels at each pixel's own place alone, by a shader that loads them.
+static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t constants)
+{
+    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * TEXEL_COLUMNS, TEXEL_ROWS);
+    row->loads = true;
+    memset(&row->constants[constants], 0,
+           (VKB_MAX_CONSTANTS - constants) * sizeof row->constants[0]);
+    row->constant_count = constants;
+}
+
+bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
+                        const struct vkb_pass_row *pass, struct vkb_error *error)
+{
+    const enum vkb_format format = graph->images[pass->reads[0]].format;
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    if (forms == VKB_FORMS_GPU)
+        vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
+                          PIXEL_INVOCATIONS);
+    else if (blends(graph, pass))
+        load_texels(&row, blend_shaders[format], 4);
+    else if (brightens(pass))
+        load_texels(&row, bright_shaders[format], 1);
+    return vkb_graph_add_pass(graph, &row, error);
+}
+
+static bool add_pixels(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+                       bool *fits, struct vkb_error *error)
+{
+    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
+         && vkb_spirv[pass->shader].dispatch != pass->shader
+         && vkb_is_written_once(&choice->plain, pass->targets[0]);
+    return !*fits || vkb_add_fullscreen(choice->forms, choice->graph, pass, error);
+}
+
+struct form {
+    enum vkb_forms forms;
+    vkb_form_add *add;
+    uint32_t least_pixels;  // of the target
+};
+
+// A GPU has no use for strips in an image of few pixels: each invocation walks down its strip
+// alone. On an H200 halving to 512 x 512 takes 29 us in strips and 56 pixel by pixel, to 256 x 256
+// 25 and 18; doubling to 1024 x 1024 33 and 45, to 512 x 512 29 and 15.
+enum { HALVE_STRIPS = 1 << 17, DOUBLE_STRIPS = 1 << 19 };
+
+static const struct form forms_table[] = {
+    {VKB_FORMS_CPU, vkb_add_line, 0},
+    {VKB_FORMS_CPU, vkb_add_enlarged, 0},
+    {VKB_FORMS_CPU, vkb_add_strips, 0},
+    {VKB_FORMS_CPU, vkb_add_from_lines, 0},
+    {VKB_FORMS_CPU, vkb_add_halved, 0},
+    {VKB_FORMS_CPU, vkb_add_doubled, 0},
+    {VKB_FORMS_CPU, vkb_add_doubled_final, 0},
+    {VKB_FORMS_CPU, add_pixels, 0},
+    {VKB_FORMS_GPU, vkb_add_whole_taps, 0},
+    {VKB_FORMS_GPU, vkb_add_enlarged, 0},
+    {VKB_FORMS_GPU, vkb_add_from_lines, 0},
+    {VKB_FORMS_GPU, vkb_add_tiles, 0},
+    {VKB_FORMS_GPU, vkb_add_halved, HALVE_STRIPS},
+    {VKB_FORMS_GPU, vkb_add_doubled, DOUBLE_STRIPS},
+    {VKB_FORMS_GPU, vkb_add_doubled_final, DOUBLE_STRIPS},
+    {VKB_FORMS_GPU, add_pixels, 0},
+};
+
+static bool add_in_its_form(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+                            struct vkb_error *error)
+{
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const uint64_t pixels = (uint64_t)target->width * target->height;
+
+    for (size_t i = 0; i < sizeof forms_table / sizeof forms_table[0]; ++i) {
+        bool fits = false;
+        if (forms_table[i].forms != choice->forms || pixels < forms_table[i].least_pixels)
+            continue;
+        if (!forms_table[i].add(choice, pass, &fits, error))
+            return false;
+        if (fits)
+            return true;
+    }
+    return vkb_graph_add_pass(choice->graph, pass, error);
+}
+
+bool vkb_forms_choose(enum vkb_forms forms, const struct vkb_device *device,
+                      struct vkb_graph *graph, struct vkb_error *error)
+{
+    struct vkb_form_choice choice = {
+        .forms = forms,
+        .device = device,
+        .plain = *graph,
+        .graph = graph,
+    };
+    bool done = true;
+
+    if (forms == VKB_FORMS_FRAGMENT)
+        return true;
+    // The images stay, the passes are laid anew.
+    graph->passes = NULL;
+    graph->pass_count = 0;
+    graph->pass_capacity = 0;
+    for (uint32_t i = 0; done && i < choice.plain.pass_count; ++i) {
+        // Adding an image may move them all.
+        choice.plain.images = graph->images;
+        done = add_in_its_form(&choice, &choice.plain.passes[i], error);
+    }
+    vkb_free(choice.plain.passes);
+    return done;
+}

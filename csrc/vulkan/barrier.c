@@ -1,0 +1,164 @@
+#include "vulkan/barrier.h"
+
+#include <string.h>
+
+#define DEPTH_STAGES \
+    (VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT)
+
+static const struct access_info {
+    VkPipelineStageFlags stages;
+    VkAccessFlags reads, writes;
+    VkImageLayout layout;
+    bool attachment;  // touches each pixel at its own place only
+} accesses[VKB_ACCESS_COUNT] = {
+    [VKB_ACCESS_NONE] =
+        {
+            .stages = VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT,
+            .layout = VK_IMAGE_LAYOUT_UNDEFINED,
+        },
+    [VKB_ACCESS_COLOR_TARGET] =
+        {
+            .stages = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT,
+            .writes = VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL,
+            .attachment = true,
+        },
+    [VKB_ACCESS_COLOR_BLEND] =
+        {
+            .stages = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT,
+            .reads = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT,
+            .writes = VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL,
+            .attachment = true,
+        },
+    [VKB_ACCESS_DEPTH_TARGET] =
+        {
+            .stages = DEPTH_STAGES,
+            .reads = VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT,
+            .writes = VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
+            .attachment = true,
+        },
+    [VKB_ACCESS_SAMPLED] =
+        {
+            .stages = VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT,
+            .reads = VK_ACCESS_SHADER_READ_BIT,
+            .layout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
+        },
+    [VKB_ACCESS_DISPATCH_SAMPLED] =
+        {
+            .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+            .reads = VK_ACCESS_SHADER_READ_BIT,
+            .layout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
+        },
+    [VKB_ACCESS_DISPATCH_LOADED] =
+        {
+            .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+            .reads = VK_ACCESS_SHADER_READ_BIT,
+            .layout = VK_IMAGE_LAYOUT_GENERAL,
+        },
+    [VKB_ACCESS_DISPATCH_STORED] =
+        {
+            .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+            .writes = VK_ACCESS_SHADER_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_GENERAL,
+        },
+    [VKB_ACCESS_COPY_SOURCE] =
+        {
+            .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,
+            .reads = VK_ACCESS_TRANSFER_READ_BIT,
+            .layout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+        },
+    [VKB_ACCESS_COPY_TARGET] =
+        {
+            .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,
+            .writes = VK_ACCESS_TRANSFER_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+        },
+};
+
+VkImageLayout vkb_access_layout(enum vkb_access access)
+{
+    return accesses[access].layout;
+}
+
+void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,
+                        const VkImageMemoryBarrier *image, enum vkb_access from, enum vkb_access to)
+{
+    const struct access_info *before = &accesses[from], *after = &accesses[to];
+    VkImageMemoryBarrier barrier = *image;
+
+    if (from == to && !after->writes)
+        return;
+    barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
+    barrier.srcAccessMask = before->writes;
+    barrier.dstAccessMask = after->reads | after->writes;
+    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    device->vk.vkCmdPipelineBarrier(commands, before->stages, after->stages, 0, 0, NULL, 0, NULL, 1,
+                                    &barrier);
+}
+
+static void record_copy_barrier(const struct vkb_device *device, VkCommandBuffer commands,
+                                VkPipelineStageFlags stages, VkAccessFlags reads)
+{
+    device->vk.vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, stages, 0, 1,
+                                    &(VkMemoryBarrier){
+                                        .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+                                        .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
+                                        .dstAccessMask = reads,
+                                    },
+                                    0, NULL, 0, NULL);
+}
+
+void vkb_barrier_record_host_read(const struct vkb_device *device, VkCommandBuffer commands)
+{
+    record_copy_barrier(device, commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
+}
+
+void vkb_barrier_record_upload(const struct vkb_device *device, VkCommandBuffer commands)
+{
+    record_copy_barrier(device, commands, VK_PIPELINE_STAGE_VERTEX_INPUT_BIT,
+                        VK_ACCESS_INDEX_READ_BIT | VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT);
+}
+
+static uint32_t add_dependency(VkSubpassDependency *dependencies, uint32_t count,
+                               uint32_t from_subpass, enum vkb_access from, uint32_t to_subpass,
+                               enum vkb_access to)
+{
+    const struct access_info *before = &accesses[from], *after = &accesses[to];
+    VkSubpassDependency added = {
+        .srcSubpass = from_subpass,
+        .dstSubpass = to_subpass,
+        .srcStageMask = before->stages,
+        .dstStageMask = after->stages,
+        // What only reads has nothing to make available; it is named to show what is waited for.
+        .srcAccessMask = before->writes ? before->writes : before->reads,
+        .dstAccessMask = after->reads | after->writes,
+        // By region only between attachments: a blur reads its neighbours, so a pixel of the next
+        // pass depends on pixels at other places of this one.
+        .dependencyFlags =
+            before->attachment && after->attachment ? VK_DEPENDENCY_BY_REGION_BIT : 0,
+    };
+
+    for (uint32_t i = 0; i < count; ++i)
+        if (memcmp(&dependencies[i], &added, sizeof added) == 0)
+            return count;
+    dependencies[count] = added;
+    return count + 1;
+}
+
+uint32_t vkb_subpass_dependencies(const struct vkb_target_use *uses, uint32_t use_count,
+                                  VkSubpassDependency *dependencies)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < use_count; ++i)
+        count = add_dependency(dependencies, count, VK_SUBPASS_EXTERNAL, uses[i].before, 0,
+                               uses[i].during);
+    for (uint32_t i = 0; i < use_count; ++i)
+        if (uses[i].after != VKB_ACCESS_NONE)
+            count = add_dependency(dependencies, count, 0, uses[i].during, VK_SUBPASS_EXTERNAL,
+                                   uses[i].after);
+    return count;
+}

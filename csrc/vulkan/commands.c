@@ -1,0 +1,72 @@
+#include "vulkan/commands.h"
+
+bool vkb_commands_create(const struct vkb_device *device, struct vkb_commands *commands,
+                         struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    *commands = (struct vkb_commands){0};
+    bool done =
+        VK(error, vk->vkCreateCommandPool(device->handle,
+                                          &(VkCommandPoolCreateInfo){
+                                              .sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                              .flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT,
+                                              .queueFamilyIndex = device->adapter.queue_family,
+                                          },
+                                          NULL, &commands->pool))
+        && VK(error, vk->vkAllocateCommandBuffers(
+                         device->handle,
+                         &(VkCommandBufferAllocateInfo){
+                             .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+                             .commandPool = commands->pool,
+                             .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
+                             .commandBufferCount = 1,
+                         },
+                         &commands->buffer))
+        && VK(error, vk->vkCreateFence(device->handle,
+                                       &(VkFenceCreateInfo){
+                                           .sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO,
+                                       },
+                                       NULL, &commands->fence));
+    if (!done)
+        vkb_commands_destroy(device, commands);
+    return done;
+}
+
+void vkb_commands_destroy(const struct vkb_device *device, struct vkb_commands *commands)
+{
+    device->vk.vkDestroyFence(device->handle, commands->fence, NULL);
+    device->vk.vkDestroyCommandPool(device->handle, commands->pool, NULL);
+    *commands = (struct vkb_commands){0};
+}
+
+bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *commands,
+                        struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    return VK(error, vk->vkResetCommandPool(device->handle, commands->pool, 0))
+        && VK(error, vk->vkBeginCommandBuffer(
+                         commands->buffer, &(VkCommandBufferBeginInfo){
+                                               .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
+                                               .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT,
+                                           }));
+}
+
+bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
+                         struct vkb_error *error)
+{
+    return VK(error, device->vk.vkEndCommandBuffer(commands->buffer))
+        && vkb_device_submit(device, commands->buffer, commands->fence, error);
+}
+
+bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
+                       struct vkb_error *error)
+{
+    return vkb_device_wait(device, commands->fence, frames, error);
+}
+
+bool vkb_commands_over(const struct vkb_device *device, const struct vkb_commands *commands)
+{
+    return device->vk.vkGetFenceStatus(device->handle, commands->fence) == VK_SUCCESS;
+}

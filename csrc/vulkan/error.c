@@ -1,0 +1,146 @@
+#include "vulkan/error.h"
+
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...)
+{
+    va_list arguments;
+
+    *error = (struct vkb_error){.kind = kind};
+    va_start(arguments, format);
+    vsnprintf(error->message, sizeof error->message, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+#define RESULT_NAMES(NAME) \
+    NAME(VK_NOT_READY) \
+    NAME(VK_TIMEOUT) \
+    NAME(VK_INCOMPLETE) \
+    NAME(VK_ERROR_OUT_OF_HOST_MEMORY) \
+    NAME(VK_ERROR_OUT_OF_DEVICE_MEMORY) \
+    NAME(VK_ERROR_INITIALIZATION_FAILED) \
+    NAME(VK_ERROR_DEVICE_LOST) \
+    NAME(VK_ERROR_MEMORY_MAP_FAILED) \
+    NAME(VK_ERROR_LAYER_NOT_PRESENT) \
+    NAME(VK_ERROR_EXTENSION_NOT_PRESENT) \
+    NAME(VK_ERROR_FEATURE_NOT_PRESENT) \
+    NAME(VK_ERROR_INCOMPATIBLE_DRIVER) \
+    NAME(VK_ERROR_TOO_MANY_OBJECTS) \
+    NAME(VK_ERROR_FORMAT_NOT_SUPPORTED) \
+    NAME(VK_ERROR_FRAGMENTED_POOL) \
+    NAME(VK_ERROR_OUT_OF_POOL_MEMORY) \
+    NAME(VK_ERROR_INVALID_EXTERNAL_HANDLE) \
+    NAME(VK_ERROR_FRAGMENTATION) \
+    NAME(VK_ERROR_INVALID_SHADER_NV)
+
+static const char *result_name(VkResult result)
+{
+    switch (result) {
+#define RESULT_CASE(name) \
+    case name: \
+        return #name;
+        RESULT_NAMES(RESULT_CASE)
+#undef RESULT_CASE
+    default:
+        return "VK_ERROR_UNKNOWN";
+    }
+}
+
+static enum vkb_error_kind result_kind(VkResult result)
+{
+    switch (result) {
+    case VK_ERROR_OUT_OF_HOST_MEMORY:
+    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
+    case VK_ERROR_OUT_OF_POOL_MEMORY:
+    case VK_ERROR_FRAGMENTED_POOL:
+        return VKB_ERROR_OUT_OF_MEMORY;
+    case VK_ERROR_DEVICE_LOST:
+        return VKB_ERROR_DEVICE_LOST;
+    case VK_ERROR_INVALID_SHADER_NV:
+        return VKB_ERROR_SHADER;
+    default:
+        return VKB_ERROR_GENERAL;
+    }
+}
+
+const char *vkb_call_name(const char *call_text, size_t *length)
+{
+    const char *end = call_text + strcspn(call_text, "("), *start = end;
+
+    while (start > call_text && start[-1] != '.' && start[-1] != '>')
+        --start;
+    *length = (size_t)(end - start);
+    return start;
+}
+
+bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text)
+{
+    if (result == VK_SUCCESS)
+        return true;
+
+    size_t length;
+    const char *name = vkb_call_name(call_text, &length);
+
+    vkb_fail(error, result_kind(result), "%.*s failed with %s", (int)length, name,
+             result_name(result));
+    error->result = result;
+    snprintf(error->call, sizeof error->call, "%.*s", (int)length, name);
+    return false;
+}
+
+static bool fail_memory(struct vkb_error *error, size_t count, size_t size)
+{
+    return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY, "no host memory for %zu objects of %zu bytes",
+                    count, size);
+}
+
+// What a test build counts, and can refuse (faults.h).
+#ifdef VKBLOOM_FAULTS
+#define REFUSED()          vkb_fault("vkb_alloc")
+#define COUNT_BLOCKS(more) vkb_fault_blocks(more)
+#else
+#define REFUSED()          false
+#define COUNT_BLOCKS(more) ((void)(more))
+#endif
+
+void *vkb_alloc(struct vkb_error *error, size_t count, size_t size)
+{
+    // calloc(0) may answer NULL, which is no failure here.
+    void *memory = REFUSED() ? NULL : calloc(count ? count : 1, size);
+
+    if (!memory)
+        fail_memory(error, count, size);
+    COUNT_BLOCKS(memory != NULL);
+    return memory;
+}
+
+bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t needed, size_t size)
+{
+    if (needed <= *capacity)
+        return true;
+
+    size_t grown = *capacity ? *capacity : 8;
+    void *before;
+    // Byte by byte, for the caller's pointer is none to void.
+    memcpy(&before, array, sizeof before);
+    while (grown < needed)
+        grown *= 2;
+    void *memory = grown > SIZE_MAX / size || REFUSED() ? NULL : realloc(before, grown * size);
+    if (!memory)
+        return fail_memory(error, grown, size);
+    COUNT_BLOCKS(before == NULL);
+    memcpy(array, &memory, sizeof memory);
+    *capacity = grown;
+    return true;
+}
+
+void vkb_free(void *memory)
+{
+    COUNT_BLOCKS(-(memory != NULL));
+    free(memory);
+}

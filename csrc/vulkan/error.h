@@ -1,0 +1,59 @@
+// Every failure is a value: functions return false after filling a struct vkb_error.
+#ifndef VKB_ERROR_H
+#define VKB_ERROR_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <vulkan/vulkan_core.h>
+
+enum vkb_error_kind {
+    VKB_OK,
+    VKB_ERROR_GENERAL,
+    VKB_ERROR_ADAPTER_NOT_FOUND,
+    VKB_ERROR_DEVICE_LOST,
+    VKB_ERROR_OUT_OF_MEMORY,
+    VKB_ERROR_VALIDATION,
+    VKB_ERROR_SHADER,
+    VKB_ERROR_VALUE,
+    VKB_ERROR_INTERRUPTED,  // by whoever was asked during a wait, and who knows the reason
+};
+
+struct vkb_error {
+    enum vkb_error_kind kind;
+    VkResult result;  // what Vulkan answered; VK_SUCCESS where no Vulkan call failed
+    char call[64];    // the Vulkan call that failed, or ""
+    char message[2048];
+};
+
+// Fills `error` and returns false, so that a caller can `return vkb_fail(...)`.
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4)))
+#endif
+bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...);
+
+// The function's name in a call's text: "vkCreateImage" of "device->vk.vkCreateImage(...)"; *length
+// is how long it is.
+const char *vkb_call_name(const char *call_text, size_t *length);
+
+// True where `result` is VK_SUCCESS; else fills `error` from the result and the call's source text.
+bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text);
+
+// The only ways in which the core calls a Vulkan function that can fail; the second gives the
+// result to the caller.
+#define VK(error, call) vkb_check((error), VK_RESULT(call), #call)
+#ifdef VKBLOOM_FAULTS
+#include "vulkan/faults.h"
+#define VK_RESULT(call) (vkb_fault(#call) ? vkb_fault_result : (call))
+#else
+#define VK_RESULT(call) (call)
+#endif
+
+// Zeroed host memory for count objects of `size` bytes; NULL and a filled error where there is
+// none.
+void *vkb_alloc(struct vkb_error *error, size_t count, size_t size);
+// Grows an array to at least `needed` objects of `size` bytes; keeps it as it was on failure.
+// `array` is where the pointer to the first one lies, of whatever type.
+bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t needed, size_t size);
+void vkb_free(void *memory);
+
+#endif

@@ -1,0 +1,336 @@
+#include "vulkan/memory.h"
+
+// The flags that a memory type must have, then those that it had better have.
+static const struct memory_wish {
+    VkMemoryPropertyFlags needed, wanted;
+} wishes[] = {
+    [VKB_MEMORY_DEVICE] = {0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT},
+    [VKB_MEMORY_UPLOAD] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT,
+                           VK_MEMORY_PROPERTY_HOST_COHERENT_BIT},
+    // Reading memory that the host does not cache is a hundred times slower.
+    [VKB_MEMORY_READBACK] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT,
+                             VK_MEMORY_PROPERTY_HOST_CACHED_BIT},
+    [VKB_MEMORY_SHARED] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT
+                               | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT,
+                           VK_MEMORY_PROPERTY_HOST_CACHED_BIT},
+};
+
+// The first fitting type with the wanted flags, else the first fitting one at all.
+static uint32_t find_memory_type(const struct vkb_device *device, enum vkb_memory_kind kind,
+                                 uint32_t allowed)
+{
+    const struct memory_wish *wish = &wishes[kind];
+    uint32_t fallback = UINT32_MAX;
+
+    for (uint32_t i = 0; i < device->memory.memoryTypeCount; ++i) {
+        VkMemoryPropertyFlags flags = device->memory.memoryTypes[i].propertyFlags;
+        if (!(allowed >> i & 1) || (flags & wish->needed) != wish->needed)
+            continue;
+        if ((flags & wish->wanted) == wish->wanted)
+            return i;
+        if (fallback == UINT32_MAX)
+            fallback = i;
+    }
+    return fallback;
+}
+
+static bool allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
+                     const VkMemoryRequirements *requirements, VkDeviceMemory *memory,
+                     VkMemoryPropertyFlags *flags, struct vkb_error *error)
+{
+    uint32_t type = find_memory_type(device, kind, requirements->memoryTypeBits);
+
+    if (type == UINT32_MAX)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter has no memory type that fits");
+    *flags = device->memory.memoryTypes[type].propertyFlags;
+    return VK(error,
+              device->vk.vkAllocateMemory(device->handle,
+                                          &(VkMemoryAllocateInfo){
+                                              .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                              .allocationSize = requirements->size,
+                                              .memoryTypeIndex = type,
+                                          },
+                                          NULL, memory));
+}
+
+bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
+                       VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
+                       struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    VkMemoryRequirements requirements;
+    VkMemoryPropertyFlags flags;
+
+    *buffer = (struct vkb_buffer){0};
+    if (!VK(error, vk->vkCreateBuffer(device->handle,
+                                      &(VkBufferCreateInfo){
+                                          .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                                          .size = size,
+                                          .usage = usage,
+                                      },
+                                      NULL, &buffer->handle)))
+        return false;
+    vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
+    if (!allocate(device, kind, &requirements, &buffer->memory, &flags, error)
+        || !VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0))
+        || (kind != VKB_MEMORY_DEVICE
+            && !VK(error, vk->vkMapMemory(device->handle, buffer->memory, 0, VK_WHOLE_SIZE, 0,
+                                          &buffer->mapped)))) {
+        vkb_buffer_destroy(device, buffer);
+        return false;
+    }
+    // Only one that is whole has a size: vkb_buffer_reserve goes by it.
+    buffer->size = size;
+    buffer->coherent = flags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    return true;
+}
+
+void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer)
+{
+    device->vk.vkDestroyBuffer(device->handle, buffer->handle, NULL);
+    device->vk.vkFreeMemory(device->handle, buffer->memory, NULL);
+    *buffer = (struct vkb_buffer){0};
+}
+
+bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind kind,
+                        VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
+                        struct vkb_error *error)
+{
+    if (buffer->size >= size)
+        return true;
+    vkb_buffer_destroy(device, buffer);
+    return vkb_buffer_create(device, kind, usage, size, buffer, error);
+}
+
+// The first coherent type of the host memory's; UINT32_MAX where there is none.
+static uint32_t find_import_type(const struct vkb_device *device, void *memory, uint32_t allowed)
+{
+    VkMemoryHostPointerPropertiesEXT properties = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT,
+    };
+
+    if (VK_RESULT(device->vk.vkGetMemoryHostPointerPropertiesEXT(
+            device->handle, VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, memory,
+            &properties))
+        != VK_SUCCESS)
+        return UINT32_MAX;
+    for (uint32_t i = 0; i < device->memory.memoryTypeCount; ++i)
+        if ((allowed & properties.memoryTypeBits) >> i & 1
+            && device->memory.memoryTypes[i].propertyFlags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT)
+            return i;
+    return UINT32_MAX;
+}
+
+static bool import_memory(const struct vkb_device *device, void *memory, struct vkb_buffer *buffer,
+                          struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    VkMemoryRequirements requirements;
+
+    vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
+    const uint32_t type = find_import_type(device, memory, requirements.memoryTypeBits);
+    if (type == UINT32_MAX || requirements.size > buffer->size)
+        return false;
+    return VK(error,
+              vk->vkAllocateMemory(
+                  device->handle,
+                  &(VkMemoryAllocateInfo){
+                      .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                      .pNext =
+                          &(VkImportMemoryHostPointerInfoEXT){
+                              .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
+                              .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+                              .pHostPointer = memory,
+                          },
+                      .allocationSize = buffer->size,
+                      .memoryTypeIndex = type,
+                  },
+                  NULL, &buffer->memory))
+        && VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0));
+}
+
+bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage, void *memory,
+                       size_t size, struct vkb_buffer *buffer, VkDeviceSize *offset)
+{
+    const VkDeviceSize align = device->import_alignment;
+    struct vkb_error ignored;
+
+    *buffer = (struct vkb_buffer){0};
+    if (align == 0)
+        return false;
+    *offset = (uintptr_t)memory % align;
+    buffer->size = (*offset + size + align - 1) / align * align;
+    if (!VK(&ignored,
+            device->vk.vkCreateBuffer(
+                device->handle,
+                &(VkBufferCreateInfo){
+                    .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                    .pNext =
+                        &(VkExternalMemoryBufferCreateInfo){
+                            .sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
+                            .handleTypes = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+                        },
+                    .size = buffer->size,
+                    .usage = usage,
+                },
+                NULL, &buffer->handle))
+        || !import_memory(device, (char *)memory - *offset, buffer, &ignored)) {
+        vkb_buffer_destroy(device, buffer);
+        return false;
+    }
+    buffer->coherent = true;
+    return true;
+}
+
+static VkMappedMemoryRange whole_range(const struct vkb_buffer *buffer)
+{
+    return (VkMappedMemoryRange){
+        .sType = VK_STRUCTURE_TYPE_MAPPED_MEMORY_RANGE,
+        .memory = buffer->memory,
+        .size = VK_WHOLE_SIZE,
+    };
+}
+
+bool vkb_buffer_flush(const struct vkb_device *device, const struct vkb_buffer *buffer,
+                      struct vkb_error *error)
+{
+    VkMappedMemoryRange range = whole_range(buffer);
+
+    return buffer->coherent
+        || VK(error, device->vk.vkFlushMappedMemoryRanges(device->handle, 1, &range));
+}
+
+bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buffer *buffer,
+                           struct vkb_error *error)
+{
+    VkMappedMemoryRange range = whole_range(buffer);
+
+    return buffer->coherent
+        || VK(error, device->vk.vkInvalidateMappedMemoryRanges(device->handle, 1, &range));
+}
+
+// What the host writes to a new image before the device's first access stays there.
+static VkImageLayout initial_layout(bool mapped)
+{
+    return mapped ? VK_IMAGE_LAYOUT_PREINITIALIZED : VK_IMAGE_LAYOUT_UNDEFINED;
+}
+
+static bool create_handle(const struct vkb_device *device, const struct vkb_image_spec *spec,
+                          struct vkb_image *image, struct vkb_error *error)
+{
+    return VK(error,
+              device->vk.vkCreateImage(
+                  device->handle,
+                  &(VkImageCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                      .flags = spec->layers == 6 ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
+                      .imageType = VK_IMAGE_TYPE_2D,
+                      .format = vkb_formats[spec->format].vk,
+                      .extent = {spec->width, spec->height, 1},
+                      .mipLevels = spec->levels,
+                      .arrayLayers = spec->layers,
+                      .samples = VK_SAMPLE_COUNT_1_BIT,
+                      .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR : VK_IMAGE_TILING_OPTIMAL,
+                      .usage = spec->usage,
+                      .initialLayout = initial_layout(spec->mapped),
+                  },
+                  NULL, &image->handle));
+}
+
+static VkImageSubresourceRange whole_image(const struct vkb_image *image)
+{
+    return (VkImageSubresourceRange){
+        .aspectMask = vkb_formats[image->format].aspect,
+        .levelCount = image->levels,
+        .layerCount = image->layers,
+    };
+}
+
+static bool create_view(const struct vkb_device *device, struct vkb_image *image,
+                        struct vkb_error *error)
+{
+    return VK(error, device->vk.vkCreateImageView(
+                         device->handle,
+                         &(VkImageViewCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
+                             .image = image->handle,
+                             .viewType = image->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
+                                                            : VK_IMAGE_VIEW_TYPE_2D,
+                             .format = vkb_formats[image->format].vk,
+                             .subresourceRange = whole_image(image),
+                         },
+                         NULL, &image->view));
+}
+
+static bool map_image(const struct vkb_device *device, struct vkb_image *image,
+                      struct vkb_error *error)
+{
+    VkSubresourceLayout layout;
+
+    device->vk.vkGetImageSubresourceLayout(
+        device->handle, image->handle,
+        &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
+    if (!VK(error, device->vk.vkMapMemory(device->handle, image->memory, 0, VK_WHOLE_SIZE, 0,
+                                          &image->mapped)))
+        return false;
+    image->mapped = (char *)image->mapped + layout.offset;
+    image->row_pitch = (size_t)layout.rowPitch;
+    return true;
+}
+
+bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
+                      struct vkb_image *image, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    VkMemoryRequirements requirements;
+    VkMemoryPropertyFlags flags;
+
+    *image = (struct vkb_image){
+        .format = spec->format,
+        .width = spec->width,
+        .height = spec->height,
+        .layers = spec->layers,
+        .levels = spec->levels,
+    };
+    if (!create_handle(device, spec, image, error))
+        return false;
+    vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
+    if (!allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE, &requirements,
+                  &image->memory, &flags, error)
+        || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
+        || (spec->mapped && !map_image(device, image, error))
+        || !create_view(device, image, error)) {
+        vkb_image_destroy(device, image);
+        return false;
+    }
+    return true;
+}
+
+void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
+{
+    device->vk.vkDestroyImageView(device->handle, image->view, NULL);
+    device->vk.vkDestroyImage(device->handle, image->handle, NULL);
+    device->vk.vkFreeMemory(device->handle, image->memory, NULL);
+    *image = (struct vkb_image){0};
+}
+
+VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access)
+{
+    return !image->mapped            ? vkb_access_layout(access)
+         : access == VKB_ACCESS_NONE ? initial_layout(true)
+                                     : VK_IMAGE_LAYOUT_GENERAL;
+}
+
+void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer commands,
+                          struct vkb_image *image, enum vkb_access access)
+{
+    vkb_barrier_record(device, commands,
+                       &(VkImageMemoryBarrier){
+                           .oldLayout = vkb_image_layout(image, image->access),
+                           .newLayout = vkb_image_layout(image, access),
+                           .image = image->handle,
+                           .subresourceRange = whole_image(image),
+                       },
+                       image->access, access);
+    image->access = access;
+}

@@ -1,0 +1,76 @@
+// Buffers and images with memory of their own.
+#ifndef VKB_MEMORY_H
+#define VKB_MEMORY_H
+
+#include "vulkan/barrier.h"
+#include "vulkan/format.h"
+
+enum vkb_memory_kind {
+    VKB_MEMORY_DEVICE,    // fast for the device
+    VKB_MEMORY_UPLOAD,    // mapped; the host writes
+    VKB_MEMORY_READBACK,  // mapped and cached; the host reads
+    VKB_MEMORY_SHARED,    // mapped and coherent; for images, on devices whose memory is the host's
+};
+
+struct vkb_buffer {
+    VkBuffer handle;
+    VkDeviceMemory memory;
+    VkDeviceSize size;
+    void *mapped;  // NULL for VKB_MEMORY_DEVICE
+    bool coherent;
+};
+
+struct vkb_image {
+    VkImage handle;
+    VkDeviceMemory memory;
+    VkImageView view;
+    enum vkb_format format;
+    uint32_t width, height, layers, levels;
+    enum vkb_access access;  // what was last recorded for it
+    void *mapped;            // its pixels, row by row; NULL: they are the device's alone
+    size_t row_pitch;        // bytes from row to row of what is mapped
+};
+
+// Six layers make a cubemap. A mapped image has one layer and one level.
+struct vkb_image_spec {
+    enum vkb_format format;
+    uint32_t width, height, layers, levels;
+    VkImageUsageFlags usage;
+    bool mapped;
+};
+
+// On failure nothing is left behind; destroying a zeroed or half-built object is fine.
+bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
+                       VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
+                       struct vkb_error *error);
+void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer);
+
+// Makes the buffer at least `size` bytes large; what it held is lost where it grows.
+bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind kind,
+                        VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
+                        struct vkb_error *error);
+
+// A buffer over host memory that the caller keeps: what the device writes is there after the fence,
+// without a copy. It starts at the multiple of device->import_alignment before `memory`; *offset is
+// where `memory` lies in it. False without an error where the device cannot have that memory.
+bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage, void *memory,
+                       size_t size, struct vkb_buffer *buffer, VkDeviceSize *offset);
+
+// Around host access to mapped memory that is not coherent.
+bool vkb_buffer_flush(const struct vkb_device *device, const struct vkb_buffer *buffer,
+                      struct vkb_error *error);
+bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buffer *buffer,
+                           struct vkb_error *error);
+
+bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
+                      struct vkb_image *image, struct vkb_error *error);
+void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
+
+// The layout that the image is in for that access. A mapped one is in the general layout always.
+VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access);
+
+// Records what must stand between the image's last access and `access`.
+void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer commands,
+                          struct vkb_image *image, enum vkb_access access);
+
+#endif

@@ -1,9 +1,0 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-// Triangles without textures.
-#include "mesh.glsl"
-
-void main()
-{
-    write_vertex();
-}

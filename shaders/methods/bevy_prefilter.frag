@@ -1,0 +1,38 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Bevy's first downsample: 13 taps, the groups weighted by brightness but not renormalized, a
+// floor, then the threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+#include "lib/threshold.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+layout(constant_id = 1) const int THRESHOLDED = 0;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+#include "lib/thirteen_taps.glsl"
+
+vec4 shade()
+{
+    vec3 means[5] = group_means(PLACE_IN(source));
+    vec3 sum = vec3(0.0);
+    for (int group = 0; group < 5; ++group) {
+        vec3 part = GROUP_SHARES[group] * means[group];
+        // Bevy's buffers hold nothing below 0; ours do, and must not divide by 0 for it.
+        float luminance = max(dot(part, vec3(0.2126, 0.7152, 0.0722)), 0.0);
+        sum += part / (1.0 + 0.25 * luminance);
+    }
+    sum = max(sum, vec3(1e-4));
+    if (THRESHOLDED != 0) {
+        float width = params.threshold * params.knee;
+        sum = soft_threshold(sum, params.threshold, width, 4.0 * (width + 1e-5), 1e-5);
+    }
+    return vec4(storable(sum), 1.0);
+}

@@ -1,0 +1,40 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// A level from the one above it by four taps one texel to each side: a box of 4 x 4 texels. Against
+// fireflies the taps are weighted by brightness and renormalized (Karis 2013; keijiro/KinoBloom
+// @ 0a04c43fa47d, Bloom.cginc).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(PYRAMID_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+layout(constant_id = 1) const int FIREFLY_FILTER = 0;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+float tap_share(vec3 value)
+{
+    if (FIREFLY_FILTER == 0)
+        return 1.0;
+    return 1.0 / (1.0 + max(max(value.r, max(value.g, value.b)), 0.0));
+}
+
+vec4 shade()
+{
+    const vec2 corners[4] = vec2[](vec2(-1, -1), vec2(1, -1), vec2(-1, 1), vec2(1, 1));
+    Place place = PLACE_IN(source);
+    vec3 sum = vec3(0.0);
+    float shares = 0.0;
+    for (int corner = 0; corner < 4; ++corner) {
+        vec3 value = sample_at(source, place, corners[corner], SAMPLING).rgb;
+        float share = tap_share(value);
+        sum += share * value;
+        shares += share;
+    }
+    return vec4(storable(sum / shares), 1.0);
+}

@@ -1,0 +1,31 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Filament's level from one of even sides above it: 3 x 3 bilinear taps that come near a Gaussian
+// (google/filament, bloomDownsample9.mat @ 523a261b1052).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(PYRAMID_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+const float OFFSET = 1.761629;
+const float OUTER = 7.46602 / 32.0;
+
+vec4 shade()
+{
+    const float shares[3] = float[](OUTER, 1.0 - 2.0 * OUTER, OUTER);
+    Place place = PLACE_IN(source);
+    vec3 sum = vec3(0.0);
+    for (int y = -1; y <= 1; ++y)
+        for (int x = -1; x <= 1; ++x)
+            sum += shares[x + 1] * shares[y + 1]
+                 * sample_at(source, place, OFFSET * vec2(x, y), SAMPLING).rgb;
+    return vec4(storable(sum), 1.0);
+}

@@ -1,0 +1,53 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Filament's reduction: a 3 x 3 binomial between texels as four bilinear taps; with the threshold
+// also its firefly filter, which weights the taps by brightness (google/filament,
+// bloomDownsample2x.mat @ 9f62dc2f2f53).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+layout(constant_id = 1) const int THRESHOLDED = 0;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+float brightest(vec3 value)
+{
+    return max(max(value.r, max(value.g, value.b)), 0.0);
+}
+
+vec4 shade()
+{
+    Place place = PLACE_IN(source);
+    vec2 part = place.part;
+    // Along an axis the texels at -1 .. 2 weigh (1 - f, 2 - f, 1 + f, f) / 4: two
+    // taps, each between two of them.
+    vec2 left_share = 0.25 * (3.0 - 2.0 * part), right_share = 0.25 * (1.0 + 2.0 * part);
+    vec2 left = (2.0 - part) / (3.0 - 2.0 * part) - 1.0 - part;
+    vec2 right = 1.0 + part / (1.0 + 2.0 * part) - part;
+    vec2 offsets[4] = vec2[](left, vec2(right.x, left.y), vec2(left.x, right.y), right);
+    vec4 shares = vec4(left_share.x, right_share.x, left_share.x, right_share.x)
+                * vec4(left_share.yy, right_share.yy);
+    vec3 sum = vec3(0.0);
+    float whole = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        vec3 value = sample_at(source, place, offsets[i], SAMPLING).rgb;
+        float share = shares[i];
+        if (THRESHOLDED != 0)
+            share /= 1.0 + brightest(value);
+        sum += share * value;
+        whole += share;
+    }
+    sum /= whole;
+    if (THRESHOLDED != 0) {
+        sum = max(sum - params.threshold, vec3(0.0));
+        sum /= 1.0 + brightest(sum) / params.highlight;
+    }
+    return vec4(storable(sum), 1.0);
+}

@@ -1,0 +1,34 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// HDRP's prefilter: five taps in a turned square, weighted against fireflies (Karis 2013;
+// Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition, BloomPrefilter.compute
+// @ 2309d2c2fde8).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    const vec2 offsets[5] = vec2[](vec2(0.0, 0.0), vec2(0.9, -0.4), vec2(-0.9, 0.4), vec2(0.4, 0.9),
+                                   vec2(-0.4, -0.9));
+    Place place = PLACE_IN(source);
+    vec3 sum = vec3(0.0);
+    float shares = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        vec3 value = sample_at(source, place, offsets[i], SAMPLING).rgb;
+        float luminance = dot(value, vec3(0.2126729, 0.7151522, 0.0721750));
+        float share = 1.0 / (1.0 + max(luminance, 0.0));
+        sum += share * value;
+        shares += share;
+    }
+    return vec4(storable(sum / shares), 1.0);
+}

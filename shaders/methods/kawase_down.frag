@@ -1,0 +1,28 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Dual Kawase, down: four times the centre and four diagonals, half a texel of the source times
+// the offset away (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(KAWASE_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    Place place = PLACE_IN(source);
+    vec2 diagonal = vec2(0.5, -0.5) * params.offset;
+    vec3 sum = 4.0 * sample_at(source, place, vec2(0.0), SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.xx, SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.xy, SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.yx, SAMPLING).rgb;
+    sum += sample_at(source, place, diagonal.yy, SAMPLING).rgb;
+    return vec4(storable(sum / 8.0), 1.0);
+}

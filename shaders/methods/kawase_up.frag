@@ -1,0 +1,32 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Dual Kawase, up: four axial taps one texel of the smaller level times the offset away, and four
+// diagonal ones half as far that count twice (source: kawase_down.frag).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(KAWASE_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+
+layout(set = 0, binding = 1) uniform sampler2D smaller;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    Place place = PLACE_IN(smaller);
+    vec2 axial = vec2(params.offset, 0.0);
+    vec2 diagonal = vec2(0.5, -0.5) * params.offset;
+    vec3 sum = sample_at(smaller, place, axial.xy, SAMPLING).rgb;
+    sum += sample_at(smaller, place, -axial.xy, SAMPLING).rgb;
+    sum += sample_at(smaller, place, axial.yx, SAMPLING).rgb;
+    sum += sample_at(smaller, place, -axial.yx, SAMPLING).rgb;
+    vec3 diagonals = sample_at(smaller, place, diagonal.xx, SAMPLING).rgb;
+    diagonals += sample_at(smaller, place, diagonal.xy, SAMPLING).rgb;
+    diagonals += sample_at(smaller, place, diagonal.yx, SAMPLING).rgb;
+    diagonals += sample_at(smaller, place, diagonal.yy, SAMPLING).rgb;
+    return vec4(storable((sum + 2.0 * diagonals) / 12.0), 1.0);
+}

@@ -1,0 +1,49 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// A level of the pyramid on the way up: its own share and, upsampled, that of the smaller level.
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+#include "lib/cubic.glsl"
+
+UNIFORM_BLOCK(PYRAMID_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+layout(constant_id = 1) const int ADD_OWN = 1;
+layout(constant_id = 2) const int UPSAMPLE = UPSAMPLE_TENT;
+
+layout(set = 0, binding = 1) uniform sampler2D smaller;
+layout(set = 0, binding = 2) uniform sampler2D own;
+
+#define TARGET_BINDING 3
+#include "lib/fullscreen.glsl"
+
+// 3 x 3 taps of weights (1 2 1)^2 / 16.
+vec3 tent(Place place)
+{
+    vec3 sum = vec3(0.0);
+    for (int y = -1; y <= 1; ++y)
+        for (int x = -1; x <= 1; ++x) {
+            vec2 offset = vec2(params.step_x, params.step_y) * vec2(x, y);
+            float weight = (2.0 - abs(float(x))) * (2.0 - abs(float(y))) / 16.0;
+            sum += weight * sample_at(smaller, place, offset, SAMPLING).rgb;
+        }
+    return sum;
+}
+
+vec3 upsample(Place place)
+{
+    if (UPSAMPLE == UPSAMPLE_LINEAR)
+        return sample_at(smaller, place, vec2(0.0), SAMPLING).rgb;
+    if (UPSAMPLE == UPSAMPLE_CUBIC)
+        return sample_cubic(smaller, place);
+    return tent(place);
+}
+
+vec4 shade()
+{
+    vec3 sum = params.coarse * upsample(PLACE_IN(smaller));
+    if (ADD_OWN != 0)
+        sum += params.own * texelFetch(own, PIXEL, 0).rgb;
+    return vec4(storable(sum), 1.0);
+}

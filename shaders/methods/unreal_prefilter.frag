@@ -1,0 +1,27 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// three.js' high pass: one bilinear tap, faded in over a step of luminance (mrdoob/three.js,
+// examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+layout(constant_id = 1) const int THRESHOLDED = 0;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    vec3 value = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING).rgb;
+    if (THRESHOLDED != 0) {
+        float luminance = dot(value, vec3(0.2126729, 0.7151522, 0.0721750));
+        value *= smoothstep(params.threshold, params.threshold + params.smooth_width, luminance);
+    }
+    return vec4(storable(value), 1.0);
+}

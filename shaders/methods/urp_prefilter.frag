@@ -1,0 +1,28 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// URP's prefilter: one bilinear tap, a clamp, the soft threshold (Unity-Technologies/Graphics,
+// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+#include "lib/threshold.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
+layout(constant_id = 1) const int THRESHOLDED = 0;
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    vec3 kept = min(sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING).rgb, vec3(params.clamp_max));
+    if (THRESHOLDED != 0) {
+        float width = params.threshold * params.knee;
+        kept = soft_threshold(kept, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
+    }
+    return vec4(storable(max(kept, vec3(0.0))), 1.0);
+}

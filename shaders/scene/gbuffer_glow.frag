@@ -1,0 +1,15 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Adds the glow mesh's light to the brightness. Blended: all else gets 0 added, which keeps it.
+#include "lib/block.glsl"
+#include "scene/gbuffer.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D glow;
+
+void main()
+{
+    albedo = vec4(0.0);
+    normal = vec4(0.0);
+    position = vec4(0.0);
+    brightness = vec4(in_its_part(texelFetch(glow, ivec2(gl_FragCoord.xy), 0).rgb), 0.0);
+}

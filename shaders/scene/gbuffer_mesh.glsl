@@ -1,0 +1,19 @@
+// The mesh that is lit later, in view space, with the radiance that its material emits.
+#include "lib/block.glsl"
+#include "scene/gbuffer.glsl"
+
+UNIFORM_BLOCK(MESH_BLOCK);
+#include "lib/storage.glsl"
+#include "scene/surface.glsl"
+
+layout(location = 0) in vec3 view_position;
+layout(location = 1) in vec3 view_normal;
+
+void main()
+{
+    float size = length(view_normal);
+    albedo = vec4(storable(surface_colour()), 1.0);
+    normal = vec4(storable(size > 0.0 ? view_normal / size : vec3(0.0)), 1.0);
+    position = vec4(storable(view_position), 1.0);
+    brightness = vec4(storable(in_its_part(surface_emission())), 1.0);
+}

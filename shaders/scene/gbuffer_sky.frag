@@ -1,0 +1,21 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The sky behind what is lit; it neither takes light nor glows.
+#include "lib/block.glsl"
+#include "scene/gbuffer.glsl"
+
+UNIFORM_BLOCK(MESH_BLOCK);
+#include "lib/storage.glsl"
+
+layout(set = 0, binding = 1) uniform samplerCube sky;
+
+layout(location = 0) in vec3 direction;
+
+void main()
+{
+    const vec4 nothing = vec4(0.0, 0.0, 0.0, 1.0);
+    albedo = vec4(storable(texture(sky, direction).rgb), 1.0);
+    normal = nothing;
+    position = nothing;
+    brightness = nothing;
+}

@@ -1,0 +1,4 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Triangles without textures.
+#include "scene/glow_mesh.glsl"

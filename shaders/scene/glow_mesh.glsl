@@ -1,0 +1,18 @@
+// The glow mesh: its plain colour at its intensity, past the threshold if there is one.
+#include "lib/block.glsl"
+#include "scene/surface.glsl"
+#include "lib/threshold.glsl"
+
+UNIFORM_BLOCK(MESH_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int THRESHOLD_MODE = 0;
+
+layout(location = 0) out vec4 colour;
+
+void main()
+{
+    vec3 bright = apply_threshold(surface_colour() * params.glow_intensity, THRESHOLD_MODE,
+                                  params.threshold, params.knee);
+    colour = vec4(storable(bright), 1.0);
+}

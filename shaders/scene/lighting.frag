@@ -1,0 +1,27 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The scene from the G-buffer: the forward system's Phong light, and what is emitted.
+#include "lib/block.glsl"
+#include "scene/phong.glsl"
+
+UNIFORM_BLOCK(LIGHTING_BLOCK);
+#include "lib/storage.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D albedo;
+layout(set = 0, binding = 2) uniform sampler2D normal;
+layout(set = 0, binding = 3) uniform sampler2D position;
+layout(set = 0, binding = 4) uniform sampler2D brightness;
+
+#define TARGET_BINDING 5
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    ivec2 pixel = PIXEL;
+    vec3 base = texelFetch(albedo, pixel, 0).rgb;
+    vec3 n = texelFetch(normal, pixel, 0).xyz;
+    vec3 lit = base;
+    if (any(notEqual(n, vec3(0.0))))
+        lit = phong(base, LAMP_IN_HALF, normalize(n), texelFetch(position, pixel, 0).xyz);
+    return vec4(storable(lit + texelFetch(brightness, pixel, 0).rgb), 1.0);
+}

@@ -1,0 +1,9 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Triangles without textures.
+#include "scene/mesh.glsl"
+
+void main()
+{
+    write_vertex();
+}

@@ -1,0 +1,25 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// What of an image is bright enough, where the bloom buffers have its size: texels are loaded, past
+// the sampler.
+#include "lib/block.glsl"
+#include "lib/finite.glsl"
+#include "lib/threshold.glsl"
+
+UNIFORM_BLOCK(EXTRACT_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int THRESHOLD_MODE = 0;
+
+layout(local_size_x = ROW_INVOCATIONS) in;
+layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
+layout(set = 0, binding = 2) uniform writeonly image2D target;
+
+#include "variants/texels.glsl"
+
+vec4 shade(ivec2 pixel)
+{
+    vec3 colour = finite_or_zero(imageLoad(image, pixel).rgb);
+    vec3 bright = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
+    return vec4(storable(bright), 1.0);
+}

@@ -1,0 +1,22 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The end of a blur that ran at the size of the bloom buffers: its lines, which have a border of
+// one texel, at every pixel of a target of another size.
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(EXTRACT_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int SAMPLING = SAMPLING_FETCH;
+
+layout(set = 0, binding = 1) uniform sampler2D lines;
+
+#define TARGET_BINDING 2
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    ivec2 size = ivec2(params.target_width, params.target_height);
+    return vec4(storable(sample_bordered(lines, PIXEL, size, SAMPLING).rgb), 1.0);
+}

@@ -1,0 +1,78 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// A blur in one direction where the source's pixels are the target's. An invocation writes a run of
+// LINE_OUTPUTS pixels along the line and loads each texel once for all of them.
+#include "lib/block.glsl"
+
+UNIFORM_BLOCK(LINE_BLOCK);
+#include "lib/storage.glsl"
+
+layout(constant_id = 0) const int DIRECTION = DIRECTION_VERTICAL;
+// Of a short kernel, whose loops a compiler can unroll then; 0: it is long, and params.radius.
+layout(constant_id = 1) const int RADIUS = 0;
+
+layout(local_size_x = ROW_INVOCATIONS) in;
+layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
+layout(set = 0, binding = 2) uniform writeonly image2D target;
+
+const int LOADED = LINE_OUTPUTS + 2 * RADIUS;
+
+ivec2 along()
+{
+    return DIRECTION == DIRECTION_VERTICAL ? ivec2(0, 1) : ivec2(1, 0);
+}
+
+vec3 load(ivec2 pixel, int texels)
+{
+    ivec2 texel = pixel + (params.origin + texels) * along();
+    return imageLoad(source, clamp(texel, ivec2(0), imageSize(source) - 1)).rgb;
+}
+
+void add_short(ivec2 first, inout vec3 sums[LINE_OUTPUTS])
+{
+    vec3 texels[LOADED];
+
+    for (int i = 0; i < LOADED; ++i)
+        texels[i] = load(first, i - RADIUS);
+    for (int i = 0; i < LINE_OUTPUTS; ++i)
+        for (int tap = 0; tap <= 2 * RADIUS; ++tap)
+            sums[i] += params.kernel[tap >> 2][tap & 3] * texels[i + tap];
+}
+
+// As many taps at a time as there are outputs, for loops of a length that is known.
+void add_long(ivec2 first, inout vec3 sums[LINE_OUTPUTS])
+{
+    vec3 texels[2 * LINE_OUTPUTS - 1];
+
+    for (int i = 0; i < LINE_OUTPUTS - 1; ++i)
+        texels[LINE_OUTPUTS + i] = load(first, i - params.radius);
+    for (int chunk = 0; chunk <= 2 * params.radius; chunk += LINE_OUTPUTS) {
+        for (int i = 0; i < LINE_OUTPUTS - 1; ++i)
+            texels[i] = texels[LINE_OUTPUTS + i];
+        for (int i = 0; i < LINE_OUTPUTS; ++i)
+            texels[LINE_OUTPUTS - 1 + i] = load(first, chunk + LINE_OUTPUTS - 1 + i - params.radius);
+        for (int tap = 0; tap < LINE_OUTPUTS; ++tap)
+            for (int i = 0; i < LINE_OUTPUTS; ++i)
+                sums[i] += params.kernel[(chunk >> 2) + (tap >> 2)][tap & 3] * texels[i + tap];
+    }
+}
+
+void main()
+{
+    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * (along() * (LINE_OUTPUTS - 1) + 1);
+    vec3 sums[LINE_OUTPUTS];
+
+    if (any(greaterThanEqual(first, imageSize(target))))
+        return;
+    for (int i = 0; i < LINE_OUTPUTS; ++i)
+        sums[i] = vec3(0.0);
+    if (RADIUS > 0)
+        add_short(first, sums);
+    else
+        add_long(first, sums);
+    for (int i = 0; i < LINE_OUTPUTS; ++i) {
+        ivec2 pixel = first + i * along();
+        if (all(lessThan(pixel, imageSize(target))))
+            imageStore(target, pixel, vec4(storable(sums[i]), 1.0));
+    }
+}

@@ -1,0 +1,90 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// An image's whole bloom for GPUs: a workgroup writes a tile, whose vertical sums lie in shared
+// memory between the blurs.
+#include "variants/whole.glsl"
+
+layout(constant_id = 6) const int RADIUS = TILE_RADIUS;
+
+const int RUN = TILE_ROWS / TILE_RUNS;
+
+layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
+layout(set = 0, binding = 1) uniform sampler2D image;
+layout(set = 0, binding = 2) uniform writeonly image2D target;
+
+// The vertical sums, packed as their image would hold them, in planes of words so that neighbours
+// lie in neighbouring banks.
+const int WORDS = FORMAT == STORED_SINGLE ? 3 : FORMAT == STORED_HALF ? 2 : 1;
+shared uint sums[WORDS][TILE_ROWS][TILE_LOADED];
+
+void keep_sum(int row, int column, vec3 sum)
+{
+    vec3 kept = as_stored(sum, FORMAT);
+    if (FORMAT == STORED_UNORM8) {
+        sums[0][row][column] = packUnorm4x8(vec4(kept, 0.0));
+    } else if (FORMAT == STORED_HALF) {
+        sums[0][row][column] = packHalf2x16(kept.rg);
+        sums[WORDS - 1][row][column] = packHalf2x16(kept.bb);
+    } else {
+        for (int channel = 0; channel < WORDS; ++channel)
+            sums[channel][row][column] = floatBitsToUint(kept[channel]);
+    }
+}
+
+vec3 kept_sum(int row, int column)
+{
+    if (FORMAT == STORED_UNORM8)
+        return unpackUnorm4x8(sums[0][row][column]).rgb;
+    if (FORMAT == STORED_HALF)
+        return vec3(unpackHalf2x16(sums[0][row][column]),
+                    unpackHalf2x16(sums[WORDS - 1][row][column]).x);
+    vec3 sum;
+    for (int channel = 0; channel < WORDS; ++channel)
+        sum[channel] = uintBitsToFloat(sums[channel][row][column]);
+    return sum;
+}
+
+// A run of vertical sums in one column, each texel loaded once.
+void sum_down(ivec2 place, ivec2 last, int top, int column)
+{
+    vec3 run[RUN];
+    for (int i = 0; i < RUN; ++i)
+        run[i] = vec3(0.0);
+    for (int at = -RADIUS; at < RUN + RADIUS; ++at) {
+        vec3 value = bright(texelFetch(image, ivec2(place.x, clamp(place.y + at, 0, last.y)), 0).rgb);
+        for (int i = 0; i < RUN; ++i)
+            if (abs(at - i) <= RADIUS)
+                run[i] += down(at - i) * value;
+    }
+    for (int i = 0; i < RUN; ++i)
+        keep_sum(top + i, column, run[i]);
+}
+
+vec3 sum_across(int row, int column)
+{
+    vec3 sum = vec3(0.0);
+    for (int tap = -RADIUS; tap <= RADIUS; ++tap)
+        sum += across(tap) * kept_sum(row, column + RADIUS + tap);
+    return as_stored(sum, FORMAT);
+}
+
+void main()
+{
+    const int columns = TILE_LOADED - 2 * RADIUS;
+    ivec2 last = textureSize(image, 0) - 1;
+    ivec2 first = ivec2(gl_WorkGroupID.xy) * ivec2(columns, TILE_ROWS);
+    int column = int(gl_LocalInvocationID.x), top = int(gl_LocalInvocationID.y) * RUN;
+
+    sum_down(ivec2(clamp(first.x + column - RADIUS, 0, last.x), first.y + top), last, top, column);
+    barrier();
+    if (column >= columns || first.x + column > last.x)
+        return;
+    for (int i = 0; i < RUN; ++i) {
+        // Rows in turn, so that those of a warp follow each other in memory.
+        int row = i * TILE_RUNS + int(gl_LocalInvocationID.y);
+        ivec2 pixel = first + ivec2(column, row);
+        if (pixel.y <= last.y)
+            imageStore(target, pixel,
+                       finish(texelFetch(image, pixel, 0), sum_across(row, column), pixel));
+    }
+}
