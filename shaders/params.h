@@ -30,10 +30,11 @@
     THRESHOLD_ROWS(B, SETTING)
 
 // A blur pass: the distances of its taps in texels of the source, and the half-kernel w0.. of what a
-// texel at each tap counts, four to a vec4.
+// texel at each tap counts, four to a vec4. `gain` is of a blur in both directions.
 #define BLUR_BLOCK(B, SETTING, INPUT, VEC4S) \
     INPUT(B, float, step_across) \
     INPUT(B, float, step_down) \
+    INPUT(B, float, gain) \
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, weights, BLUR_VEC4S)
 

@@ -148,6 +148,7 @@ static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *k
     struct vkb_blur blur = {
         .direction = direction,
         .count = kernel->count,
+        .gain = 1.0,
         .across = step,
         .down = step,
     };

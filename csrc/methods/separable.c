@@ -22,13 +22,14 @@ static struct vkb_pass_row blur_row(const struct vkb_settings *settings,
     struct vkb_blur blur = {
         .direction = direction,
         .count = settings->weight_count,
+        .gain = strength,
         .across = scale,
         .down = width_steps ? scale * read->height / read->width : scale,
         .filter = source->format == VKB_FORMAT_RGBA8_UNORM,
     };
 
     for (uint32_t tap = 0; tap < blur.count; ++tap)
-        blur.weights[tap] = strength * (tap ? side : centre) * settings->weights[tap];
+        blur.weights[tap] = (tap ? side : centre) * settings->weights[tap];
     return vkb_blur_row(graph, name, &blur, from, to);
 }
 

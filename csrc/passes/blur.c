@@ -58,8 +58,12 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     params->target_width = sampling.width;
     params->target_height = sampling.height;
     params->limit = sampling.limit;
-    for (uint32_t i = 0; i < moved.count; ++i)
-        params->weights[i / 4][i % 4] = (float)moved.weights[i];
+    // In one direction part of the weights, so that variants need to know nothing of it.
+    params->gain = blur->direction == DIRECTION_BOTH ? (float)blur->gain : 1.0f;
+    for (uint32_t i = 0; i < moved.count; ++i) {
+        const double gain = blur->direction == DIRECTION_BOTH ? 1.0 : blur->gain;
+        params->weights[i / 4][i % 4] = (float)(gain * moved.weights[i]);
+    }
     row.constants[DIRECTION] = blur->direction;
     row.constants[RADIUS] = (int32_t)moved.count - 1;
     row.constants[SAMPLING] =

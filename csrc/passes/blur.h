@@ -14,6 +14,7 @@ struct vkb_blur {
     enum vkb_mode direction;
     double weights[MAX_WEIGHTS];  // of the taps 0, 1, ... to each side
     uint32_t count;
+    double gain;          // of what is added up
     double across, down;  // the distance of two taps in a row and in a column, in source texels
     bool filter;          // taps between texels go through the sampler, else they are fetched
 };

@@ -8,9 +8,11 @@
 // whose last bit is the half's, but for the exponent of the value, leaves no other bits.
 vec3 nearest_half(vec3 value)
 {
-    uvec3 exponent = max(floatBitsToUint(value) & 0x7f800000u, 0x38800000u);
+    uvec3 bits = floatBitsToUint(value);
+    uvec3 exponent = max(bits & 0x7f800000u, 0x38800000u);
     vec3 magic = uintBitsToFloat(exponent + ((13u << 23) + 0x400000u));
-    return (value + magic) - magic;
+    // A zero keeps its sign.
+    return uintBitsToFloat(floatBitsToUint((value + magic) - magic) | (bits & 0x80000000u));
 }
 
 // The nearest of the 256 levels, ties to even: 0 to 255.

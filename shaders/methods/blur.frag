@@ -42,5 +42,5 @@ vec4 shade()
     vec3 sum = vec3(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
         sum += weight(tap) * blur_line(place, float(tap) * down, across);
-    return vec4(storable(sum), 1.0);
+    return vec4(storable(params.gain * sum), 1.0);
 }
