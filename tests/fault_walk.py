@@ -23,7 +23,7 @@ from screens import CAMERA, panel
 
 import vkbloom
 from vkbloom import Renderer, Scene, _core
-from vkbloom.textures import Texture
+from vkbloom.scene.textures import Texture
 
 OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4

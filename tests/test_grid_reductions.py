@@ -10,7 +10,7 @@ from framebuffers import make, noise
 from numpy.typing import NDArray
 
 from vkbloom import reductions
-from vkbloom.comparison import compare
+from vkbloom.views.comparison import compare
 
 # Of one pair of doubles.
 EXACT = 1e-12
