@@ -376,9 +376,7 @@ static PyObject *submit(PyObject *object, PyObject *unused)
                             (uint32_t)self->count, &self->flight, &error);
     if (done && source.input)
         self->specials = renderer->frame.upload.specials;
-    // A validation message says more than what it led to.
-    if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, &error) && done;
+    done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
     release_source(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
@@ -445,8 +443,7 @@ static PyObject *collect(PyObject *object, PyObject *unused)
     done = renderer->open
              ? vkb_frame_collect(&renderer->device, &renderer->frame, flight, &over, &error)
              : vkb_require_open(renderer, &error);
-    if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, &error) && done;
+    done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
     if (!over) {
         set_adrift(self, flight);

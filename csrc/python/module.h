@@ -63,6 +63,11 @@ bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *err
 bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
 void vkb_renderer_leave(struct vkb_renderer *renderer);
 
+// Whether what was `done` is so without a validation message either: such a message says more than
+// the failure that it led to. After an interruption, whose exception is set, the messages wait for
+// the next call. With the lock.
+bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struct vkb_error *error);
+
 // Whether this is the process that opened the renderer.
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Takes the cargo over, whose flight may be in the air.

@@ -128,6 +128,13 @@ void vkb_renderer_leave(struct vkb_renderer *self)
     release_all(over);
 }
 
+bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vkb_error *error)
+{
+    if (!self->open || (!done && error->kind == VKB_ERROR_INTERRUPTED))
+        return done;
+    return vkb_instance_check(&self->device.instance, error) && done;
+}
+
 // create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
 // earlier run's pipeline cache, or None.
 static bool create(struct vkb_renderer *self, const char *adapter, bool validation,
