@@ -62,6 +62,39 @@ def test_settings_that_raise() -> None:
         _core.describe(object(), (16, 16), True, "forward")
 
 
+BEYOND_32_BITS = [2**32, 2**32 + 16, 2**64 + 16, 2**128, -1, -(2**32) + 16]
+
+
+@pytest.mark.parametrize("side", BEYOND_32_BITS)
+def test_sizes_are_not_taken_modulo_2_to_the_32(renderer: Renderer, scene: Scene, side: int) -> None:
+    """Once 2**32 + 16 was a side of 16."""
+    arrays, camera, _, *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+    for size in ((side, 16), (16, side)):
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            _core.describe(Separable(), size, True, "forward")
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            _core.describe(settings_with(bloom_size=size), (16, 16), True, "forward")
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            renderer._core.render(arrays, camera, size, *rest)
+    serial, body, *others = arrays
+    for surface in ((side, 0, 0), (0, side, 0), (0, 0, side)):
+        wrong = (serial, (*body[:4], (surface,)), *others)
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            renderer._core.render(wrong, camera, (8, 8), *rest)
+
+
+def test_sides_that_are_no_whole_numbers() -> None:
+    with pytest.raises(TypeError, match="16.5 is not a whole number"):
+        _core.describe(Separable(), (16.5, 16), True, "forward")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("serial", [0, -1, 2**64, 2**64 + 1])
+def test_serials_have_64_bits(renderer: Renderer, scene: Scene, serial: int) -> None:
+    (_, *others), *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+    with pytest.raises((ValueError, OverflowError)):
+        renderer._core.render((serial, *others), *rest)
+
+
 def test_shadings_and_sizes() -> None:
     with pytest.raises(ValueError, match="shading: there is no toon"):
         _core.describe(Separable(), (16, 16), True, "toon")

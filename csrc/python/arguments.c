@@ -104,6 +104,36 @@ bool vkb_require_tuple(PyObject *object, const char *what)
     return PyTuple_Check(object);
 }
 
+int vkb_read_uint32(PyObject *object, void *number)
+{
+    const unsigned long long wide =
+        PyLong_Check(object) ? PyLong_AsUnsignedLongLong(object) : (unsigned long long)-1;
+
+    if (wide <= UINT32_MAX) {
+        *(uint32_t *)number = (uint32_t)wide;
+        return 1;
+    }
+    if (!PyLong_Check(object)) {
+        PyErr_Format(PyExc_TypeError, "%R is not a whole number", object);
+        return 0;
+    }
+    PyErr_Clear();
+    PyErr_Format(PyExc_ValueError, "%R is out of range, 0 to %u", object, UINT32_MAX);
+    return 0;
+}
+
+int vkb_read_serial(PyObject *object, void *number)
+{
+    const unsigned long long serial = PyLong_AsUnsignedLongLong(object);
+
+    if (PyErr_Occurred())
+        return 0;
+    if (serial == 0)
+        PyErr_SetString(PyExc_ValueError, "scene: a serial of 0 stands for no scene");
+    *(uint64_t *)number = serial;
+    return serial != 0;
+}
+
 static void store_value(struct vkb_values *values, const struct vkb_value_row *row, double number)
 {
     char *place = (char *)values + row->offset;
@@ -202,8 +232,8 @@ static bool read_size(const struct reader *reader, struct vkb_settings *settings
         return !PyErr_Occurred();
     if (value != Py_None) {
         done = vkb_require_tuple(value, "bloom_size")
-            && PyArg_ParseTuple(value, "II;bloom_size must be (width, height)",
-                                &settings->bloom_width, &settings->bloom_height);
+            && PyArg_ParseTuple(value, "O&O&;bloom_size must be (width, height)", vkb_read_uint32,
+                                &settings->bloom_width, vkb_read_uint32, &settings->bloom_height);
         if (done && (settings->bloom_width == 0 || settings->bloom_height == 0)) {
             PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, 1 a side at least",
                          value);

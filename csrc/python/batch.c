@@ -185,9 +185,10 @@ PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments)
     PyObject *scene_tuple, *camera, *names, *shading;
     struct vkb_scene_source source = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!O!(II)OddO:render", &PyTuple_Type, &scene_tuple,
-                          &PyTuple_Type, &camera, &source.size.width, &source.size.height, &shading,
-                          &source.time, &source.glow_intensity, &names)
+    if (!PyArg_ParseTuple(arguments, "O!O!(O&O&)OddO:render", &PyTuple_Type, &scene_tuple,
+                          &PyTuple_Type, &camera, vkb_read_uint32, &source.size.width,
+                          vkb_read_uint32, &source.size.height, &shading, &source.time,
+                          &source.glow_intensity, &names)
         || !vkb_read_camera(camera, &source.camera))
         return NULL;
     struct batch *self = new_batch(renderer, names);

@@ -100,6 +100,11 @@ bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
 // Whether it is a tuple, as PyArg_ParseTuple must have it; else with a TypeError set.
 bool vkb_require_tuple(PyObject *object, const char *what);
 
+// Converters of PyArg_ParseTuple ("O&"), whose own codes for whole numbers without a sign take any
+// number modulo 2^32. 0 with an exception set.
+int vkb_read_uint32(PyObject *object, void *number);
+int vkb_read_serial(PyObject *object, void *number);  // 64 bits, not 0
+
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
 

@@ -387,7 +387,7 @@ class Renderer:
         """
         image = _check_image(image)
         names = _check_attachments(attachments)
-        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
+        return self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -418,7 +418,7 @@ class Renderer:
         As for `apply_many`.
         """
         arguments = _render_arguments(scene, size, shading, time, attachments)
-        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
+        return self._run_many(lambda: self._core.render(*arguments), settings_seq)
 
     def grid(
         self,
@@ -527,11 +527,12 @@ class Renderer:
     def _run_many(
         self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
     ) -> Iterator[Frames]:
+        # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
         checked = map(_check_settings, settings_seq)
-        for settings, result in batches.run(checked, open_batch, _allocator(self._core, None)):
-            yield self._frames(settings, result)
+        results = batches.run(checked, open_batch, _allocator(self._core, None))
+        return (self._frames(settings, result) for settings, result in results)
 
     def _frames(self, settings: Settings, result: batches.Result) -> Frames:
         self._save_pipelines()
