@@ -17,7 +17,6 @@ struct vkb_module_state {
     PyObject *renderer_type, *batch_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
-    PyObject *lacking;  // dict of type to bytes: which of those its objects lack
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);
@@ -92,8 +91,8 @@ PyObject *vkb_batch_of_image(PyObject *renderer, PyObject *arguments);
 // Makes what vkb_read_settings keeps in the state; false with an exception set.
 bool vkb_make_attributes(struct vkb_module_state *state);
 
-// A settings object's attributes; one that it lacks keeps its default. Objects of one type have the
-// same attributes. False with an exception set.
+// A settings object's attributes; one that it lacks keeps its default. False with an
+// exception set.
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 

@@ -190,6 +190,10 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     if (!PyArg_ParseTuple(arguments, "spsdO:Renderer", &adapter, &validation, &forms,
                           &frame_seconds, &read_cache))
         return NULL;
+    if (!(frame_seconds > 0.0)) {
+        PyErr_SetString(PyExc_ValueError, "frame_seconds: a number above 0 is needed");
+        return NULL;
+    }
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
     if (!self)

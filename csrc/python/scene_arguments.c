@@ -146,7 +146,10 @@ static bool read_picture(struct vkb_held_scene *scene, PyObject *levels, const c
         const uint32_t width = picture->width >> i ? picture->width >> i : 1;
         const uint32_t height = picture->height >> i ? picture->height >> i : 1;
         const size_t expected = (size_t)layers * width * height * vkb_pixel_size(picture->format);
-        if (picture->width == 0 || (size_t)view->len != expected
+        // A level after one of 1 x 1 is none of the picture's.
+        const bool beyond = i > 0 && picture->width >> i == 0 && picture->height >> i == 0;
+        const bool uneven = layers > 1 && picture->width != picture->height;
+        if (picture->width == 0 || beyond || uneven || (size_t)view->len != expected
             || vkb_pixel_format(vkb_element_code(view)) != picture->format) {
             PyErr_Format(PyExc_ValueError, "%s: level %zd is not %u times %u x %u", what, i, layers,
                          width, height);
