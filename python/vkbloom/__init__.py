@@ -26,6 +26,7 @@ from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, Un
 from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Scene
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
+from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from vkbloom.grid import reductions
@@ -85,11 +86,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        # A sixth of the time of the import is spared whoever does not ask.
-        from importlib.metadata import version  # noqa: PLC0415
-
-        globals()[name] = version("vkbloom")
-        return globals()[name]
+        return installed_version()
     if name == "reductions":
         return import_module("vkbloom.grid.reductions")
     if name in _LATE:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.framebuffers import dimensions
 from vkbloom.io import files
 from vkbloom.views import pictures
-from vkbloom.views.dimensions import dimensions
 
 if TYPE_CHECKING:
     import xarray
