@@ -15,7 +15,6 @@ from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
 from vkbloom.checks import check_attachments, check_image, check_size, check_time
 from vkbloom.frames import Frames
-from vkbloom.io import pipeline_cache
 from vkbloom.settings import SHADINGS, Settings, Shading, check_settings
 from vkbloom.version import installed_version
 
@@ -129,6 +128,8 @@ class Renderer:
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
+        from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
         try:
             self._core = _core.Renderer(
                 adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
@@ -493,6 +494,8 @@ class Renderer:
         """Keep the driver's pipeline cache on disk when new pipelines came into it."""
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
+            from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
             # Without the cache the next start is slower: no reason to lose a frame that is there.
             # A ValueError: another thread has closed the renderer.
             with contextlib.suppress(_core.Error, ValueError):
