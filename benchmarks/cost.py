@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.bench import peers
-from vkbloom.bench.image import SETTINGS, full_kernel
-from vkbloom.bench.inputs import COUNT, THRESHOLD, pictures
-from vkbloom.bench.ours import contender
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Curve, Section, Table
-from vkbloom.bench.timing import Contender, Times, alternate
+from benchmarks import peers
+from benchmarks.image import SETTINGS, full_kernel
+from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.ours import contender
+from benchmarks.plan import Plan
+from benchmarks.results import Curve, Section, Table
+from benchmarks.timing import Contender, Times, alternate
 
 __all__ = ["Line", "run"]
 

@@ -1,4 +1,4 @@
-"""``vkbloom bench``: how fast it is here, beside its peers."""
+"""``python -m benchmarks``: how fast vkbloom is here, beside its peers."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from vkbloom.bench import BENCHMARKS, Plan, run, write
-from vkbloom.bench.plan import usable_cores
+from benchmarks import BENCHMARKS, Plan, run, write
+from benchmarks.plan import usable_cores
 from vkbloom.cli.device_options import adapter_option
 from vkbloom.cli.program import blaming_the_call
 
@@ -69,7 +69,7 @@ def command(
     points: int,
     threads: int | None,
     adapter: str,
-) -> int:
+) -> None:
     """Time vkbloom beside its peers and write a table.
 
     Peers (OpenCV, SciPy, scikit-image, PyTorch, CuPy, pygfx) take part where they are installed,
@@ -109,8 +109,12 @@ def command(
             click.echo(f"{goal.what}: {goal.ratio:.3g} ({limit} wanted)")
     for found in report.disagreements:
         click.echo(
-            f"vkbloom: {found.what}: pictures differ by {found.largest:.3g}, "
-            f"{found.allowed:g} is allowed",
+            f"{found.what}: pictures differ by {found.largest:.3g}, {found.allowed:g} is allowed",
             err=True,
         )
-    return 1 if report.disagreements else 0
+    if report.disagreements:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    command(prog_name="python -m benchmarks")

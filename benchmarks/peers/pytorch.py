@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.bench.inputs import REC709
-from vkbloom.bench.peers import ImageBloom, rounded
+from benchmarks.inputs import REC709
+from benchmarks.peers import ImageBloom, rounded
 
 
 class _Blur:

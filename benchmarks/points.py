@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 
 import vkbloom
-from vkbloom.bench.inputs import THRESHOLD, picture
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Section, Table, agreement
-from vkbloom.bench.timing import Times
+from benchmarks.inputs import THRESHOLD, picture
+from benchmarks.plan import Plan
+from benchmarks.results import Section, Table, agreement
+from benchmarks.timing import Times
 
 __all__ = ["best_order", "run", "worst_order"]
 

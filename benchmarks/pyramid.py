@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.bench import peers
-from vkbloom.bench.inputs import COUNT, pictures
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Agreement, Goal, Section, Table, agreement, side_by_side
-from vkbloom.bench.spread import spread
-from vkbloom.bench.timing import Contender, alternate
+from benchmarks import peers
+from benchmarks.inputs import COUNT, pictures
+from benchmarks.plan import Plan
+from benchmarks.results import Agreement, Goal, Section, Table, agreement, side_by_side
+from benchmarks.spread import spread
+from benchmarks.timing import Contender, alternate
 
 __all__ = ["run"]
 

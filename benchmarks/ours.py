@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.bench.timing import Contender, device_clock
+from benchmarks.timing import Contender, device_clock
 
 __all__ = ["contender"]
 

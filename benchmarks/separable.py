@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 
 import vkbloom
-from vkbloom.bench.inputs import pictures
-from vkbloom.bench.ours import contender
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Section, Table, agreement
-from vkbloom.bench.timing import alternate
+from benchmarks.inputs import pictures
+from benchmarks.ours import contender
+from benchmarks.plan import Plan
+from benchmarks.results import Section, Table, agreement
+from benchmarks.timing import alternate
 
 __all__ = ["run"]
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.bench.inputs import REC709
-from vkbloom.bench.peers import ImageBloom
+from benchmarks.inputs import REC709
+from benchmarks.peers import ImageBloom
 
 
 def _opencv(threads: int) -> Any:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.bench.peers import ImageBloom, rounded
-from vkbloom.bench.peers.scipy import glow_of
+from benchmarks.peers import ImageBloom, rounded
+from benchmarks.peers.scipy import glow_of
 
 
 def image_bloom(

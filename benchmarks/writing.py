@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-from vkbloom.bench.results import Curve, Report, Section, Table
+from benchmarks.results import Curve, Report, Section, Table
 
 __all__ = ["as_json", "as_markdown", "write"]
 

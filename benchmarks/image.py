@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.bench import peers
-from vkbloom.bench.inputs import COUNT, THRESHOLD, pictures
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Goal, Section, agreement, side_by_side
-from vkbloom.bench.timing import Contender, Times, alternate
+from benchmarks import peers
+from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.plan import Plan
+from benchmarks.results import Goal, Section, agreement, side_by_side
+from benchmarks.timing import Contender, Times, alternate
 
 __all__ = ["ALLOWED", "SETTINGS", "full_kernel", "run"]
 

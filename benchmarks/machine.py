@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 import vkbloom
-from vkbloom.bench import peers
-from vkbloom.bench.plan import Plan, usable_cores
+from benchmarks import peers
+from benchmarks.plan import Plan, usable_cores
 
 __all__ = ["describe"]
 
@@ -48,7 +48,7 @@ def describe(plan: Plan, adapter: vkbloom.AdapterInfo | None) -> dict[str, Any]:
 
 def command(plan: Plan) -> str:
     """Return the command line that runs a plan."""
-    words = ["vkbloom", "bench"]
+    words = ["python", "-m", "benchmarks"]
     if plan.adapter != "auto":
         words += ["--adapter", plan.adapter]
     for name in plan.only:

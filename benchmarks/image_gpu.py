@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.bench import peers
-from vkbloom.bench.image import ALLOWED, SETTINGS, full_kernel
-from vkbloom.bench.inputs import COUNT, THRESHOLD, pictures
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Goal, Section, Table, agreement, side_by_side
-from vkbloom.bench.timing import Contender, Times, alternate, alternate_seconds, device_clock
+from benchmarks import peers
+from benchmarks.image import ALLOWED, SETTINGS, full_kernel
+from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.plan import Plan
+from benchmarks.results import Goal, Section, Table, agreement, side_by_side
+from benchmarks.timing import Contender, Times, alternate, alternate_seconds, device_clock
 
 __all__ = ["run"]
 

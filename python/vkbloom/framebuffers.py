@@ -1,16 +1,52 @@
-"""Which framebuffer leads, and the names of the axes of the others beside it."""
+"""What is known of framebuffers without their renderer: which leads, and the axes' names."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import ItemsView, Iterator, Mapping
+from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-__all__ = ["dimensions", "leading"]
+__all__ = ["Framebuffers", "MadeWith", "dimensions", "leading"]
 
 
-def leading(arrays: Mapping[str, NDArray[Any]]) -> str:
+class MadeWith(Protocol):
+    """The part of a `Settings` that those who show and write framebuffers read."""
+
+    @property
+    def encoding(self) -> str:
+        """The transfer curve that `final` has passed, or "none"."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields by name, and ``method``."""
+
+
+class Framebuffers(Protocol):
+    """Framebuffers with how they came about, as those that show and write them see a `Frames`."""
+
+    @property
+    def timings(self) -> Mapping[str, float]:
+        """Seconds on the device by pass name."""
+
+    @property
+    def settings(self) -> MadeWith:
+        """The settings that the framebuffers were made with."""
+
+    @property
+    def info(self) -> Mapping[str, Any]:
+        """Adapter, driver and version among others."""
+
+    def __getitem__(self, name: str, /) -> NDArray[Any]: ...
+
+    def __iter__(self) -> Iterator[str]: ...
+
+    def __len__(self) -> int: ...
+
+    def items(self) -> ItemsView[str, NDArray[Any]]:
+        """Return the framebuffers with their names, in the order that the data flows."""
+
+
+def leading(arrays: Mapping[str, NDArray[Any]] | Framebuffers) -> str:
     """Name the framebuffer that stands for all: `final`, the last image, or the last.
 
     Parameters

@@ -9,9 +9,9 @@ from types import MappingProxyType
 from typing import Final
 
 import vkbloom
-from vkbloom.bench.machine import describe
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Report, Section
+from benchmarks.machine import describe
+from benchmarks.plan import Plan
+from benchmarks.results import Report, Section
 
 __all__ = ["BENCHMARKS", "run"]
 
@@ -64,7 +64,7 @@ def run(plan: Plan) -> Iterator[Report]:
     report = Report(machine, ())
     for name in plan.only or BENCHMARKS:
         plan.tell(name)
-        module = importlib.import_module(f"vkbloom.bench.{name.replace('-', '_')}")
+        module = importlib.import_module(f"benchmarks.{name.replace('-', '_')}")
         section: Section = module.run(plan)
         if plan.quick:
             # Its figures mean nothing.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.bench.inputs import REC709
+from benchmarks.inputs import REC709
 
 #: Outputs of a thread block of fused.cu, and how many rows a thread walks down.
 TILE = (64, 32)

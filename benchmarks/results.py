@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.bench.timing import Times
+from benchmarks.timing import Times
 
 __all__ = ["Agreement", "Curve", "Goal", "Report", "Section", "Table", "agreement", "side_by_side"]
 

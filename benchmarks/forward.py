@@ -6,9 +6,9 @@ from contextlib import ExitStack
 from typing import Final
 
 import vkbloom
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Goal, Section, Table, agreement, side_by_side
-from vkbloom.bench.timing import Contender, alternate
+from benchmarks.plan import Plan
+from benchmarks.results import Goal, Section, Table, agreement, side_by_side
+from benchmarks.timing import Contender, alternate
 
 __all__ = ["run"]
 

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.bench.image import SETTINGS
-from vkbloom.bench.inputs import COUNT, pictures
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Goal, Section, Table, side_by_side
-from vkbloom.bench.timing import Contender, Times, alternate, alternate_seconds
+from benchmarks.image import SETTINGS
+from benchmarks.inputs import COUNT, pictures
+from benchmarks.plan import Plan
+from benchmarks.results import Goal, Section, Table, side_by_side
+from benchmarks.timing import Contender, Times, alternate, alternate_seconds
 
 __all__ = ["run"]
 

@@ -11,10 +11,10 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
-from vkbloom.bench import peers
-from vkbloom.bench.plan import Plan
-from vkbloom.bench.results import Section, Table
-from vkbloom.bench.timing import Times, alternate_seconds
+from benchmarks import peers
+from benchmarks.plan import Plan
+from benchmarks.results import Section, Table
+from benchmarks.timing import Times, alternate_seconds
 
 __all__ = ["run"]
 
