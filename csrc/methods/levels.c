@@ -219,7 +219,7 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     }
     if (is_twice(levels->graph, to, from) && kernel != UPSAMPLE_CUBIC
         && (kernel == UPSAMPLE_LINEAR
-            || (params->step_x == params->step_y && params->step_x <= 1.0f))) {
+            || (params->step_x == params->step_y && fabsf(params->step_x) <= 1.0f))) {
         row.constants[0] = SAMPLING_WHOLE;
         find_up_taps(kernel == UPSAMPLE_TENT ? params->step_x : 0.0, params->taps[0]);
     }

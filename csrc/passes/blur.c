@@ -92,7 +92,7 @@ bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texe
     const double step = vertical ? params->step_down : params->step_across;
     const int taps = pass->constants[RADIUS];
 
-    if (!is_whole(step) || taps * step > limit)
+    if (!is_whole(step) || step < 0.0 || taps * step > limit)
         return false;
     memset(kernel, 0, sizeof *kernel);
     kernel->radius = taps * (int)step;

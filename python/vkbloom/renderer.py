@@ -6,15 +6,17 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from vkbloom import _core, batches, pipeline_cache
+from vkbloom import _core, requests
 from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
+from vkbloom.checks import check_attachments, check_image, check_size, check_time
 from vkbloom.frames import Frames
-from vkbloom.settings import Separable, Settings, check_size, check_time
+from vkbloom.settings import SHADINGS, Settings, Shading, check_settings
+from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,19 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vkbloom.scene import Mesh, Scene
-    from vkbloom.textures import Texture
-
-Shading = Literal["forward", "deferred"]
-SHADINGS: tuple[Shading, ...] = get_args(Shading)
-
-# In this machine's byte order: for all but those, more is asked.
-_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
-
-
-def _version() -> str:
-    from vkbloom import __version__  # noqa: PLC0415  the package imports this module
-
-    return __version__
+    from vkbloom.scene.textures import Texture
 
 
 def _frame_seconds() -> float:
@@ -49,47 +39,6 @@ def _frame_seconds() -> float:
     if not seconds > 0:
         raise ValueError(f"VKBLOOM_TIMEOUT: {text!r} is not a number of seconds above 0")
     return seconds
-
-
-def _check_settings(settings: Settings | None) -> Settings:
-    if settings is None:
-        return Separable()
-    if not isinstance(settings, Settings):
-        raise TypeError(f"settings: Settings are needed, not {settings!r}")
-    return settings
-
-
-def _check_image(image: object) -> NDArray[Any]:
-    """Return the image, in this machine's byte order, if the core can take it."""
-    if not isinstance(image, np.ndarray):
-        raise TypeError(f"image: an array is needed, not {type(image).__name__}")
-    if type(image) is not np.ndarray and np.ma.is_masked(image):
-        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
-    if image.dtype not in _DTYPES:
-        if image.dtype.name not in ("uint8", "float16", "float32"):
-            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
-        image = image.astype(image.dtype.newbyteorder("="), copy=False)
-    if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
-        raise ValueError(
-            f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
-        )
-    return image
-
-
-def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
-    """Return the wanted names, None for all."""
-    if attachments == "all":
-        return None
-    if isinstance(attachments, str):
-        return (attachments,)
-    try:
-        names = tuple(attachments)
-    except TypeError:
-        raise TypeError(f"attachments: names are needed, not {attachments!r}") from None
-    for name in names:
-        if not isinstance(name, str):
-            raise TypeError(f"attachments: names are needed, not {name!r}")
-    return names
 
 
 def _allocator(
@@ -179,6 +128,8 @@ class Renderer:
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
+        from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
         try:
             self._core = _core.Renderer(
                 adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
@@ -197,7 +148,7 @@ class Renderer:
         self._made_by = {
             "adapter": self.info.name,
             "driver": self.info.driver_info or self.info.driver,
-            "version": _version(),
+            "version": installed_version(),
         }
         self._saved_pipelines = 0
 
@@ -235,9 +186,9 @@ class Renderer:
     def _repr_html_(self) -> str:
         """Return the table of `display.renderer_html`."""
         # Late: notebooks need it, and nothing else.
-        from vkbloom import display  # noqa: PLC0415
+        from vkbloom.views import display  # noqa: PLC0415
 
-        return display.renderer_html(self)
+        return display.renderer_html(self.info, closed=self.closed)
 
     def render(
         self,
@@ -303,7 +254,7 @@ class Renderer:
         A pass runs only when what it reads, its settings or its size changed since it last ran;
         ``timings`` of the result names the passes that ran.
         """
-        settings = _check_settings(settings)
+        settings = check_settings(settings)
         arguments = _render_arguments(scene, size, shading, time, attachments)
         return self._run_one(self._core.render(*arguments), settings, out)
 
@@ -352,8 +303,8 @@ class Renderer:
         The same image again, to the byte, is not sent to the device again, and passes run only
         when what they read or their settings changed.
         """
-        settings = _check_settings(settings)
-        batch = self._core.apply(_check_image(image), _check_attachments(attachments))
+        settings = check_settings(settings)
+        batch = self._core.apply(check_image(image), check_attachments(attachments))
         return self._run_one(batch, settings, out)
 
     def apply_many(
@@ -385,9 +336,9 @@ class Renderer:
         settings are taken from their iterable before the frames that come before theirs.
         What a wrong one of them raises is raised in its turn, after the frames before it.
         """
-        image = _check_image(image)
-        names = _check_attachments(attachments)
-        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
+        image = check_image(image)
+        names = check_attachments(attachments)
+        return self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -418,7 +369,7 @@ class Renderer:
         As for `apply_many`.
         """
         arguments = _render_arguments(scene, size, shading, time, attachments)
-        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
+        return self._run_many(lambda: self._core.render(*arguments), settings_seq)
 
     def grid(
         self,
@@ -484,7 +435,7 @@ class Renderer:
         Points are visited in the order that runs the fewest passes, whatever the order of the
         axes. For grids that outgrow memory see `vkbloom.grid_to_zarr`.
         """
-        from vkbloom.grid.memory import in_memory  # noqa: PLC0415  it imports this module
+        from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
         from vkbloom.grid.plan import ask  # noqa: PLC0415
 
         asked = ask(
@@ -527,13 +478,14 @@ class Renderer:
     def _run_many(
         self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
     ) -> Iterator[Frames]:
+        # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
-        checked = map(_check_settings, settings_seq)
-        for settings, result in batches.run(checked, open_batch, _allocator(self._core, None)):
-            yield self._frames(settings, result)
+        checked = map(check_settings, settings_seq)
+        results = requests.run(checked, open_batch, _allocator(self._core, None))
+        return (self._frames(settings, result) for settings, result in results)
 
-    def _frames(self, settings: Settings, result: batches.Result) -> Frames:
+    def _frames(self, settings: Settings, result: requests.Result) -> Frames:
         self._save_pipelines()
         arrays, timings, (nan, inf) = result
         info = {**self._made_by, "nan": nan, "inf": inf}
@@ -543,6 +495,8 @@ class Renderer:
         """Keep the driver's pipeline cache on disk when new pipelines came into it."""
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
+            from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
             # Without the cache the next start is slower: no reason to lose a frame that is there.
             # A ValueError: another thread has closed the renderer.
             with contextlib.suppress(_core.Error, ValueError):
@@ -589,7 +543,7 @@ def _render_arguments(
         # Whole turns change nothing; without them large times keep their precision.
         math.fmod(turns, 1.0),
         scene.glow_intensity,
-        _check_attachments(attachments),
+        check_attachments(attachments),
     )
 
 
@@ -610,7 +564,7 @@ def _scene_arrays(scene: Scene) -> Any:
         )
         for texture in numbers
     )
-    return scene.serial, body, glow, sky, textures
+    return scene.contents_serial, body, glow, sky, textures
 
 
 def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:

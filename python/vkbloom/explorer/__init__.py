@@ -14,15 +14,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vkbloom.explorer.widget import Explorer
-    from vkbloom.renderer import Renderer, Shading
+    from vkbloom.renderer import Renderer
     from vkbloom.scene import Scene
-    from vkbloom.settings import Settings
+    from vkbloom.settings import Settings, Shading
 
 __all__ = ["explore"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import chunk_in
 from vkbloom.grid.keys import Keys, open_keys
@@ -17,8 +17,7 @@ from vkbloom.grid.order import Index
 from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.store import IDENTITY, ROOT, GridStore, read_json, stored_identity
-from vkbloom.renderer import Shading
-from vkbloom.settings import Settings
+from vkbloom.settings import Settings, Shading
 
 if TYPE_CHECKING:
     import xarray
