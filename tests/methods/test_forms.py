@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.conftest import ADAPTER
 from tests.methods.test_apply import DTYPES, METHODS, picture
 from tests.tolerance import assert_matches_reference, real, tolerance
 from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, gaussian_weights, presets
