@@ -378,7 +378,7 @@ static PyObject *submit(PyObject *object, PyObject *unused)
         self->specials = renderer->frame.upload.specials;
     // A validation message says more than what it led to.
     if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, &error) && done;
+        done = vkb_messages_check(&renderer->device.messages, &error) && done;
     vkb_renderer_leave(renderer);
     release_source(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
@@ -446,7 +446,7 @@ static PyObject *collect(PyObject *object, PyObject *unused)
              ? vkb_frame_collect(&renderer->device, &renderer->frame, flight, &over, &error)
              : vkb_require_open(renderer, &error);
     if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, &error) && done;
+        done = vkb_messages_check(&renderer->device.messages, &error) && done;
     vkb_renderer_leave(renderer);
     if (!over) {
         set_adrift(self, flight);

@@ -7,9 +7,10 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
-#include "variants/forms.h"
-#include "run/frame.h"
 #include "methods/methods.h"
+#include "run/frame.h"
+#include "variants/forms.h"
+#include "vulkan/process.h"
 
 #include <stdatomic.h>
 
@@ -45,9 +46,10 @@ struct vkb_renderer {
     struct vkb_cargo *adrift;  // touched with the GIL
     long process;              // that opened it: the device is no other's, not even a forked one's
     atomic_bool open;          // changed with the lock, looked at without
-    PyObject *array_memory;    // a capsule, which the arrays hold too; NULL: closed
-    PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
-    size_t pipeline_count;     // made so far; read and written with the GIL
+    const struct vkb_messages *before;  // whose the messages are when the holder leaves
+    PyObject *array_memory;             // a capsule, which the arrays hold too; NULL: closed
+    PyObject *array_context;  // a contextvars.Context that has it; NULL: no NumPy that takes it
+    size_t pipeline_count;    // made so far; read and written with the GIL
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -67,9 +69,6 @@ void vkb_renderer_leave(struct vkb_renderer *renderer);
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Takes the cargo over, whose flight may be in the air.
 void vkb_renderer_set_adrift(struct vkb_renderer *renderer, struct vkb_cargo *cargo);
-
-// Whose the device is: this process's number, whatever it was forked from.
-long vkb_current_process(void);
 
 // Memory for large arrays that the device writes to without a copy; false with an exception set.
 bool vkb_array_memory_create(struct vkb_renderer *renderer);
@@ -137,6 +136,7 @@ PyObject *vkb_describe(PyObject *module, PyObject *arguments);
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);
 PyObject *vkb_fault_state(PyObject *module, PyObject *unused);
+PyObject *vkb_fault_forget(PyObject *module, PyObject *unused);
 #endif
 
 #endif

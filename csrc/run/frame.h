@@ -3,12 +3,12 @@
 #ifndef VKB_FRAME_H
 #define VKB_FRAME_H
 
-#include "run/flight.h"
 #include "graph/graph.h"
+#include "run/flight.h"
 #include "run/pipeline.h"
-#include "scene/scene.h"
 #include "run/slots.h"
 #include "run/upload.h"
+#include "scene/scene.h"
 
 // The passes of the point that was recorded last, and what its source was.
 struct vkb_previous {
@@ -39,7 +39,8 @@ struct vkb_timing {
     double seconds;  // NaN: the queue has no timestamps
 };
 
-// Destroying a zeroed or half-built object is fine.
+// Destroying a zeroed or half-built object is fine, one that flights were submitted with only after
+// vkb_frame_end.
 bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, size_t cache_size,
                       struct vkb_frame *frame, struct vkb_error *error);
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame);
@@ -72,7 +73,8 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
 // be at work on it.
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight);
 
-// Waits for all flights.
-bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error);
+// Waits for all flights for the last time, no longer than a frame may take for each. False where
+// the frame cannot be destroyed: the wait was interrupted, or the device is at work still.
+bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error);
 
 #endif

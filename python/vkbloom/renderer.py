@@ -156,7 +156,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range.
+        `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
+        what the adapter cannot run.
 
     Notes
     -----
@@ -167,7 +168,11 @@ class Renderer:
     be used again; closing waits for what the device is still at work on. A device that takes longer
     than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
     number. After a fork the child opens a renderer of its own, where the driver can; its parent's
-    raise ValueError.
+    raise ValueError. NVIDIA's driver cannot: start processes by multiprocessing's method "spawn".
+
+    The first renderer, or list of `adapters`, opens the Vulkan loader for the life of the process:
+    drivers that are installed later, and variables such as VK_DRIVER_FILES that are set later, are
+    seen by new processes only.
     """
 
     #: The process that opened the last one: any other has been forked from it since.
@@ -176,6 +181,8 @@ class Renderer:
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
+        if not adapter:
+            raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
