@@ -71,6 +71,8 @@ static PyObject *adapters(PyObject *module, PyObject *unused)
     done = instance && vkb_adapters_list(instance, found, &count, &error);
     if (instance)
         vkb_instance_close(instance);
+    if (!done)
+        vkb_instance_explain_fork(&error);
     Py_END_ALLOW_THREADS
     if (!done)
         return vkb_raise(vkb_module_state(module), &error);

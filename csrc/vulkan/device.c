@@ -156,8 +156,10 @@ bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bo
     const struct vkb_messages *before = vkb_messages_begin(&device->messages);
     const bool done = create_handle(device, adapter_choice, validation, error);
     vkb_messages_end(before);
-    if (!done)
+    if (!done) {
         vkb_device_destroy(device);
+        vkb_instance_explain_fork(error);
+    }
     return done;
 }
 

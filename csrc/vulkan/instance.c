@@ -61,6 +61,13 @@ static bool check_loader(bool validation, struct vkb_error *error)
     return true;
 }
 
+static void add_text(struct vkb_error *error, const char *text)
+{
+    const size_t length = strlen(error->message);
+
+    snprintf(error->message + length, sizeof error->message - length, "%s", text);
+}
+
 // What the loader answers where no adapter can be had is not always what is wrong.
 static bool check_created(VkResult result, struct vkb_error *error)
 {
@@ -73,12 +80,9 @@ static bool check_created(VkResult result, struct vkb_error *error)
     }
     if (vkb_check(error, result, "vkCreateInstance"))
         return true;
-    if (result == VK_ERROR_OUT_OF_HOST_MEMORY) {
-        const size_t length = strlen(error->message);
-        snprintf(error->message + length, sizeof error->message - length,
-                 ". Unless memory is short, a driver's manifest (a JSON file) is damaged, which "
-                 "some loaders report so; `vkbloom doctor` names the file");
-    }
+    if (result == VK_ERROR_OUT_OF_HOST_MEMORY)
+        add_text(error, ". Unless memory is short, a driver's manifest (a JSON file) is damaged, "
+                        "which some loaders report so; `vkbloom doctor` names the file");
     return false;
 }
 
@@ -177,6 +181,16 @@ void vkb_instance_close(struct vkb_instance *instance)
     vkb_lock_acquire(&lock);
     if (--instance->users == 0 && forked)
         destroy_instance(instance);
+    vkb_lock_release(&lock);
+}
+
+void vkb_instance_explain_fork(struct vkb_error *error)
+{
+    vkb_lock_acquire(&lock);
+    if (forked)
+        add_text(error, ". This process was forked from one that had used Vulkan, after which some "
+                        "drivers (NVIDIA's among them) do not work; start it by multiprocessing's "
+                        "method \"spawn\" or \"forkserver\"");
     vkb_lock_release(&lock);
 }
 

@@ -51,6 +51,10 @@ struct vkb_instance {
 struct vkb_instance *vkb_instance_open(bool validation, struct vkb_error *error);
 void vkb_instance_close(struct vkb_instance *instance);
 
+// Adds to an error what may have led to it where this process was forked from one with an instance,
+// and what to do.
+void vkb_instance_explain_fork(struct vkb_error *error);
+
 // The functions of a device of that instance.
 void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice device,
                               struct VolkDeviceTable *table);

@@ -6,12 +6,11 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from vkbloom import _core, batches, pipeline_cache
-from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
 from vkbloom.frames import Frames
 from vkbloom.settings import Separable, Settings, check_size, check_time
@@ -175,9 +174,6 @@ class Renderer:
     seen by new processes only.
     """
 
-    #: The process that opened the last one: any other has been forked from it since.
-    _opened_in: ClassVar[int | None] = None
-
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
@@ -186,19 +182,9 @@ class Renderer:
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
-        try:
-            self._core = _core.Renderer(
-                adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
-            )
-        except Error as error:
-            if self._opened_in not in (None, os.getpid()):
-                error.add_note(
-                    "This process was forked from one that had opened a renderer, which some "
-                    "drivers (NVIDIA's among them) refuse to work after; start it by "
-                    'multiprocessing\'s method "spawn" or "forkserver".'
-                )
-            raise
-        Renderer._opened_in = os.getpid()
+        self._core = _core.Renderer(
+            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+        )
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._made_by = {
