@@ -11,7 +11,7 @@ import pytest
 
 from tests.screens import noise, screen
 from vkbloom import Camera, Frames, Renderer, Scene, Separable
-from vkbloom.renderer import Shading
+from vkbloom.settings import Shading
 
 SIZE = (160, 90)
 ALL = ["glow", "blur_vertical", "bloom", "scene", "final"]
