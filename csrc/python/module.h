@@ -47,8 +47,8 @@ struct vkb_renderer {
     atomic_bool open;          // changed with the lock, looked at without
     const struct vkb_messages *before;  // whose the messages are when the holder leaves
     PyObject *array_memory;             // a capsule, which the arrays hold too; NULL: closed
-    PyObject *array_context;  // a contextvars.Context that has it; NULL: no NumPy that takes it
-    size_t pipeline_count;    // made so far; read and written with the GIL
+    PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
+    size_t pipeline_count;     // made so far; read and written with the GIL
     struct vkb_cached cached;  // read and written with the GIL
     enum vkb_forms forms;
     struct vkb_device device;
