@@ -611,7 +611,7 @@ def _scene_arrays(scene: Scene) -> Any:
         )
         for texture in numbers
     )
-    return scene.serial, body, glow, sky, textures
+    return scene.contents_serial, body, glow, sky, textures
 
 
 def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:
