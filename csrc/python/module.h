@@ -47,6 +47,7 @@ struct vkb_renderer {
     PyObject *array_memory;    // a capsule, which the arrays hold too; NULL: closed
     PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
     size_t pipeline_count;     // made so far; read and written with the GIL
+    struct vkb_cached cached;  // read and written with the GIL
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
