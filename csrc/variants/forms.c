@@ -32,11 +32,13 @@ bool vkb_forms_by_name(const char *name, const struct vkb_device *device, enum v
     return true;
 }
 
-const enum vkb_mode vkb_stored_as[VKB_FORMAT_COUNT] = {
-    [VKB_FORMAT_RGBA8_UNORM] = STORED_UNORM8,
-    [VKB_FORMAT_RGBA16_FLOAT] = STORED_HALF,
-    [VKB_FORMAT_RGBA32_FLOAT] = STORED_SINGLE,
-};
+enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format)
+{
+    if (format == VKB_FORMAT_RGBA8_UNORM)
+        return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? STORED_UNORM8_SCALED
+                                                                          : STORED_UNORM8;
+    return format == VKB_FORMAT_RGBA16_FLOAT ? STORED_HALF : STORED_SINGLE;
+}
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
 {
@@ -152,7 +154,6 @@ static const struct form forms_table[] = {
     {VKB_FORMS_CPU, vkb_add_doubled, 0},
     {VKB_FORMS_CPU, vkb_add_doubled_final, 0},
     {VKB_FORMS_CPU, add_pixels, 0},
-    {VKB_FORMS_GPU, vkb_add_whole_taps, 0},
     {VKB_FORMS_GPU, vkb_add_enlarged, 0},
     {VKB_FORMS_GPU, vkb_add_from_lines, 0},
     {VKB_FORMS_GPU, vkb_add_tiles, 0},
