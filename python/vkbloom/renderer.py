@@ -6,12 +6,11 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
 from vkbloom.checks import check_attachments, check_image, check_size, check_time
 from vkbloom.frames import Frames
@@ -105,7 +104,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range.
+        `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
+        what the adapter cannot run.
 
     Notes
     -----
@@ -116,33 +116,26 @@ class Renderer:
     be used again; closing waits for what the device is still at work on. A device that takes longer
     than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
     number. After a fork the child opens a renderer of its own, where the driver can; its parent's
-    raise ValueError.
-    """
+    raise ValueError. NVIDIA's driver cannot: start processes by multiprocessing's method "spawn".
 
-    #: The process that opened the last one: any other has been forked from it since.
-    _opened_in: ClassVar[int | None] = None
+    The first renderer, or list of `adapters`, opens the Vulkan loader for the life of the process:
+    drivers that are installed later, and variables such as VK_DRIVER_FILES that are set later, are
+    seen by new processes only.
+    """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
+        if not adapter:
+            raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
-        try:
-            self._core = _core.Renderer(
-                adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
-            )
-        except Error as error:
-            if self._opened_in not in (None, os.getpid()):
-                error.add_note(
-                    "This process was forked from one that had opened a renderer, which some "
-                    "drivers (NVIDIA's among them) refuse to work after; start it by "
-                    'multiprocessing\'s method "spawn" or "forkserver".'
-                )
-            raise
-        Renderer._opened_in = os.getpid()
+        self._core = _core.Renderer(
+            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+        )
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._made_by = {
@@ -338,7 +331,7 @@ class Renderer:
         """
         image = check_image(image)
         names = check_attachments(attachments)
-        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
+        return self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -369,7 +362,7 @@ class Renderer:
         As for `apply_many`.
         """
         arguments = _render_arguments(scene, size, shading, time, attachments)
-        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
+        return self._run_many(lambda: self._core.render(*arguments), settings_seq)
 
     def grid(
         self,
@@ -478,11 +471,12 @@ class Renderer:
     def _run_many(
         self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
     ) -> Iterator[Frames]:
+        # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
         checked = map(check_settings, settings_seq)
-        for settings, result in requests.run(checked, open_batch, _allocator(self._core, None)):
-            yield self._frames(settings, result)
+        results = requests.run(checked, open_batch, _allocator(self._core, None))
+        return (self._frames(settings, result) for settings, result in results)
 
     def _frames(self, settings: Settings, result: requests.Result) -> Frames:
         self._save_pipelines()
@@ -563,7 +557,7 @@ def _scene_arrays(scene: Scene) -> Any:
         )
         for texture in numbers
     )
-    return scene.serial, body, glow, sky, textures
+    return scene.contents_serial, body, glow, sky, textures
 
 
 def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:

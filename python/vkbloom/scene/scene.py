@@ -1,7 +1,7 @@
 """Scenes: meshes, the sky and the camera, as immutable values.
 
 Loading needs no Vulkan. What a scene holds is read-only, so a renderer may keep what it uploaded
-for as long as the scene's serial stays the same.
+for as long as the serial of the scene's contents stays the same.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import dataclasses
 import itertools
 import math
 import os
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -24,6 +25,21 @@ from vkbloom.scene.mesh import Mesh
 from vkbloom.scene.skybox import Cubemap, SkyboxSource
 
 _serials = itertools.count(1)
+
+
+class _Contents:
+    """What the scenes of the same meshes and sky share: one number, for as long as one is alive."""
+
+    def __init__(self) -> None:
+        self.serial = next(_serials)
+
+
+#: By the ids of body, glow and sky. A scene holds its contents and these three, so that no other
+#: object can have such an id while the entry is there.
+_contents: weakref.WeakValueDictionary[tuple[int, int, int], _Contents] = (
+    weakref.WeakValueDictionary()
+)
+
 _FACE_SUFFIXES: Final = ("px", "nx", "py", "ny", "pz", "nz")
 
 
@@ -112,6 +128,7 @@ class Scene:
     camera: Camera = field(default_factory=Camera)
     glow_intensity: float = 1.0
     serial: int = field(init=False, default_factory=lambda: next(_serials))
+    _contents: _Contents = field(init=False)
 
     def __post_init__(self) -> None:
         for name, kind, optional in (
@@ -128,6 +145,13 @@ class Scene:
         if intensity < 0.0:
             raise ValueError(f"glow_intensity is {intensity}; 0 or more is needed")
         object.__setattr__(self, "glow_intensity", intensity)
+        key = (id(self.body), id(self.glow), id(self.skybox))
+        object.__setattr__(self, "_contents", _contents.setdefault(key, _Contents()))
+
+    @property
+    def contents_serial(self) -> int:
+        """A number that just the scenes of the same meshes and sky share, whatever their camera."""
+        return self._contents.serial
 
     def __reduce__(self) -> tuple[type[Scene], tuple[Any, ...]]:
         # A copy gets a serial of its own: in another process this one's may be taken.
