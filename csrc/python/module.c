@@ -237,7 +237,6 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->renderer_type);
     Py_VISIT(state->batch_type);
     Py_VISIT(state->attributes);
-    Py_VISIT(state->lacking);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
     return 0;
@@ -250,7 +249,6 @@ static int clear(PyObject *module)
     Py_CLEAR(state->renderer_type);
     Py_CLEAR(state->batch_type);
     Py_CLEAR(state->attributes);
-    Py_CLEAR(state->lacking);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);
     return 0;

@@ -120,12 +120,21 @@ bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
 void vkb_renderer_leave(struct vkb_renderer *self)
 {
     PyEval_RestoreThread(self->thread);
-    if (self->open)
-        self->pipeline_count = self->frame.pipelines.entry_count;
+    if (self->open) {
+        self->pipeline_count = self->frame.pipelines.created;
+        self->cached = vkb_frame_cached(&self->frame);
+    }
     struct vkb_cargo *over = take_over(self);
     self->holder = 0;
     PyThread_release_lock(self->lock);
     release_all(over);
+}
+
+bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vkb_error *error)
+{
+    if (!self->open || (!done && error->kind == VKB_ERROR_INTERRUPTED))
+        return done;
+    return vkb_instance_check(&self->device.instance, error) && done;
 }
 
 // create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
@@ -183,6 +192,10 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     if (!PyArg_ParseTuple(arguments, "spsdO:Renderer", &adapter, &validation, &forms,
                           &frame_seconds, &read_cache))
         return NULL;
+    if (!(frame_seconds > 0.0)) {
+        PyErr_SetString(PyExc_ValueError, "frame_seconds: a number above 0 is needed");
+        return NULL;
+    }
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
     if (!self)
@@ -332,6 +345,15 @@ static PyObject *get_pipeline_count(PyObject *object, void *unused)
     return PyLong_FromSize_t(((struct vkb_renderer *)object)->pipeline_count);
 }
 
+static PyObject *get_cached(PyObject *object, void *unused)
+{
+    const struct vkb_cached *cached = &((struct vkb_renderer *)object)->cached;
+
+    (void)unused;
+    return Py_BuildValue("(nnK)", (Py_ssize_t)cached->pipelines, (Py_ssize_t)cached->framebuffers,
+                         (unsigned long long)cached->image_bytes);
+}
+
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Gives all back; may be called twice."},
     {"render", vkb_batch_of_scene, METH_VARARGS,
@@ -348,6 +370,8 @@ static PyGetSetDef attributes[] = {
     {"closed", get_closed, NULL, "Whether close() was called.", NULL},
     {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
     {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},
+    {"cached", get_cached, NULL,
+     "(pipelines, framebuffers, bytes of images) that are kept for later frames.", NULL},
     {0},
 };
 

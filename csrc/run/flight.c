@@ -88,6 +88,16 @@ bool vkb_flight_submit(struct vkb_device *device, struct vkb_flight *flight,
     return flight->airborne;
 }
 
+uint64_t vkb_flights_pending(const struct vkb_flights *flights, uint64_t now)
+{
+    uint64_t first = now;
+
+    for (size_t i = 0; i < flights->count; ++i)
+        if (flights->flights[i]->airborne && flights->flights[i]->number < first)
+            first = flights->flights[i]->number;
+    return first;
+}
+
 bool vkb_flight_over(const struct vkb_device *device, const struct vkb_flight *flight)
 {
     return !flight->airborne || vkb_commands_over(device, &flight->commands);

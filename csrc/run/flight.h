@@ -3,8 +3,8 @@
 #ifndef VKB_FLIGHT_H
 #define VKB_FLIGHT_H
 
-#include "vulkan/commands.h"
 #include "run/readback.h"
+#include "vulkan/commands.h"
 #include "vulkan/timing.h"
 
 struct vkb_flight {
@@ -15,6 +15,7 @@ struct vkb_flight {
     uint32_t descriptor_capacity;  // in sets
     struct vkb_timer timer;
     struct vkb_readback readback;
+    uint64_t number;           // of the submission; they count up
     struct vkb_point *points;  // what it runs; the submitter's
     uint32_t point_count;
     bool taken;     // by a submitter that has not given it back
@@ -35,6 +36,9 @@ bool vkb_flights_take(const struct vkb_device *device, struct vkb_flights *fligh
 // One that is in the air can be taken again when it has landed.
 void vkb_flights_give_back(const struct vkb_device *device, struct vkb_flights *flights,
                            struct vkb_flight *flight);
+
+// The number of the first submission in the air; `now` where there is none.
+uint64_t vkb_flights_pending(const struct vkb_flights *flights, uint64_t now);
 
 // Whether the device has run the flight, without a wait.
 bool vkb_flight_over(const struct vkb_device *device, const struct vkb_flight *flight);

@@ -3,12 +3,12 @@
 #ifndef VKB_FRAME_H
 #define VKB_FRAME_H
 
-#include "run/flight.h"
 #include "graph/graph.h"
+#include "run/flight.h"
 #include "run/pipeline.h"
-#include "scene/scene.h"
 #include "run/slots.h"
 #include "run/upload.h"
+#include "scene/scene.h"
 
 // The passes of the point that was recorded last, and what its source was.
 struct vkb_previous {
@@ -25,7 +25,8 @@ struct vkb_frame {
     struct vkb_upload upload;
     struct vkb_slots slots;
     struct vkb_previous previous;
-    bool stale;  // something failed: the images are made anew before anything is recorded
+    uint64_t submissions;  // so far
+    bool stale;            // something failed: the images are made anew before anything is recorded
 };
 
 // What graphs start from; what they do not use is NULL.
@@ -71,6 +72,13 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
 // Gives up a flight that nobody wants any more, without a wait; false where the device may still
 // be at work on it.
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight);
+
+// What is cached.
+struct vkb_cached {
+    size_t pipelines, framebuffers;
+    uint64_t image_bytes;
+};
+struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame);
 
 // Waits for all flights.
 bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error);

@@ -2,9 +2,9 @@
 #ifndef VKB_SCENE_H
 #define VKB_SCENE_H
 
-#include "vulkan/commands.h"
 #include "graph/params.h"
 #include "scene/texture.h"
+#include "vulkan/commands.h"
 
 // As the meshes lie on the device, tightly packed.
 struct vkb_vertex {
@@ -41,7 +41,7 @@ struct vkb_mesh_data {
 };
 
 struct vkb_scene_data {
-    uint64_t serial;  // differs between any two scenes; never 0
+    uint64_t serial;  // differs between any two scenes but by camera or intensity; never 0
     struct vkb_mesh_data body, glow;
     struct vkb_picture_data sky;
     struct vkb_texture_data *textures;

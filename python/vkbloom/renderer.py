@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from vkbloom import _core, batches, pipeline_cache
+from vkbloom import _core, requests
 from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
+from vkbloom.checks import check_size, check_time
 from vkbloom.frames import Frames
-from vkbloom.settings import Separable, Settings, check_size, check_time
+from vkbloom.io import pipeline_cache
+from vkbloom.settings import Separable, Settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vkbloom.scene import Mesh, Scene
-    from vkbloom.textures import Texture
+    from vkbloom.scene.textures import Texture
 
 Shading = Literal["forward", "deferred"]
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
@@ -235,7 +237,7 @@ class Renderer:
     def _repr_html_(self) -> str:
         """Return the table of `display.renderer_html`."""
         # Late: notebooks need it, and nothing else.
-        from vkbloom import display  # noqa: PLC0415
+        from vkbloom.views import display  # noqa: PLC0415
 
         return display.renderer_html(self)
 
@@ -387,7 +389,7 @@ class Renderer:
         """
         image = _check_image(image)
         names = _check_attachments(attachments)
-        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
+        return self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -418,7 +420,7 @@ class Renderer:
         As for `apply_many`.
         """
         arguments = _render_arguments(scene, size, shading, time, attachments)
-        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
+        return self._run_many(lambda: self._core.render(*arguments), settings_seq)
 
     def grid(
         self,
@@ -527,13 +529,14 @@ class Renderer:
     def _run_many(
         self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
     ) -> Iterator[Frames]:
+        # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
         checked = map(_check_settings, settings_seq)
-        for settings, result in batches.run(checked, open_batch, _allocator(self._core, None)):
-            yield self._frames(settings, result)
+        results = requests.run(checked, open_batch, _allocator(self._core, None))
+        return (self._frames(settings, result) for settings, result in results)
 
-    def _frames(self, settings: Settings, result: batches.Result) -> Frames:
+    def _frames(self, settings: Settings, result: requests.Result) -> Frames:
         self._save_pipelines()
         arrays, timings, (nan, inf) = result
         info = {**self._made_by, "nan": nan, "inf": inf}
@@ -610,7 +613,7 @@ def _scene_arrays(scene: Scene) -> Any:
         )
         for texture in numbers
     )
-    return scene.serial, body, glow, sky, textures
+    return scene.contents_serial, body, glow, sky, textures
 
 
 def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:

@@ -16,9 +16,10 @@ import pytest
 
 import vkbloom
 from tests.cli.processes import python
-from vkbloom import doctor, pipeline_cache
+from vkbloom import doctor
 from vkbloom.doctor import child, drivers, installation, trial
 from vkbloom.doctor.finding import Finding
+from vkbloom.io import pipeline_cache
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader works on Linux")
 

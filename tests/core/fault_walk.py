@@ -24,7 +24,7 @@ import vkbloom
 from tests.images import picture
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
-from vkbloom.textures import Texture
+from vkbloom.scene.textures import Texture
 
 OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4

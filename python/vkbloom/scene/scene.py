@@ -1,7 +1,7 @@
 """Scenes: meshes, the sky and the camera, as immutable values.
 
 Loading needs no Vulkan. What a scene holds is read-only, so a renderer may keep what it uploaded
-for as long as the scene's serial stays the same.
+for as long as the serial of the scene's contents stays the same.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import dataclasses
 import itertools
 import math
 import os
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -19,11 +20,26 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from . import skybox as sky
-from .skybox import Cubemap, SkyboxSource, read_only
-from .textures import WHITE, Surface
+from vkbloom.scene import skybox as sky
+from vkbloom.scene.skybox import Cubemap, SkyboxSource, read_only
+from vkbloom.scene.textures import WHITE, Surface
 
 _serials = itertools.count(1)
+
+
+class _Contents:
+    """What the scenes of the same meshes and sky share: one number, for as long as one is alive."""
+
+    def __init__(self) -> None:
+        self.serial = next(_serials)
+
+
+#: By the ids of body, glow and sky. A scene holds its contents and these three, so that no other
+#: object can have such an id while the entry is there.
+_contents: weakref.WeakValueDictionary[tuple[int, int, int], _Contents] = (
+    weakref.WeakValueDictionary()
+)
+
 _FACE_SUFFIXES: Final = ("px", "nx", "py", "ny", "pz", "nz")
 
 
@@ -204,6 +220,7 @@ class Scene:
     camera: Camera = field(default_factory=Camera)
     glow_intensity: float = 1.0
     serial: int = field(init=False, default_factory=lambda: next(_serials))
+    _contents: _Contents = field(init=False)
 
     def __post_init__(self) -> None:
         for name, kind, optional in (
@@ -220,6 +237,13 @@ class Scene:
         if intensity < 0.0:
             raise ValueError(f"glow_intensity is {intensity}; 0 or more is needed")
         object.__setattr__(self, "glow_intensity", intensity)
+        key = (id(self.body), id(self.glow), id(self.skybox))
+        object.__setattr__(self, "_contents", _contents.setdefault(key, _Contents()))
+
+    @property
+    def contents_serial(self) -> int:
+        """A number that just the scenes of the same meshes and sky share, whatever their camera."""
+        return self._contents.serial
 
     def __reduce__(self) -> tuple[type[Scene], tuple[Any, ...]]:
         # A copy gets a serial of its own: in another process this one's may be taken.
@@ -262,7 +286,7 @@ class Scene:
         Parameters
         ----------
         base : str or path-like
-            File of the mesh that is lit; see `vkbloom.gltf.load_mesh` for what is read.
+            File of the mesh that is lit; see `vkbloom.scene.gltf.load_mesh` for what is read.
         glow : str or path-like, optional
             File of the mesh that glows, or None.
         skybox : str, path-like, sequence of these, ndarray or Cubemap, optional
@@ -290,7 +314,7 @@ class Scene:
             pygltflib, or OpenImageIO for an image, is not installed.
         """
         # Imported late because gltf.py makes the Mesh defined here.
-        from . import gltf  # noqa: PLC0415
+        from vkbloom.scene import gltf  # noqa: PLC0415
 
         for name, path in (("base", base), ("glow", "" if glow is None else glow)):
             if not isinstance(path, str | os.PathLike):
@@ -351,7 +375,7 @@ class Scene:
     def _repr_html_(self) -> str:
         """Return the page of `display.scene_html`."""
         # Late: pictures are of no use where nobody looks.
-        from vkbloom import display  # noqa: PLC0415
+        from vkbloom.views import display  # noqa: PLC0415
 
         return display.scene_html(self)
 
