@@ -58,6 +58,11 @@ def real(array: NDArray[Any]) -> NDArray[np.float64]:
     return values / 255 if array.dtype == np.uint8 else values
 
 
+def colours(array: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the colours of a framebuffer in real units, without alpha."""
+    return real(array[..., :3])
+
+
 def assert_close(
     name: str, array: NDArray[Any], expected: NDArray[np.float64], limit: Limit
 ) -> None:
