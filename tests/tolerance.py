@@ -115,7 +115,8 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
         )
     if settings.bloom and _DTYPES[format] != image.dtype:
         # The coarser bloom's rounding goes through the composite into a finer final.
-        limits["final"] = limits["final"] + settings.intensity * limits["bloom"]
+        of_bloom = np.broadcast_to(limits["bloom"], frames["bloom"].shape)[..., : image.shape[2]]
+        limits["final"] = limits["final"] + settings.intensity * of_bloom
     for name, array in frames.items():
         assert_close(name, array, expected[name], limits[name])
         if name != "final":
