@@ -22,15 +22,6 @@ def _linear(encoded: float) -> float:
     return float(((encoded + 0.055) / 1.055) ** 2.4)
 
 
-def _check_composite(settings: Settings, *allowed: Composite) -> None:
-    """Raise ValueError unless the method has the composite."""
-    if settings.composite not in allowed:
-        raise ValueError(
-            f"composite: {settings.composite!r} is not one of {', '.join(allowed)}, "
-            f"which the method {settings.method} has"
-        )
-
-
 def _check_no_knee(settings: Settings) -> None:
     """Raise ValueError where a knee is asked of a method whose threshold has none."""
     if settings.knee != 0:
@@ -83,6 +74,7 @@ class BevyBloom(Settings):
     """
 
     method: ClassVar[str] = "bevy"
+    composites: ClassVar[tuple[Composite, ...]] = ("mix", "add")
 
     composite: Composite = "mix"
     intensity: float = _number("intensity", default=0.15)
@@ -94,7 +86,6 @@ class BevyBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "mix", "add")
         check_number("intensity", self.intensity, 0, 1)
 
 
@@ -131,6 +122,7 @@ class KinoBloom(Settings):
     """
 
     method: ClassVar[str] = "kino"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = _linear(0.8)
     knee: float = _number("knee", default=0.5)
@@ -141,7 +133,6 @@ class KinoBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "add")
         check_number("radius", self.radius, 1, 7)
 
 
@@ -184,6 +175,7 @@ class FilamentBloom(Settings):
     """
 
     method: ClassVar[str] = "filament"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = 1.0
     intensity: float = _number("intensity", default=0.1)
@@ -194,7 +186,6 @@ class FilamentBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "add")
         _check_no_knee(self)
         check_number("intensity", self.intensity, 0, 1)
         check_number("levels", self.levels, 1, 12)
@@ -239,6 +230,7 @@ class UrpBloom(Settings):
     """
 
     method: ClassVar[str] = "urp"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = _linear(0.9)
     knee: float = _number("knee", default=0.5)
@@ -246,11 +238,6 @@ class UrpBloom(Settings):
     scatter: float = _number("scatter")
     iterations: int = _number("iterations")
     clamp_max: float = _number("clamp_max")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_composite(self, "add")
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class HdrpBloom(Settings):
@@ -289,6 +276,7 @@ class HdrpBloom(Settings):
     """
 
     method: ClassVar[str] = "hdrp"
+    composites: ClassVar[tuple[Composite, ...]] = ("mix",)
 
     composite: Composite = "mix"
     intensity: float = _number("intensity", default=2**0.2 - 1)
@@ -298,7 +286,6 @@ class HdrpBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "mix")
         _check_no_knee(self)
         check_number("intensity", self.intensity, 0, 1)
         if self.threshold is not None:
@@ -343,6 +330,7 @@ class UnrealBloom(Settings):
     """
 
     method: ClassVar[str] = "unreal"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = 0.0
     intensity: float = _number("intensity", default=3.0)
@@ -352,6 +340,5 @@ class UnrealBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "add")
         _check_no_knee(self)
         check_number("radius", self.radius, 0, 1)

@@ -73,7 +73,7 @@ def passes(
         total += factor * sample(image, half)
     whole = sum(_factors(settings.radius)) if store.high == 1 else 1.0
     framebuffers["up_0"] = store(total / whole)
-    framebuffers["bloom"] = store(whole * sample(framebuffers["up_0"], size))
+    framebuffers["bloom"] = store.end(whole * sample(framebuffers["up_0"], size))
     return framebuffers
 
 
