@@ -28,13 +28,13 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
-	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*.c tools/threads/*.c
+	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/threads/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so
 
 format: build/stamp/lint
 	$(VENV)/bin/ruff check --fix-only .
 	$(VENV)/bin/ruff format .
-	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*.c tools/threads/*.c
+	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/threads/*.c
 
 # The suite once more over a core with ASan, UBSan and LeakSanitizer; threads under ThreadSanitizer.
 sanitize: build/stamp/core build/stamp/test

@@ -27,8 +27,8 @@ import vkbloom
 from vkbloom.explorer.viewer import Viewer
 
 # What starts both for the tests.
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
-from explorer_hosts import jupyterlab, served
+sys.path.append(str(Path(__file__).parents[1]))
+from tests.explorer.explorer_hosts import jupyterlab, served
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

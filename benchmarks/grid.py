@@ -147,7 +147,7 @@ def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) ->
 
 def kills() -> None:
     """Kill -9 ten times at random moments of the work, then finish: equal to the undisturbed."""
-    script = Path(__file__).parents[1] / "tests" / "grid_to_kill.py"
+    script = Path(__file__).parents[1] / "tests" / "grid" / "grid_to_kill.py"
     generator = random.Random(time.time_ns())
     with folder() as path:
         command = [sys.executable, str(script)]

@@ -9,10 +9,10 @@ set -eu
 cd "$(dirname "$0")/.."
 PYTHON=${PYTHON:-python3}
 if [ $# = 0 ]; then
-    for name in adapters apply apply_input array_memory batches core_arguments deferred \
-        deferred_passes errors forms graph interruption lesser_devices lifetime out_of_date \
-        pipeline_cache presets readback render scene separable settings skybox textures threads; do
-        set -- "$@" "tests/test_$name.py"
+    set -- tests/core tests/methods tests/scene
+    for name in core/faults core/frames core/mutations methods/dither methods/hdr_images \
+        methods/properties methods/reference scene/assets scene/gltf scene/gltf_textures; do
+        set -- "$@" "--ignore=tests/${name%/*}/test_${name#*/}.py"
     done
 fi
 folder=$PWD/build/coverage
@@ -27,12 +27,12 @@ CFLAGS=-O0 VKBLOOM_CFLAGS="-DVKBLOOM_FAULTS --coverage" VKBLOOM_LDFLAGS="--cover
 
 export PYTHONPATH="$PWD/python"
 set +e
-VKBLOOM_CACHE_DIR="" "$PYTHON" tests/fault_walk.py "${STRIDE:-8}" >"$folder/walk.txt"
+VKBLOOM_CACHE_DIR="" "$PYTHON" -m tests.core.fault_walk "${STRIDE:-8}" >"$folder/walk.txt"
 walked=$?
-VKBLOOM_CACHE_DIR="" "$PYTHON" tests/memory_walk.py
+VKBLOOM_CACHE_DIR="" "$PYTHON" -m tests.core.memory_walk
 walked=$((walked + $?))
 "$PYTHON" -m pytest -q -p no:cacheprovider -m "not slow" \
-    --deselect tests/test_faults.py::test_what_is_shipped_cannot_be_told_to_fail "$@"
+    --deselect tests/core/test_faults.py::test_what_is_shipped_cannot_be_told_to_fail "$@"
 tested=$?
 set -e
 "$PYTHON" tools/coverage_report.py . "$folder/uncovered.txt"

@@ -3,10 +3,10 @@
 #ifndef VKB_GRAPH_H
 #define VKB_GRAPH_H
 
-#include "vulkan/barrier.h"
-#include "vulkan/format.h"
 #include "graph/params.h"
 #include "spirv.h"
+#include "vulkan/barrier.h"
+#include "vulkan/format.h"
 
 enum {
     VKB_NAME_SIZE = 32,

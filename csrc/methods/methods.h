@@ -3,8 +3,8 @@
 #define VKB_METHODS_H
 
 #include "graph/graph.h"
-#include "scene/scene.h"
 #include "methods/settings.h"
+#include "scene/scene.h"
 
 struct vkb_size {
     uint32_t width, height;

@@ -2,8 +2,8 @@
 #ifndef VKB_SETTINGS_H
 #define VKB_SETTINGS_H
 
-#include "vulkan/format.h"
 #include "graph/params.h"
+#include "vulkan/format.h"
 
 #include <stdbool.h>
 

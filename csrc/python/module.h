@@ -7,9 +7,9 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
-#include "variants/forms.h"
-#include "run/frame.h"
 #include "methods/methods.h"
+#include "run/frame.h"
+#include "variants/forms.h"
 
 #include <stdatomic.h>
 

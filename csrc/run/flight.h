@@ -3,8 +3,8 @@
 #ifndef VKB_FLIGHT_H
 #define VKB_FLIGHT_H
 
-#include "vulkan/commands.h"
 #include "run/readback.h"
+#include "vulkan/commands.h"
 #include "vulkan/timing.h"
 
 struct vkb_flight {

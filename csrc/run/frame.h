@@ -3,12 +3,12 @@
 #ifndef VKB_FRAME_H
 #define VKB_FRAME_H
 
-#include "run/flight.h"
 #include "graph/graph.h"
+#include "run/flight.h"
 #include "run/pipeline.h"
-#include "scene/scene.h"
 #include "run/slots.h"
 #include "run/upload.h"
+#include "scene/scene.h"
 
 // The passes of the point that was recorded last, and what its source was.
 struct vkb_previous {

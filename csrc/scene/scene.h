@@ -2,9 +2,9 @@
 #ifndef VKB_SCENE_H
 #define VKB_SCENE_H
 
-#include "vulkan/commands.h"
 #include "graph/params.h"
 #include "scene/texture.h"
+#include "vulkan/commands.h"
 
 // As the meshes lie on the device, tightly packed.
 struct vkb_vertex {

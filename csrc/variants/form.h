@@ -3,8 +3,8 @@
 #ifndef VKB_FORM_H
 #define VKB_FORM_H
 
-#include "variants/forms.h"
 #include "methods/methods.h"
+#include "variants/forms.h"
 
 // The choice of forms for one graph: the passes of `plain` to those of `graph`.
 struct vkb_form_choice {

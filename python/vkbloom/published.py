@@ -12,7 +12,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number, check_number
+from vkbloom.checks import check_number
+from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number
 
 __all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UnrealBloom", "UrpBloom"]
 
@@ -22,7 +23,7 @@ def _linear(encoded: float) -> float:
     return float(((encoded + 0.055) / 1.055) ** 2.4)
 
 
-def _check_no_knee(settings: Settings) -> None:
+def check_no_knee(settings: Settings) -> None:
     """Raise ValueError where a knee is asked of a method whose threshold has none."""
     if settings.knee != 0:
         raise ValueError(
@@ -186,7 +187,7 @@ class FilamentBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_no_knee(self)
+        check_no_knee(self)
         check_number("intensity", self.intensity, 0, 1)
         check_number("levels", self.levels, 1, 12)
 
@@ -239,6 +240,7 @@ class UrpBloom(Settings):
     iterations: int = _number("iterations")
     clamp_max: float = _number("clamp_max")
 
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class HdrpBloom(Settings):
     """Bloom of Unity's High Definition Render Pipeline, without a threshold, at half resolution.
@@ -286,7 +288,7 @@ class HdrpBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_no_knee(self)
+        check_no_knee(self)
         check_number("intensity", self.intensity, 0, 1)
         if self.threshold is not None:
             raise ValueError(
@@ -305,11 +307,13 @@ class UnrealBloom(Settings):
         0 to 1: from the factors 1, 0.8, 0.6, 0.4, 0.2 of the levels to 0.2, 0.4, 0.6, 0.8, 1.
     smooth_width : float
         Luminance over which the threshold fades in, 0.0001 to 65504.
+    node : bool
+        As three.js' BloomNode has it, the successor for WebGPU: the sizes are floored.
     threshold : float or None
         Luminance where that begins.
     composite : {"add"}
     intensity : float
-        Three times three.js' strength.
+        Three times three.js' strength; with `node` the strength itself, so ``intensity=1``.
     **settings
         The other fields of `Settings`; there is no knee.
 
@@ -322,6 +326,10 @@ class UnrealBloom(Settings):
     weights 0.39894 exp(-i^2 / (2 sigma^2)) / sigma, -R < i < R, R = 6, 10, 14, 18, 22 and
     sigma = R / 3, not normalized. ``up_0`` is the sum of the levels, bilinear, times their
     factors, ``bloom`` one bilinear sample of it. In "rgba8unorm" up_0 is a third of that.
+
+    With `node` all halves are floored, never under 1, and the luminance has the weights of Rec. 709
+    with four digits. Newer versions of BloomNode merge neighbouring taps into one bilinear fetch,
+    which differs where a level is read at another size, and is left out.
 
     Source: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since pull requests
     #31528 (kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js
@@ -337,8 +345,9 @@ class UnrealBloom(Settings):
     format: BloomFormat | None = "rgba16float"
     radius: float = _number("radius", default=0.0)
     smooth_width: float = _number("smooth_width")
+    node: bool = _flag("node")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_no_knee(self)
+        check_no_knee(self)
         check_number("radius", self.radius, 0, 1)

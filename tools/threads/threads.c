@@ -3,10 +3,10 @@
 // shares others, as renderer.c and batch.c do it: one lock a renderer around all that touches its
 // device, and one mutex in place of the GIL around what those keep under it. Every picture is
 // compared with one that was made before by one thread alone.
-#include "variants/forms.h"
-#include "run/frame.h"
 #include "methods/methods.h"
+#include "run/frame.h"
 #include "run/pages.h"
+#include "variants/forms.h"
 
 #include <pthread.h>
 #include <stdatomic.h>

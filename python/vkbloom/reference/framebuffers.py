@@ -60,7 +60,7 @@ class _Method(NamedTuple):
 
 _METHODS = {
     "separable": _Method(separable.passes, separable.gain),
-    "pyramid": _Method(pyramid.passes, pyramid.gain),
+    "pyramid": _Method(pyramid.passes, pyramid.gain, sized=True),
     "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
     "bevy": _Method(bevy.passes, bevy.gain, published=True),
     "filament": _Method(filament.passes, filament.gain, published=True),

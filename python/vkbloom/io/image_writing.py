@@ -1,0 +1,241 @@
+"""Pictures written to image files, in numbers and colours that the format has a place for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import import_extra
+from vkbloom.io import safe_writing
+from vkbloom.io.images import DTYPES, KEPT_ATTRIBUTES, SPACES, Colour, Encoding, Picture
+from vkbloom.io.srgb import encode_srgb
+
+if TYPE_CHECKING:
+    import OpenImageIO
+
+__all__ = ["check_writable", "save"]
+
+# The numbers to write, best first, by those that the picture came with. 16 bits come last for
+# floats, because files of 8 bits are what a PNG of a float picture is expected to be.
+_PREFERENCES: Final[Mapping[str, tuple[str, ...]]] = {
+    "uint8": ("uint8", "float", "half", "uint16"),
+    "uint16": ("uint16", "float", "half", "uint8"),
+    "half": ("half", "float", "uint8", "uint16"),
+    "float": ("float", "half", "uint8", "uint16"),
+    "double": ("float", "half", "uint8", "uint16"),
+}
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Find out whether a file's extension is of a format that can be written.
+
+    Parameters
+    ----------
+    path : str or path-like
+
+    Raises
+    ------
+    ValueError
+        It is not.
+    ModuleNotFoundError
+        OpenImageIO is missing.
+    """
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    safe_writing.check_extension(oiio, Path(path).suffix)
+
+
+def save(
+    picture: Picture,
+    path: str | os.PathLike[str],
+    colour: Colour | None = None,
+    attributes: Mapping[str, str] | None = None,
+) -> tuple[str, ...]:
+    """Write a picture to a file, in the numbers that it came with or the next best ones.
+
+    Grey becomes one channel and windows are kept where the format has such; else grey becomes
+    RGB, and what is outside the display window is cut off. NaN becomes 0 and infinity 1 in
+    integers, which hold 0..1. Alpha is written as it is.
+
+    Parameters
+    ----------
+    picture : Picture
+    path : str or path-like
+        With an extension that OpenImageIO writes. What is there is replaced, when the whole file
+        is written under another name.
+    colour : {"linear", "srgb"}, optional
+        What the colours in the file shall be. By default integers are sRGB and floats linear.
+    attributes : mapping of str to str, optional
+        Added to the file where its format has a place for them.
+
+    Returns
+    -------
+    tuple of str
+        What the user may want to know about what the file could not hold.
+
+    Raises
+    ------
+    ValueError
+        The extension is unknown; the format cannot hold pictures of this kind; `colour` is given
+        for a picture that is not linear.
+    OSError
+        The file cannot be written; it names the file, and no half file is left.
+    ModuleNotFoundError
+        OpenImageIO is missing.
+    """
+    if colour is not None and picture.encoding != "linear":
+        raise ValueError(f"colour: {colour!r} needs a linear picture, not {picture.encoding}")
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    target = Path(path)
+    safe_writing.check_extension(oiio, target.suffix)
+    temporary = safe_writing.reserve(target, [picture.values])
+    try:
+        notes = _write(oiio, picture, colour, temporary, target, attributes=attributes or {})
+        safe_writing.check_complete(oiio, temporary, target)
+        safe_writing.put_in_place(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return notes
+
+
+def _write(
+    oiio: ModuleType,
+    picture: Picture,
+    colour: Colour | None,
+    temporary: Path,
+    target: Path,
+    *,
+    attributes: Mapping[str, str],
+) -> tuple[str, ...]:
+    writer = oiio.ImageOutput.create(str(temporary))
+    chosen = _chosen_form(oiio, picture, writer, temporary)
+    if chosen is None:
+        raise ValueError(f"{target}: {writer.format_name()} cannot hold such a picture")
+    values, numbers = chosen
+    integer = numbers.startswith("uint")
+    has_alpha = values.shape[2] in (2, 4)
+    notes = _losses(picture, target, values, has_alpha, integer)
+    encoding = picture.encoding
+    if encoding == "linear" and (colour or ("srgb" if integer else "linear")) == "srgb":
+        values, encoding = _encoded(values, has_alpha), "srgb"
+    values = _as_numbers(values, numbers)
+
+    stored = picture.stored
+    x, y, width, height = stored.display
+    if not writer.supports("displaywindow"):
+        row, column = y - stored.origin[1], x - stored.origin[0]
+        values = values[row : row + height, column : column + width]
+    spec = oiio.ImageSpec(values.shape[1], values.shape[0], values.shape[2], numbers)
+    if values.shape[2] < 3:
+        spec.channelnames = ("Y", "A")[: values.shape[2]]
+        spec.alpha_channel = 1 if has_alpha else -1
+    if writer.supports("displaywindow"):
+        spec.x, spec.y = stored.origin
+        spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
+    _describe(spec, picture, encoding, target)
+    for name, text in attributes.items():
+        spec.attribute(name, text)
+    is_written = (
+        writer.open(str(temporary), spec)
+        and writer.write_image(np.ascontiguousarray(values))
+        and writer.close()
+    )
+    if not is_written:
+        raise safe_writing.write_error(writer, temporary, target)
+    # An error that nobody asked for would be printed when the writer is gone.
+    writer.geterror()
+    return tuple(notes)
+
+
+def _chosen_form(
+    oiio: ModuleType, picture: Picture, writer: OpenImageIO.ImageOutput, temporary: Path
+) -> tuple[NDArray[Any], str] | None:
+    """Return the channels and the numbers to write, those most like the picture's first."""
+    for values in _layouts(picture, writer.supports("alpha") != 0):
+        for numbers in _PREFERENCES[picture.numbers]:
+            if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
+                return values, numbers
+    return None
+
+
+def _layouts(picture: Picture, with_alpha: bool) -> Iterator[NDArray[Any]]:
+    forms = [picture.values, picture.pixels] if picture.grey else [picture.pixels]
+    if with_alpha:
+        yield from forms
+    if picture.pixels.shape[2] == 4:
+        yield from (form[:, :, :-1] for form in forms)
+    elif not with_alpha:
+        yield from forms
+
+
+def _losses(
+    picture: Picture, target: Path, values: NDArray[Any], has_alpha: bool, integer: bool
+) -> list[str]:
+    """Say what the file cannot hold of a picture, or will be read differently."""
+    notes: list[str] = []
+    is_float = values.dtype.kind == "f"
+    if picture.pixels.shape[2] == 4:
+        opaque = 1.0 if is_float else np.iinfo(values.dtype).max
+        is_opaque = bool((picture.pixels[:, :, 3] == opaque).all())
+        suffix = target.suffix.lower()
+        # TIFF says for each file which of the two it is.
+        associated = (suffix == ".exr") if suffix not in (".tif", ".tiff") else None
+        if not has_alpha and not is_opaque:
+            notes.append(f"{target} has no place for the alpha, which is not 1 everywhere")
+        elif has_alpha and not is_opaque and associated is (not picture.stored.associated):
+            notes.append(
+                f"colours and alpha are written to {target} as they are, although readers of it "
+                f"take the colours as {'' if associated else 'not '}multiplied by alpha"
+            )
+    if integer and is_float and not np.isfinite(values).all():
+        notes.append(f"{target} holds integers: NaN is written as 0, infinity as 1")
+    return notes
+
+
+def _encoded(values: NDArray[Any], has_alpha: bool) -> NDArray[np.float32]:
+    colours = values.shape[2] - has_alpha
+    encoded = values.astype(np.float32)
+    encoded[:, :, :colours] = encode_srgb(encoded[:, :, :colours])
+    return encoded
+
+
+def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
+    """Return values as the numbers of a file, whose 1 is the largest for integers."""
+    dtype = DTYPES[numbers]
+    if values.dtype.kind == "u":
+        if values.dtype == dtype:
+            return values
+        values = values / np.float32(np.iinfo(values.dtype).max)
+    if dtype.kind == "f":
+        return values.astype(dtype, copy=False)
+    clipped = np.clip(np.nan_to_num(values.astype(np.float32), nan=0.0), 0.0, 1.0)
+    whole: NDArray[Any] = np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
+    return whole
+
+
+def _describe(
+    spec: OpenImageIO.ImageSpec, picture: Picture, encoding: Encoding | None, target: Path
+) -> None:
+    """Say in a file what its colours, its alpha and its pixels are."""
+    is_exr = target.suffix.lower() == ".exr"
+    stored = picture.stored
+    space = stored.space if encoding is None else SPACES[encoding]
+    # In OpenEXR linear goes without saying, and the primaries are in another attribute.
+    if space and not (is_exr and encoding == "linear"):
+        spec.attribute("oiio:ColorSpace", space)
+    # Else OpenImageIO divides the colours by alpha where the format has them plain; TIFF can say
+    # what they are.
+    is_tiff = target.suffix.lower() in (".tif", ".tiff")
+    if not is_exr and not (is_tiff and stored.associated):
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+    # A profile describes encoded colours, not those of a picture that was written linear.
+    profiles = ("ICCProfile",) if encoding in ("srgb", None) else ()
+    for name in (*KEPT_ATTRIBUTES, *profiles):
+        if name in stored.attributes:
+            kind, value = stored.attributes[name]
+            spec.attribute(name, kind, value)

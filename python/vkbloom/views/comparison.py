@@ -1,0 +1,515 @@
+"""Two images compared: how much they differ, where, and what makes them incomparable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import check_number, import_extra
+from vkbloom.io.srgb import decode_srgb
+
+__all__ = ["Comparison", "Limits", "Metric", "compare", "difference", "flip_map"]
+
+Metric = Literal["ssim", "psnr", "flip"]
+
+_DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
+# Taps to a side of scikit-image's default window.
+_SSIM_WINDOW: Final = 7
+_METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """How much two images may differ.
+
+    Parameters
+    ----------
+    max_error : float or None
+        Largest difference of a value that is allowed, integers counting as 0 to 1. Only up to
+        `fail_percent` percent of the pixels may exceed it.
+    min_ssim : float or None
+        Smallest structural similarity that is allowed, -1 to 1.
+    min_psnr : float or None
+        Smallest peak signal-to-noise ratio that is allowed, in dB.
+    max_flip : float or None
+        Largest mean FLIP that is allowed, 0 to 1.
+    fail_percent : float or None
+        Percentage of pixels that may differ by more than `max_error` (by anything without one),
+        0 to 100.
+
+    Raises
+    ------
+    ValueError
+        A limit is out of its range; names the field, the value and the range.
+    TypeError
+        A limit is no number.
+    """
+
+    max_error: float | None = None
+    min_ssim: float | None = None
+    min_psnr: float | None = None
+    max_flip: float | None = None
+    fail_percent: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("max_error", 0.0, math.inf),
+            ("min_ssim", -1.0, 1.0),
+            ("min_psnr", -math.inf, math.inf),
+            ("max_flip", 0.0, 1.0),
+            ("fail_percent", 0.0, 100.0),
+        ):
+            value = getattr(self, name)
+            if value is not None:
+                check_number(name, value, low, high)
+
+    @property
+    def are_none(self) -> bool:
+        """Whether there is no limit at all."""
+        return all(getattr(self, field.name) is None for field in fields(self))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """What comparing two images found out.
+
+    Parameters
+    ----------
+    mismatches : tuple of str
+        Reasons for which the images are no match, whatever the limits: another shape, integers
+        against floats, NaN or infinity. Where shape or kind differ, the figures are None.
+    max_error : float or None
+        Largest absolute difference of two finite values, integers counting as 0 to 1.
+    max_error_at : (int, int, int) or None
+        Where: x, y and channel. None where there is no error.
+    max_error_values : (float, float) or None
+        The two values there.
+    mean_error : float or None
+        Mean absolute difference of all finite values.
+    percent_over : float or None
+        Percentage of pixels of which a channel differs by more than `threshold` and `relative`
+        allow, or is not finite in one image only.
+    threshold, relative : float
+        As given to `compare`.
+    data_range : float or None
+        Of SSIM and PSNR.
+    ssim, psnr, flip : float or None
+        Structural similarity, peak signal-to-noise ratio in dB (inf where nothing differs) and
+        mean FLIP.
+    not_computed : mapping of str to str
+        Why one of these three is None, by its name; "not asked for" too.
+    """
+
+    mismatches: tuple[str, ...]
+    threshold: float
+    relative: float = 0.0
+    max_error: float | None = None
+    max_error_at: tuple[int, int, int] | None = None
+    max_error_values: tuple[float, float] | None = None
+    mean_error: float | None = None
+    percent_over: float | None = None
+    data_range: float | None = None
+    ssim: float | None = None
+    psnr: float | None = None
+    flip: float | None = None
+    not_computed: Mapping[str, str]
+
+    @property
+    def identical(self) -> bool:
+        """Whether all values are equal."""
+        return not self.mismatches and not self.max_error
+
+    def failures(self, limits: Limits | None = None) -> tuple[str, ...]:
+        """Tell what is beyond the limits.
+
+        Parameters
+        ----------
+        limits : Limits, optional
+            Without any, the images must be identical.
+
+        Returns
+        -------
+        tuple of str
+            One reason each; empty if the images pass. Mismatches always fail, and so does a
+            figure that has a limit but could not be computed.
+
+        Raises
+        ------
+        ValueError
+            `limits` has both `fail_percent` and `max_error`, and the comparison was not made with
+            the latter as `threshold`.
+        """
+        limits = limits or Limits()
+        reasons = list(self.mismatches)
+        if limits.are_none and self.max_error:
+            reasons.append("the images differ")
+        if limits.fail_percent is None:
+            reasons += self._beyond("max_error", limits.max_error, is_most=True)
+        else:
+            if self.threshold != (limits.max_error or 0.0):
+                raise ValueError(
+                    f"max_error: {limits.max_error!r} is not the threshold {self.threshold!r} of "
+                    "this comparison"
+                )
+            reasons += self._beyond("percent_over", limits.fail_percent, is_most=True)
+        reasons += self._beyond("ssim", limits.min_ssim, is_most=False)
+        reasons += self._beyond("psnr", limits.min_psnr, is_most=False)
+        reasons += self._beyond("flip", limits.max_flip, is_most=True)
+        return tuple(reasons)
+
+    def _beyond(self, name: str, limit: float | None, *, is_most: bool) -> list[str]:
+        """Return why a figure fails, an empty list if it does not."""
+        value = getattr(self, name)
+        label = "percentage of pixels" if name == "percent_over" else name.replace("_", " ")
+        if limit is None:
+            return []
+        if value is None:
+            # Of images that are no match, that is said already.
+            why = self.not_computed.get(name, "no values to compare")
+            return [] if self.mismatches else [f"{label} has a limit and is not computed: {why}"]
+        if is_most and value > limit:
+            return [f"{label} {value:.6g} is over {limit:.6g}"]
+        if not is_most and value < limit:
+            return [f"{label} {value:.6g} is under {limit:.6g}"]
+        return []
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two images of one shape, as float64, with the values that are not finite set to 0.
+
+    Integers are scaled to 0..1; `error` is exact for them. `valid` is where both are finite.
+    """
+
+    a: NDArray[np.float64]
+    b: NDArray[np.float64]
+    error: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    unequal: NDArray[np.bool_]
+    is_integer: bool
+
+
+def compare(
+    a: NDArray[Any],
+    b: NDArray[Any],
+    *,
+    threshold: float = 0.0,
+    relative: float = 0.0,
+    allow_nan: bool = False,
+    data_range: float | None = None,
+    metrics: Collection[Metric] = _METRICS,
+) -> Comparison:
+    """Compare two images.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (H, W) or (H, W, C)
+        uint8, uint16 (both compared as 0 to 1), float16, float32 or float64. `a` is the
+        reference. All channels count, alpha as any other, but for FLIP, which takes the first
+        three, or the first alone as grey.
+    threshold : float, default 0
+        Difference from which on, exclusively, a pixel counts in `percent_over`.
+    relative : float, default 0
+        Added to `threshold`, times the absolute value that `a` has.
+    allow_nan : bool, default False
+        Take NaN, and infinity of one sign, as equal where both images have it.
+    data_range : float, optional
+        Of SSIM and PSNR. By default 1 for integers, and for floats what their values span
+        together with 0 and 1, so that images within 0..1 have 1.
+    metrics : collection of {"ssim", "psnr", "flip"}
+        Which of the three to compute; the others are None. They cost far more than the rest.
+
+    Returns
+    -------
+    Comparison
+        SSIM and PSNR are scikit-image's (SSIM with its window of 7 x 7), FLIP is OpenImageIO's:
+        for integers, decoded from sRGB, LDR-FLIP; for floats, taken as linear, HDR-FLIP with
+        OpenImageIO's exposures, which are made for luminances up to 2. Values that are not
+        finite count as 0 in SSIM and FLIP and not at all in the others.
+
+    Raises
+    ------
+    TypeError
+        An image is no array of one of these types.
+    ValueError
+        An image has another number of dimensions or no pixel; `threshold`, `relative` or
+        `data_range` is out of range, or a metric is unknown.
+    ModuleNotFoundError
+        scikit-image (for SSIM and PSNR) or OpenImageIO (for FLIP) is missing.
+    """
+    check_number("threshold", threshold, 0.0, math.inf)
+    check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
+    if unknown := [name for name in metrics if name not in _METRICS]:
+        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(_METRICS)}")
+    if data_range is not None and not 0 < data_range < math.inf:
+        raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
+    a, b = _checked("a", a), _checked("b", b)
+    mismatches = _mismatches(a, b)
+    if mismatches:
+        return Comparison(
+            mismatches=mismatches,
+            threshold=threshold,
+            relative=relative,
+            not_computed=dict.fromkeys(("ssim", "psnr", "flip"), "the images are no match"),
+        )
+    pair = _pair(a, b)
+    unequal, common = pair.unequal, ~pair.valid & ~pair.unequal
+    if unequal.any():
+        mismatches += (f"NaN or infinity in one image only, {_places(unequal)}",)
+    if common.any() and not allow_nan:
+        mismatches += (f"NaN or infinity in both images, {_places(common)}",)
+    if data_range is None:
+        data_range = 1.0 if pair.is_integer else _span(pair)
+    computed, not_computed = _metrics(pair, data_range, metrics)
+    over = _over(pair, threshold, relative)
+    place, values = _largest(pair)
+    is_any = bool(pair.valid.any())
+    return Comparison(
+        mismatches=mismatches,
+        threshold=threshold,
+        relative=relative,
+        max_error=float(pair.error.max()) if is_any else None,
+        max_error_at=place,
+        max_error_values=values,
+        mean_error=float(pair.error.mean(where=pair.valid)) if is_any else None,
+        percent_over=100.0 * float(over.any(axis=2).mean()),
+        data_range=data_range,
+        not_computed=not_computed,
+        **computed,
+    )
+
+
+def difference(
+    a: NDArray[Any], b: NDArray[Any], scale: float | None = None
+) -> tuple[NDArray[np.float32], float]:
+    """Make a picture of where two images differ.
+
+    Parameters
+    ----------
+    a, b : ndarray
+        As for `compare`, of one shape, both integers or both floats.
+    scale : float, optional
+        What the differences are multiplied with, above 0. By default so that the largest
+        becomes 1.
+
+    Returns
+    -------
+    picture : ndarray, shape (H, W, 3)
+        Absolute differences of red, green and blue in 0..1, or those of one channel in grey;
+        those of further channels, such as alpha, brighten all three. Magenta where one image
+        only is not finite.
+    scale : float
+        As given, or as found; 1 where nothing differs.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `compare`; also for images that it calls no match.
+    """
+    if scale is not None and not 0 < scale < math.inf:
+        raise ValueError(f"scale: {scale!r} is out of range, finite and above 0")
+    a, b = _checked("a", a), _checked("b", b)
+    mismatches = _mismatches(a, b)
+    if mismatches:
+        raise ValueError(f"there is no difference picture: {'; '.join(mismatches)}")
+    pair = _pair(a, b)
+    largest = min(float(pair.error.max()), float(np.finfo(np.float64).max))
+    if scale is None:
+        scale = 1.0 / largest if largest else 1.0
+    colours = 3 if a.shape[2] >= 3 else 1
+    picture = np.repeat(pair.error[:, :, :colours], 3 // colours, axis=2)
+    if a.shape[2] > colours:
+        others = pair.error[:, :, colours:].max(axis=2, keepdims=True)
+        picture = np.maximum(picture, others)
+    with np.errstate(over="ignore"):
+        picture = np.minimum(np.minimum(picture, largest) * scale, 1.0)
+    picture[pair.unequal.any(axis=2)] = (1.0, 0.0, 1.0)
+    return picture.astype(np.float32), scale
+
+
+def _checked(name: str, image: NDArray[Any]) -> NDArray[Any]:
+    """Return an image as (H, W, C)."""
+    if not isinstance(image, np.ndarray):
+        raise TypeError(f"{name}: an array is needed, not {type(image).__name__}")
+    if image.dtype.name not in _DTYPES:
+        raise TypeError(f"{name}: dtype {image.dtype} is not one of {', '.join(_DTYPES)}")
+    if image.ndim not in (2, 3) or image.size == 0:
+        raise ValueError(
+            f"{name}: shape {image.shape} is not (H, W) or (H, W, C) with sides of at least 1"
+        )
+    return np.atleast_3d(image)
+
+
+def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
+    """Tell what keeps two images from being compared value by value."""
+    found: list[str] = []
+    if a.shape[:2] != b.shape[:2]:
+        sizes = (f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))
+        found.append(f"the sizes differ, {' against '.join(sizes)}")
+    if a.shape[2] != b.shape[2]:
+        found.append(f"the numbers of channels differ, {a.shape[2]} against {b.shape[2]}")
+    if a.dtype.kind != b.dtype.kind:
+        found.append(f"integers against floats, {a.dtype} against {b.dtype}")
+    return tuple(found)
+
+
+def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
+    if a.dtype.kind == "u":
+        scale = max(np.iinfo(a.dtype).max, np.iinfo(b.dtype).max)
+        # 65535 is 257 times 255, so 8-bit values keep their places among those of 16 bits.
+        whole_a, whole_b = (
+            image.astype(np.int32) * (scale // np.iinfo(image.dtype).max) for image in (a, b)
+        )
+        everywhere = np.ones(a.shape, np.bool_)
+        error = np.abs(whole_a - whole_b) / scale
+        return _Pair(whole_a / scale, whole_b / scale, error, everywhere, ~everywhere, True)
+    finite_a, finite_b = np.isfinite(a), np.isfinite(b)
+    valid = finite_a & finite_b
+    same = (a == b) | (np.isnan(a) & np.isnan(b))
+    plain_a = np.where(valid, a, 0).astype(np.float64)
+    plain_b = np.where(valid, b, 0).astype(np.float64)
+    # Doubles of both signs may be further apart than the largest of them.
+    with np.errstate(over="ignore"):
+        error = np.abs(plain_a - plain_b)
+    return _Pair(plain_a, plain_b, error, valid, ~valid & ~same, False)
+
+
+def _over(pair: _Pair, threshold: float, relative: float) -> NDArray[np.bool_]:
+    """Return which values differ by more than the thresholds, or are finite in one image only."""
+    with np.errstate(over="ignore"):
+        allowed = threshold + relative * np.abs(pair.a)
+    over: NDArray[np.bool_] = (pair.error > allowed) | pair.unequal
+    return over
+
+
+def _places(where: NDArray[np.bool_]) -> str:
+    """Describe how many values of an (H, W, C) image are meant, and which is the first."""
+    y, x, channel = (int(index[0]) for index in np.nonzero(where))
+    return f"{int(where.sum())} values, the first at x {x}, y {y}, channel {channel}"
+
+
+def _span(pair: _Pair) -> float:
+    low = min(0.0, float(pair.a.min()), float(pair.b.min()))
+    high = max(1.0, float(pair.a.max()), float(pair.b.max()))
+    return high - low
+
+
+def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, float] | None]:
+    """Return place (x, y, channel) and values of the largest error, None without any."""
+    index = np.unravel_index(int(pair.error.argmax()), pair.error.shape)
+    if not pair.error[index]:
+        return None, None
+    y, x, channel = (int(number) for number in index)
+    return (x, y, channel), (float(pair.a[index]), float(pair.b[index]))
+
+
+def _metrics(
+    pair: _Pair, data_range: float, wanted: Collection[Metric]
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Return the metrics that can be computed, and why the others are not, by their names."""
+    computed: dict[str, float] = {}
+    reasons: dict[str, str] = {name: "not asked for" for name in _METRICS if name not in wanted}
+    # Extreme floats end in a figure that is not finite, which is looked at below.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if "ssim" in wanted:
+            _add_ssim(pair, data_range, computed, reasons)
+        if "psnr" in wanted:
+            _add_psnr(pair, data_range, computed, reasons)
+    if "flip" in wanted:
+        if hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
+            computed["flip"] = float(_flip(pair).mean(dtype=np.float64))
+        else:
+            reasons["flip"] = "OpenImageIO 3.2 is needed"
+    for name, value in list(computed.items()):
+        if math.isnan(value) or value == -math.inf:
+            reasons[name] = "the values are too large"
+            del computed[name]
+    return computed, reasons
+
+
+def _add_ssim(
+    pair: _Pair, data_range: float, computed: dict[str, float], reasons: dict[str, str]
+) -> None:
+    metrics = import_extra("skimage.metrics", "quality", "Comparing images")
+    if min(pair.a.shape[:2]) < _SSIM_WINDOW:
+        reasons["ssim"] = f"a side is under the window's {_SSIM_WINDOW} pixels"
+        return
+    computed["ssim"] = float(
+        metrics.structural_similarity(
+            pair.a, pair.b, win_size=_SSIM_WINDOW, data_range=data_range, channel_axis=-1
+        )
+    )
+
+
+def _add_psnr(
+    pair: _Pair, data_range: float, computed: dict[str, float], reasons: dict[str, str]
+) -> None:
+    metrics = import_extra("skimage.metrics", "quality", "Comparing images")
+    if not pair.valid.any():
+        reasons["psnr"] = "no values to compare"
+    elif not pair.error.any():
+        computed["psnr"] = math.inf
+    else:
+        computed["psnr"] = float(
+            metrics.peak_signal_noise_ratio(
+                pair.a[pair.valid], pair.b[pair.valid], data_range=data_range
+            )
+        )
+
+
+def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
+    """Return FLIP of every pixel, whose mean is the figure of `compare`.
+
+    Parameters
+    ----------
+    a, b : ndarray
+        As for `compare`, of one shape, both integers or both floats.
+
+    Returns
+    -------
+    ndarray, shape (H, W)
+        0 (no difference that is seen) to 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `compare`; also for images that it calls no match.
+    ModuleNotFoundError
+        OpenImageIO 3.2 or later is missing.
+    """
+    a, b = _checked("a", a), _checked("b", b)
+    mismatches = _mismatches(a, b)
+    if mismatches:
+        raise ValueError(f"there is no FLIP: {'; '.join(mismatches)}")
+    if not hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
+        raise ModuleNotFoundError("FLIP needs OpenImageIO 3.2: pip install vkbloom[images]")
+    return _flip(_pair(a, b))
+
+
+def _oiio() -> Any:
+    return import_extra("OpenImageIO", "images", "Comparing images")
+
+
+def _flip(pair: _Pair) -> NDArray[np.float32]:
+    """Return OpenImageIO's FLIP of every pixel.
+
+    Sources: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020;
+    "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021.
+    """
+    oiio = _oiio()
+    colours = 3 if pair.a.shape[2] >= 3 else 1
+    largest = np.finfo(np.float32).max
+    buffers = []
+    for image in (pair.a, pair.b):
+        linear = image[:, :, :colours]
+        if pair.is_integer:
+            linear = decode_srgb(linear)
+        limited = np.clip(linear, -largest, largest).astype(np.float32)
+        buffers.append(oiio.ImageBuf(np.repeat(limited, 3 // colours, axis=2)))
+    errors = oiio.ImageBufAlgo.FLIP_diff(*buffers, hdr=0 if pair.is_integer else 1)
+    return np.asarray(errors.get_pixels(), np.float32)[:, :, 0]

@@ -1,0 +1,393 @@
+"""Pictures of framebuffers to look at: PNG, and contact sheets as HTML and as PNG."""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+import struct
+import warnings
+import zlib
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import check_index, import_extra
+from vkbloom.io.srgb import encode_srgb
+from vkbloom.views.dimensions import leading
+
+if TYPE_CHECKING:
+    from vkbloom.frames import Frames
+
+__all__ = [
+    "contact_sheet_html",
+    "contact_sheet_png",
+    "labelled",
+    "leading_png",
+    "picture",
+    "png",
+    "resized",
+    "scaled",
+]
+
+_THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
+
+
+def leading_png(frames: Frames) -> bytes:
+    """Return the picture of `final`, or else the last image, or else the last framebuffer.
+
+    8-bit images are shown as stored. Float images are clipped to 0..1 and shown with
+    the sRGB curve, unless the settings' encoding was already applied to them; `normal`
+    is shown as (n + 1) / 2, `position` with each axis stretched to 0..1, depth from
+    white (nearest) to black (farthest). NaN counts as 0.
+
+    Parameters
+    ----------
+    frames : Frames
+        One framebuffer at least.
+
+    Returns
+    -------
+    bytes
+        An 8-bit PNG file of 1, 3 or 4 channels, of the framebuffer's size.
+    """
+    return png(_picture(frames, leading(frames)))
+
+
+def contact_sheet_html(frames: Frames) -> str:
+    """Return a contact sheet of all framebuffers, with the pass times, as HTML.
+
+    Pictures are as in `leading_png`, without alpha, so that nothing is hidden, and
+    averaged down to 320 pixels at most. Linear floats of which more than one pixel in a
+    hundred is brighter than 1 are shown with less exposure; the caption says how much, and
+    gives the range of all floats. Colours are those of the page.
+
+    Parameters
+    ----------
+    frames : Frames
+        Any number of framebuffers.
+
+    Returns
+    -------
+    str
+        One ``div`` without script, with the pictures in it, and all texts escaped.
+    """
+    page = ['<div style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em">']
+    page.append(
+        '<div style="display:grid;gap:12px;'
+        'grid-template-columns:repeat(auto-fill,minmax(200px,1fr))">'
+    )
+    for name, array in frames.items():
+        height, width = array.shape[:2]
+        shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
+        stops = _viewing_stops(frames, name)
+        picture = _picture(frames, name, scaled(width, height, shrink), stops)[:, :, :3]
+        data = base64.b64encode(png(picture)).decode("ascii")
+        # An enlarged level of a pyramid shall show its pixels.
+        rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
+        label, size = html.escape(name), html.escape(_described(array) + _ranged(array))
+        if stops != 0:
+            size += f", shown at {stops:g} stops"
+        page.append(
+            '<figure style="margin:0">'
+            f'<img src="data:image/png;base64,{data}" alt="{label}, {size}" '
+            'style="display:block;width:100%;height:auto;max-width:none;'
+            f"aspect-ratio:{_aspect(frames):.4g};object-fit:contain;"
+            f'background:rgba(128,128,128,.15);image-rendering:{rendering}">'
+            f'<figcaption><b>{label}</b> <span style="opacity:.7">{size}</span></figcaption>'
+            "</figure>"
+        )
+    page.append("</div>")
+    if frames.timings:
+        page.append(_timings_html(frames))
+    facts = [f"{key} {value}" for key, value in frames.info.items()]
+    page.append(
+        '<div style="margin-top:10px;opacity:.8">' + html.escape(", ".join(facts)) + "<br>"
+        '<code style="color:inherit;background:none;padding:0;white-space:pre-wrap;'
+        f'overflow-wrap:anywhere">{html.escape(repr(frames.settings))}</code></div></div>'
+    )
+    return "".join(page)
+
+
+def _timings_html(frames: Frames) -> str:
+    longest = max((t for t in frames.timings.values() if math.isfinite(t)), default=0.0)
+    adapter = html.escape(str(frames.info.get("adapter", "the device")))
+    rows = [
+        f'<div style="margin-top:10px">Time of each pass on {adapter}</div>'
+        '<div style="display:grid;grid-template-columns:max-content 1fr max-content;'
+        'gap:2px 8px;align-items:center">'
+    ]
+    for name, seconds in frames.timings.items():
+        part = seconds / longest if longest > 0 and math.isfinite(seconds) else 0.0
+        rows.append(
+            f"<div>{html.escape(name)}</div>"
+            f'<div style="width:{100 * part:.1f}%;height:.7em;background:#5b8def;'
+            'border-radius:2px"></div>'
+            f'<div style="text-align:right">{1e3 * seconds:.3f} ms</div>'
+        )
+    rows.append("</div>")
+    return "".join(rows)
+
+
+def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> bytes:
+    """Return a labelled contact sheet of all framebuffers as PNG.
+
+    Pictures are shown as in a notebook, without alpha, fitted into cells that have the
+    shape of `final`; small ones are enlarged with hard pixels. The labels are drawn by
+    OpenImageIO; where that or its fonts are missing, they are left out with a warning.
+
+    Parameters
+    ----------
+    frames : Frames
+        One framebuffer at least.
+    columns : int, default 3
+        Pictures in a row, 1 to 32.
+    width : int, default 320
+        Width of a picture in pixels, 128 to 4096.
+
+    Returns
+    -------
+    bytes
+        An 8-bit RGB PNG file.
+
+    Raises
+    ------
+    TypeError
+        If `columns` or `width` is not an integer.
+    ValueError
+        If `columns` or `width` is out of range, or `frames` is empty.
+    """
+    columns = check_index("columns", columns, 1, 32)
+    width = check_index("width", width, 128, 4096)
+    if not frames:
+        raise ValueError("frames: a contact sheet needs one framebuffer at least")
+    columns = min(columns, len(frames))
+    height = round(width / _aspect(frames))
+    text = max(11, width // 20)
+    gap, caption = text, 3 * text
+    rows = -(-len(frames) // columns)
+    sheet = np.full(
+        (
+            gap + 2 * text + rows * (height + caption + gap),
+            gap + columns * (width + gap),
+            3,
+        ),
+        24,
+        np.uint8,
+    )
+    version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
+    labels = [(gap, gap + text, f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter)))]
+    for index, (name, array) in enumerate(frames.items()):
+        row, column = divmod(index, columns)
+        left = gap + column * (width + gap)
+        top = gap + 2 * text + row * (height + caption + gap)
+        fit = min(width / array.shape[1], height / array.shape[0])
+        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))[:, :, :3]
+        y = top + (height - picture.shape[0]) // 2
+        x = left + (width - picture.shape[1]) // 2
+        sheet[top : top + height, left : left + width] = 40
+        sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
+        baseline = top + height + text + text // 4
+        labels += [(left, baseline, name), (left, baseline + text + 2, _described(array))]
+    return png(labelled(sheet, labels, text))
+
+
+def labelled(
+    sheet: NDArray[np.uint8], labels: Iterable[tuple[int, int, str]], size: int
+) -> NDArray[np.uint8]:
+    """Draw texts at (x, baseline y), in light grey; without a font, leave them out.
+
+    Parameters
+    ----------
+    sheet : ndarray, shape (H, W, 3)
+    labels : iterable of (int, int, str)
+    size : int
+        Of the letters, in pixels.
+    """
+    try:
+        oiio = import_extra("OpenImageIO", "images", "A labelled contact sheet")
+    except ModuleNotFoundError as error:
+        warnings.warn(f"the contact sheet has no labels: {error}", stacklevel=3)
+        return sheet
+    canvas = oiio.ImageBuf(sheet)
+    for x, y, label in labels:
+        if not oiio.ImageBufAlgo.render_text(canvas, x, y, label, size, "", (0.87, 0.87, 0.87)):
+            warnings.warn(f"the contact sheet has no labels: {canvas.geterror()}", stacklevel=3)
+            return sheet
+    drawn: NDArray[np.uint8] = canvas.get_pixels(oiio.UINT8)
+    return drawn
+
+
+def _picture(
+    frames: Frames, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
+) -> NDArray[np.uint8]:
+    """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
+    encoded = name == "final" and frames.settings.encoding != "none"
+    return picture(frames[name], name, encoded=encoded, size=size, stops=stops)
+
+
+def picture(
+    array: NDArray[Any],
+    name: str = "",
+    *,
+    encoded: bool = False,
+    size: tuple[int, int] | None = None,
+    range_of: NDArray[Any] | None = None,
+    stops: float = 0.0,
+) -> NDArray[np.uint8]:
+    """Return an image as 8 bits to look at, as `leading_png` describes.
+
+    Parameters
+    ----------
+    array : ndarray, shape (H, W) or (H, W, C)
+    name : str
+        Of the framebuffer; "normal" and "position" are shown in their own ways.
+    encoded : bool, default False
+        Whether floats have passed a transfer curve already.
+    size : (int, int), optional
+        Width and height of the picture: pixels are averaged or repeated.
+    range_of : ndarray, optional
+        What is stretched to 0..1, depth and position, is stretched by this array's range, so that
+        two pictures can be compared.
+    stops : float, default 0
+        Exposure that colours of light in floats are shown with; others are shown as they are.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W, C)
+    """
+    values = np.atleast_3d(array).astype(np.float32)
+    ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)
+    linear = False
+    if array.dtype.kind == "u":
+        shown = values / np.float32(np.iinfo(array.dtype).max)
+    elif array.ndim == 2:
+        shown = np.float32(1) - _stretched(values, ranged)
+    elif name == "position":
+        shown = _stretched(values, ranged)
+    elif name == "normal":
+        shown = _clipped(values * np.float32(0.5) + np.float32(0.5))
+    else:
+        if stops != 0:
+            values[:, :, :3] *= np.float32(2.0**stops)
+        shown = _clipped(values)
+        linear = not encoded
+    if size is not None:
+        shown = resized(shown, *size)
+    if linear:
+        shown[:, :, :3] = encode_srgb(shown[:, :, :3])
+    pixels: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
+    return pixels
+
+
+def _viewing_stops(frames: Frames, name: str) -> float:
+    """Return the exposure, 0 or negative in half stops, that leaves 99 % of the pixels below 1."""
+    array = frames[name]
+    is_light = array.ndim == 3 and array.dtype != np.uint8 and name not in ("normal", "position")
+    if not is_light or (name == "final" and frames.settings.encoding != "none"):
+        return 0.0
+    # Every so manieth row and column: a percentile of them all would take longer than the picture.
+    step = max(1, max(array.shape[:2]) // _THUMBNAIL_SIDE)
+    brightest = array[::step, ::step, :3].max(axis=2).astype(np.float32)
+    brightest = brightest[np.isfinite(brightest)]
+    peak = float(np.percentile(brightest, 99, method="lower")) if brightest.size else 0.0
+    return -math.ceil(2 * math.log2(peak)) / 2 if peak > 1 else 0.0
+
+
+def _ranged(array: NDArray[Any]) -> str:
+    """Return the range of finite floats in words, alpha left out; nothing for other numbers."""
+    if array.dtype == np.uint8:
+        return ""
+    values = np.atleast_3d(array)[:, :, :3]
+    finite = np.isfinite(values)
+    if not finite.any():
+        return ", nothing finite"
+    low = values.min(where=finite, initial=np.inf)
+    high = values.max(where=finite, initial=-np.inf)
+    return f", {low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
+
+
+def _aspect(arrays: Mapping[str, NDArray[Any]]) -> float:
+    """Width by height of the cells of a contact sheet: that of the leading framebuffer.
+
+    Bounded, so that a strip of one pixel still leaves room to look at the others.
+    """
+    height, width = arrays[leading(arrays)].shape[:2]
+    return float(min(max(width / height, 0.5), 3.0))
+
+
+def _described(array: NDArray[Any]) -> str:
+    return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}"
+
+
+def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Clip to 0..1; NaN gives 0."""
+    finite = np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0)
+    return np.clip(finite, 0.0, 1.0)
+
+
+def _stretched(values: NDArray[np.float32], ranged: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Map the finite range that each channel has in `ranged` to 0..1; one value gives 0."""
+    finite = np.isfinite(ranged)
+    low: NDArray[np.float32] = ranged.min(axis=(0, 1), where=finite, initial=np.inf)
+    high: NDArray[np.float32] = ranged.max(axis=(0, 1), where=finite, initial=-np.inf)
+    # Also positive where no value is finite, and the range therefore inf to -inf.
+    span = np.maximum(high - low, np.finfo(np.float32).tiny)
+    return _clipped((np.clip(values, low, high) - low) / span)
+
+
+def scaled(width: int, height: int, factor: float) -> tuple[int, int]:
+    """Return a size times a factor, of at least one pixel a side."""
+    return max(1, round(width * factor)), max(1, round(height * factor))
+
+
+def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
+    """Average groups of pixels where an (H, W, C) image shrinks, repeat them where it grows."""
+    for axis, wanted in ((0, height), (1, width)):
+        count = image.shape[axis]
+        starts = np.arange(wanted) * count // wanted
+        if wanted < count:
+            lengths = np.diff(starts, append=count).astype(np.float32)
+            sums = np.add.reduceat(image, starts, axis=axis)
+            image = sums / lengths.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+        else:
+            image = image.take(starts, axis=axis)
+    return image
+
+
+def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
+    """Encode a picture as PNG (W3C PNG specification).
+
+    Here so that notebooks show pictures with nothing but NumPy installed; files that users
+    save are written by OpenImageIO.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8, shape (H, W, C)
+        Of 1, 3 or 4 channels.
+    level : int, default -1
+        Of zlib: 1 (quick) to 9 (small), -1 being its own choice.
+
+    Returns
+    -------
+    bytes
+        A whole file.
+    """
+    height, width, channels = pixels.shape
+    rows = pixels.reshape(height, width * channels)
+    # Filter type 2, each row less the one above, compresses soft pictures far better.
+    filtered = np.full((height, 1 + rows.shape[1]), 2, np.uint8)
+    filtered[:, 1:] = rows
+    filtered[1:, 1:] -= rows[:-1]
+    colour_type = {1: 0, 3: 2, 4: 6}[channels]
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)),
+        (b"IDAT", zlib.compress(filtered.tobytes(), level)),
+        (b"IEND", b""),
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in chunks
+    )

@@ -1,0 +1,476 @@
+"""The benchmarks' harness: what is compared, what is timed, and what is written."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import json
+import math
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.conftest import ADAPTER
+from vkbloom.bench import BENCHMARKS, Plan, Report, peers, run, write
+from vkbloom.bench.cost import Line
+from vkbloom.bench.image import SETTINGS, full_kernel
+from vkbloom.bench.inputs import REC709, THRESHOLD, pictures
+from vkbloom.bench.machine import command
+from vkbloom.bench.ours import contender
+from vkbloom.bench.plan import FORM_VARIABLE
+from vkbloom.bench.points import best_order, worst_order
+from vkbloom.bench.results import Curve, Goal, Section, Table, agreement
+from vkbloom.bench.spread import spread
+from vkbloom.bench.timing import Contender, Times, alternate
+from vkbloom.cli.program import program
+
+# The peers are no requirement of the tests; SciPy comes with scikit-image, which is one.
+scipy_peer = importlib.import_module("vkbloom.bench.peers.scipy")
+
+
+def bench(*arguments: str | Path) -> Result:
+    everything = ("bench", "--adapter", ADAPTER, *map(str, arguments))
+    return CliRunner().invoke(program, list(everything))
+
+
+def last(plan: Plan) -> Report:
+    *_, report = run(plan)
+    return report
+
+
+def quick(*only: str, **changes: Any) -> Plan:
+    return Plan(adapter=ADAPTER, quick=True, only=only, **changes)
+
+
+# Timing
+
+
+def test_contenders_are_timed_in_turn() -> None:
+    calls: list[tuple[str, int]] = []
+
+    def contender(name: str) -> Contender:
+        return Contender(name, lambda turn: calls.append((name, turn)))
+
+    times = alternate([contender("a"), contender("b")], 3, warm_up=2)
+    assert calls == [(name, turn) for turn in range(5) for name in "ab"]
+    assert list(times) == ["a", "b"]
+    assert all(len(measured.seconds) == 3 for measured in times.values())
+
+
+def test_a_device_can_be_the_clock() -> None:
+    contender = Contender("device", lambda turn: turn + 1, lambda result: result / 4)
+    assert alternate([contender], 3, warm_up=1)["device"].seconds == (0.5, 0.75, 1.0)
+
+
+def test_names_of_contenders_differ() -> None:
+    with pytest.raises(ValueError, match="twice"):
+        alternate([Contender("a", str), Contender("a", str)], 3)
+
+
+def test_a_ratio_is_of_medians_and_its_spread_of_rounds() -> None:
+    slow, fast = Times((2.0, 8.0, 6.0, 40.0, 5.0)), Times((1.0, 2.0, 2.0, 4.0, 5.0))
+    ratio = slow.over(fast)
+    assert ratio.value == 6.0 / 2.0
+    # The ratios of the rounds are 2, 4, 3, 10, 1.
+    assert (ratio.low, ratio.high) == (2.0, 4.0)
+    assert str(ratio) == "3 (2 to 4)"
+    assert slow.least == 2.0
+    assert slow.minus(fast).seconds == (1.0, 6.0, 4.0, 36.0, 0.0)
+
+
+def test_a_ratio_to_nothing_is_no_number() -> None:
+    assert math.isnan(Times((1.0, 1.0)).over(Times((0.0, 0.0))).value)
+
+
+def test_a_line_is_found() -> None:
+    x = [1.0, 4.0, 16.0]
+    line = Line.through(x, [2.0 + 3.0 * place for place in x])
+    assert (line.start, line.slope) == pytest.approx((2.0, 3.0))
+    assert line.deviation(2.0, 8.8) == pytest.approx(0.1)
+
+
+# Agreement of pictures
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16, np.float32])
+def test_one_wrong_pixel_is_no_agreement(dtype: Any) -> None:
+    ours = pictures((40, 30), dtype)[0]
+    theirs = ours.copy()
+    assert agreement("", ours, theirs, 0.0, "").agrees
+    theirs[7, 5, 1] += 3
+    found = agreement("", ours, theirs, 2.0, "")
+    assert not found.agrees
+    # 3e-3 is a half's rounding at 3.
+    assert found.largest == pytest.approx(3.0, abs=3e-3)
+
+
+def test_alpha_is_not_compared() -> None:
+    ours = pictures((8, 8), np.float32)[0]
+    theirs = ours.copy()
+    theirs[..., 3] = 7
+    assert agreement("", ours, theirs, 0.0, "").agrees
+    assert agreement("", ours, theirs[..., :3], 0.0, "").agrees
+
+
+def test_what_cannot_be_compared_does_not_agree() -> None:
+    ours = pictures((8, 8), np.float32)[0]
+    nan = ours.copy()
+    nan[0, 0, 0] = np.nan
+    for theirs in (ours[:4], ours.astype(np.float16), nan):
+        assert not agreement("", ours, theirs, math.inf, "").agrees
+
+
+def spoiled(image: NDArray[Any], *_: Any) -> dict[str, peers.ImageBloom]:
+    """A peer that blurs nothing."""
+    return {"SciPy": lambda picture: picture.copy()}
+
+
+def test_a_wrong_peer_is_told_and_not_timed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(scipy_peer, "image_bloom", spoiled)
+    result = bench("--quick", "--only", "image", "-o", tmp_path / "b.md")
+    assert result.exit_code == 1
+    assert "float16, RGBA: SciPy: pictures differ by" in result.stderr
+    assert "Traceback" not in result.stderr
+    (section,) = json.loads((tmp_path / "b.json").read_text())["sections"]
+    wrong = [found for found in section["agreements"] if not found["agrees"]]
+    assert {found["what"].split(": ")[1] for found in wrong} == {"SciPy"}
+    assert "SciPy" not in section["times"]["float16, RGBA"]
+    assert "scikit-image" in section["times"]["float16, RGBA"]
+    assert "| **no** |" in (tmp_path / "b.md").read_text()
+
+
+# Peers
+
+
+def test_a_missing_peer_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "find_spec", lambda name: None)
+    missing: list[str] = []
+    assert peers.gather(("OpenCV", "PyTorch"), lambda peer: {"": peer}, missing) == {}
+    assert missing == ["OpenCV is not installed", "PyTorch is not installed"]
+
+
+@pytest.mark.parametrize("error", [ImportError, OSError, RuntimeError, AttributeError])
+def test_a_peer_that_fails_is_listed(
+    monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+) -> None:
+    def make(_: Any) -> dict[str, Any]:
+        raise error("libcuda.so.1:\n no such file")
+
+    monkeypatch.setattr(peers, "find_spec", lambda name: True)
+    missing: list[str] = []
+    assert peers.gather(("CuPy",), make, missing) == {}
+    assert missing == ["CuPy does not run here: libcuda.so.1: no such file"]
+
+
+def test_every_peer_has_a_module() -> None:
+    found = peers.versions()
+    assert list(found) == list(peers.PEERS)
+    assert found["SciPy"] is not None
+    for name in peers.PEERS:
+        if name != "wgpu":  # pygfx's own
+            importlib.import_module(f"vkbloom.bench.peers.{name.lower().replace('-', '_')}")
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16, np.float32])
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("name", ["scipy", "scikit_image"])
+def test_peers_make_the_references_picture(name: str, channels: int, dtype: Any) -> None:
+    image = pictures((50, 37), dtype, channels)[1]
+    module = importlib.import_module(f"vkbloom.bench.peers.{name}")
+    ((_, bloom),) = module.image_bloom(image, full_kernel(SETTINGS), THRESHOLD, 1).items()
+    kept = image.copy()
+    result = bloom(image)
+    assert result.dtype == dtype
+    np.testing.assert_array_equal(image, kept)
+    # The reference gives 0 to 1, unclamped; half a level, half a half's step at 2.
+    expected = vkbloom.reference.apply(image, SETTINGS)["final"][..., :3]
+    scale = 255 if dtype == np.uint8 else 1
+    allowed = {"uint8": 0.5 + 1e-3, "float16": 1e-3, "float32": 1e-6}[np.dtype(dtype).name]
+    difference = result[..., :3] - np.clip(expected * scale, 0, 255)
+    assert np.abs(difference).max() <= allowed
+
+
+# Inputs
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16, np.float32])
+def test_no_rounding_decides_what_is_bright(dtype: Any) -> None:
+    several = pictures((100, 70), dtype)
+    for image in several:
+        colours = image[..., :3] / 255 if dtype == np.uint8 else image[..., :3].astype(float)
+        luminance = colours @ np.array(REC709)
+        assert np.abs(luminance - THRESHOLD).min() > 0.01
+        assert 0.1 < (luminance > THRESHOLD).mean() < 0.5
+        assert colours.max() <= 0.7 + 1 / 255
+        assert (image[..., 3] == (255 if dtype == np.uint8 else 1)).all()
+    assert not np.array_equal(several[0], several[1])
+    assert not np.array_equal(several[1], several[2])
+
+
+def test_points_are_the_same_in_both_orders() -> None:
+    points = best_order(10_000)
+    assert len(set(points)) == 10_000
+    for name, count in (("blur_scale", 10), ("blur_strength", 20), ("intensity", 50)):
+        assert len({getattr(point, name) for point in points}) == count
+    worst = worst_order(points)
+    assert set(worst) == set(points)
+    assert all(a.intensity != b.intensity for a, b in itertools.pairwise(points))
+    assert all(a.blur_scale != b.blur_scale for a, b in itertools.pairwise(worst))
+    assert len(best_order(7)) == 7
+
+
+def test_the_spread_of_a_known_blur() -> None:
+    ndimage = pytest.importorskip("scipy.ndimage")
+
+    def blur(image: NDArray[Any]) -> NDArray[Any]:
+        single = image.astype(np.float32)
+        return 3 * np.asarray(ndimage.gaussian_filter(single, (6.0, 6.0, 0.0)))
+
+    # The Gaussian is cut off at 4 sigma.
+    assert spread(blur, (256, 128)) == pytest.approx((6.0, 3.0), rel=2e-3)
+
+
+def test_no_call_finds_its_passes_done(renderer: vkbloom.Renderer) -> None:
+    feed = itertools.cycle(pictures((20, 10), np.float16))
+    several = [
+        contender(str(taps), renderer, feed, vkbloom.Separable(weights=(1.0,) * taps))
+        for taps in (1, 2, 3)
+    ]
+    ran = [len(each.call(turn).timings) for turn in range(4) for each in several]
+    assert set(ran) == {ran[0]}
+    assert ran[0] > 0
+
+
+# Plans
+
+
+def test_a_renderer_is_made_under_the_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[str, str | None]] = []
+    monkeypatch.setattr(
+        vkbloom, "Renderer", lambda name: seen.append((name, os.environ.get(FORM_VARIABLE)))
+    )
+    monkeypatch.delenv(FORM_VARIABLE, raising=False)
+    Plan(adapter="software").renderer("fragment")
+    assert FORM_VARIABLE not in os.environ
+    monkeypatch.setenv(FORM_VARIABLE, "mine")
+    Plan().renderer()
+    assert os.environ[FORM_VARIABLE] == "mine"
+    assert seen == [("software", "fragment"), ("auto", "auto")]
+
+
+@pytest.mark.parametrize(("name", "value"), [("rounds", 2), ("points", 0), ("threads", 0)])
+def test_numbers_out_of_range(name: str, value: int) -> None:
+    with pytest.raises(ValueError, match=f"{name}: {value} is out of range"):
+        Plan(**{name: value})  # type: ignore[arg-type]
+
+
+def test_the_command_of_a_plan() -> None:
+    assert command(Plan()) == "vkbloom bench"
+    plan = Plan(adapter="NVIDIA H", only=("image", "cost"), quick=True, rounds=9, points=8)
+    expected = "vkbloom bench --adapter 'NVIDIA H' --only image --only cost --quick"
+    assert command(plan) == f"{expected} --rounds 9 --points 8"
+
+
+# Reports
+
+
+def test_what_is_written(tmp_path: Path) -> None:
+    machine = {"date": "a day", "command": "vkbloom bench", "adapter": "X", "adapter type": "cpu"}
+    machine |= {"peers": {"SciPy": "1", "CuPy": None}}  # type: ignore[dict-item]
+    section = Section(
+        "id",
+        "A title",
+        ["What it is."],
+        [Table("Rows", ("a", "b"), (("1|2", "3"),))],
+        [Goal("x / y", 2.0, 3.0), Goal("y / x", float("nan"), 3.0, at_most=True)],
+        missing=["CuPy is not installed"],
+        times={"group": {"one": Times((0.5, 1.5, 1.0))}},
+    )
+    written = write(Report(machine, (section,)), tmp_path / "new" / "b.md")
+    assert [path.name for path in written] == ["b.md", "b.json"]
+    page = written[0].read_text()
+    for line in (
+        "Written by `vkbloom bench`, a day.",
+        "| CuPy | not installed |",
+        "## A title (`id`)",
+        "**Rows**",
+        "| 1\\|2 | 3 |",
+        "| x / y | at least 3 | 2 | no | id |",
+        "| y / x | at most 3 | nan | no | id |",
+        "- CuPy is not installed",
+    ):
+        assert line in page.splitlines()
+    assert "times are wall-clock times" in page
+    values = json.loads(written[1].read_text(), parse_constant=pytest.fail)
+    (found,) = values["sections"]
+    assert values["machine"] == machine
+    assert found["times"]["group"]["one"] == {
+        "median": 1.0,
+        "least": 0.5,
+        "quartiles": [0.75, 1.25],
+        "seconds": [0.5, 1.5, 1.0],
+    }
+    assert [goal["ratio"] for goal in found["goals"]] == [2.0, None]
+
+
+def test_curves_are_drawn_by_their_kind(tmp_path: Path) -> None:
+    oiio = pytest.importorskip("OpenImageIO")
+    section = Section("cost", "Cost")
+    section.curves = [
+        Curve("pixels", "one", (1.0, 100.0), (0.1, 9.0)),
+        Curve("kernel length", "one", (1.0, 2.0), (0.5, 0.8)),
+        Curve("pixels", "two", (1.0, 100.0), (0.2, 8.0)),
+    ]
+    machine = {"date": "", "command": "", "adapter": "", "adapter type": "discrete", "peers": {}}
+    written = write(Report(machine, (section,)), tmp_path / "b.md")
+    names = ["b.md", "b.json", "b-pixels.png", "b-kernel_length.png"]
+    assert [path.name for path in written] == names
+    page = written[0].read_text()
+    for chart in written[2:]:
+        assert f"({chart.name})" in page
+        pixels = oiio.ImageBuf(str(chart)).get_pixels(oiio.UINT8)
+        assert pixels.min() < 100 < pixels.max(), "something is drawn"
+    assert "wall-clock" not in page
+
+
+def test_what_was_found_is_written_before_the_rest_fails(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def fail(_: Plan) -> Section:
+        raise vkbloom.Error("the device went away")
+
+    monkeypatch.setattr(importlib.import_module("vkbloom.bench.overhead"), "run", fail)
+    result = bench("--quick", "--only", "separable", "--only", "overhead", "-o", tmp_path / "b.md")
+    assert result.exit_code == 1
+    assert result.stderr == "vkbloom: the device went away\n"
+    (section,) = json.loads((tmp_path / "b.json").read_text())["sections"]
+    assert section["id"] == "separable"
+
+
+# All of it
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, dict[str, Any], str]:
+    """A quick run of everything, its JSON and its page."""
+    path = tmp_path_factory.mktemp("bench") / "all.md"
+    result = bench("--quick", "-o", path)
+    return result, json.loads(path.with_suffix(".json").read_text()), path.read_text()
+
+
+def test_everything_runs(smoke: tuple[Result, dict[str, Any], str]) -> None:
+    result, values, page = smoke
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert [section["id"] for section in values["sections"]] == list(BENCHMARKS)
+    for section in values["sections"]:
+        assert f"(`{section['id']}`)" in page
+        assert all(found["agrees"] for found in section["agreements"])
+        # Its figures mean nothing.
+        assert section["goals"] == []
+        if values["machine"]["adapter type"] == "cpu" and section["id"] == "image-gpu":
+            assert "is no GPU" in section["missing"][0]
+            continue
+        assert section["tables"]
+        assert section["times"]
+        for group in section["times"].values():
+            rounds = {len(times["seconds"]) for times in group.values()}
+            assert len(rounds) == 1, "all contenders of a group run equally often"
+
+
+def test_the_report_says_on_what(smoke: tuple[Result, dict[str, Any], str]) -> None:
+    _, values, page = smoke
+    machine = values["machine"]
+    assert machine["command"] == f"vkbloom bench --adapter {ADAPTER} --quick"
+    assert machine["vkbloom"] == vkbloom.__version__
+    assert machine["CPU"]
+    with vkbloom.Renderer() as renderer:
+        assert machine["adapter"] == renderer.info.name
+        assert renderer.info.driver_info in machine["driver"]
+    for name, version in machine["peers"].items():
+        assert (version is None) == (find_spec(peers.PEERS[name]) is None)
+        assert f"| {name} | {version or 'not installed'} |" in page
+
+
+def test_the_best_order_runs_fewer_passes(smoke: tuple[Result, dict[str, Any], str]) -> None:
+    (section,) = (each for each in smoke[1]["sections"] if each["id"] == "points")
+    rows = {row[0]: int(row[3].split()[0]) for row in section["tables"][0]["rows"]}
+    many, calls, worst = rows.values()
+    # In calls one after the other, a point may be what the one before the table left.
+    assert many <= calls <= worst
+
+
+# The command
+
+
+def test_the_list_names_every_benchmark() -> None:
+    result = bench("--list")
+    assert result.exit_code == 0
+    assert [line.split()[0] for line in result.stdout.splitlines()] == list(BENCHMARKS)
+
+
+def test_the_module_is_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "vkbloom.bench", "--list"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == bench("--list").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--only", "speed"), "speed"),
+        (("--rounds", "2"), "rounds: 2 is out of range, 3 or more"),
+        (("--points", "0"), "points: 0 is out of range"),
+        (("--threads", "0"), "threads: 0 is out of range"),
+        (("-o", "table.txt"), "does not end in .md"),
+        (("extra",), "extra"),
+    ],
+)
+def test_wrong_use(arguments: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        result = bench(*arguments)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_written_is_told_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran: list[Plan] = []
+    monkeypatch.setattr("vkbloom.cli.bench.run", ran.append)
+    (tmp_path / "file").write_text("")
+    result = bench("-o", tmp_path / "file" / "b.md")
+    assert result.exit_code == 1
+    assert result.stderr.startswith(f"vkbloom: {tmp_path}")
+    assert ran == []
+
+
+def test_no_such_adapter(tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        program, ["bench", "--adapter", "Voodoo", "-o", str(tmp_path / "b.md")]
+    )
+    assert result.exit_code == 1
+    assert "Voodoo" in result.stderr
+
+
+def test_nothing_of_it_is_imported_with_the_package() -> None:
+    code = "import sys, vkbloom; print([name for name in sys.modules if 'vkbloom.bench' in name])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,481 @@
+"""``vkbloom apply``: files, colours, framebuffers beside them, and errors of one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom.cli.program import program
+from vkbloom.io.image_reading import load
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
+from vkbloom.io.srgb import decode_srgb, encode_srgb
+from vkbloom.settings import Pyramid, Separable
+
+oiio = pytest.importorskip("OpenImageIO")
+
+
+def light(*shape: int, dtype: str = "float32") -> NDArray[Any]:
+    """Return a dark image with a few lights, which go above 1 in floats."""
+    generator = np.random.default_rng(11)
+    values = generator.random(shape) * 0.2
+    values[4:7, 6:9] = generator.random((3, 3, shape[2])) * (1 if dtype.startswith("u") else 6)
+    if dtype.startswith("u"):
+        return np.rint(values * np.iinfo(dtype).max).astype(dtype)
+    return values.astype(dtype)
+
+
+def stored(path: Path, pixels: NDArray[Any]) -> Path:
+    """Write values as they are."""
+    save(Picture.of_values(pixels, "half" if pixels.dtype == np.float16 else "float"), path)
+    return path
+
+
+def png(path: Path, pixels: NDArray[Any]) -> Path:
+    """Write integers of 8 or 16 bits with 1 to 4 channels."""
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, str(pixels.dtype))
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    if channels == 2:
+        spec.channelnames = ("Y", "A")
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer.open(str(path), spec)
+    assert writer.write_image(pixels)
+    assert writer.close()
+    return path
+
+
+def run(*arguments: str | Path, adapter: str = "auto") -> Result:
+    words = ["apply", *(str(argument) for argument in arguments), "--adapter", adapter]
+    return CliRunner().invoke(program, words)
+
+
+def done(*arguments: str | Path) -> Result:
+    """Run what must succeed and say nothing on standard error."""
+    result = run(*arguments)
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result
+
+
+def pixels(path: Path) -> NDArray[Any]:
+    return load(path).pixels
+
+
+def applied(image: NDArray[Any], settings: vkbloom.Settings | None = None) -> NDArray[Any]:
+    with vkbloom.Renderer() as renderer:
+        return renderer.apply(image, settings, attachments="final")["final"]
+
+
+def linear(levels: NDArray[Any]) -> NDArray[np.float32]:
+    """Return sRGB integers as linear floats, alpha only scaled."""
+    values = levels / np.iinfo(levels.dtype).max
+    values[:, :, :3] = decode_srgb(values[:, :, :3])
+    return values.astype(np.float32)
+
+
+def levels(values: NDArray[Any], largest: int = 255) -> NDArray[np.float64]:
+    """Return linear floats as sRGB integers before rounding."""
+    encoded = np.clip(values.astype(np.float64), 0, 1)
+    encoded[:, :, :3] = encode_srgb(encoded[:, :, :3])
+    return encoded * largest
+
+
+# Half a step of rounding, and what the decoding in float32 adds to it.
+ROUNDING = 0.501
+
+
+class TestFormats:
+    @pytest.mark.parametrize("dtype", ["float16", "float32"])
+    @pytest.mark.parametrize("channels", [3, 4])
+    def test_exr_stays_as_it_is(self, tmp_path: Path, dtype: str, channels: int) -> None:
+        image = light(20, 30, channels, dtype=dtype)
+        image[:, :, 3:] = 1
+        path = stored(tmp_path / "a.exr", image)
+        result = done(path, tmp_path / "b.exr")
+        assert pixels(tmp_path / "b.exr").dtype == dtype
+        assert np.array_equal(pixels(tmp_path / "b.exr"), applied(image))
+        assert result.stdout.startswith("Rendering on ")
+        assert result.stdout.endswith(f"\nwrote {tmp_path / 'b.exr'}\n")
+
+    @pytest.mark.parametrize("suffix", ["png", "tif", "bmp", "tga"])
+    def test_8_bits_bloom_as_linear_floats(self, tmp_path: Path, suffix: str) -> None:
+        image = light(20, 30, 3, dtype="uint8")
+        done(png(tmp_path / "a.png", image), tmp_path / f"b.{suffix}")
+        written = pixels(tmp_path / f"b.{suffix}")
+        assert written.dtype == np.uint8
+        expected = levels(applied(linear(image)))
+        assert np.abs(written - expected).max() <= ROUNDING
+        assert np.abs(expected - image).max() > 20
+
+    def test_16_bits(self, tmp_path: Path) -> None:
+        image = light(20, 30, 4, dtype="uint16")
+        done(png(tmp_path / "a.png", image), tmp_path / "b.png")
+        written = pixels(tmp_path / "b.png")
+        assert written.dtype == np.uint16
+        expected = levels(applied(linear(image)), 65535)
+        # Floats of 24 bits are good to 1/256 of a step; decoding, bloom and encoding add up.
+        assert np.abs(written - expected).max() <= 0.6
+        assert np.array_equal(written[:, :, 3], image[:, :, 3])
+
+    @pytest.mark.parametrize(
+        ("dtype", "channels"), [(dtype, n) for dtype in ("uint8", "uint16") for n in (1, 2, 3, 4)]
+    )
+    def test_without_bloom_integers_come_back(
+        self, tmp_path: Path, dtype: str, channels: int
+    ) -> None:
+        image = np.random.default_rng(0).integers(0, np.iinfo(dtype).max + 1, (20, 30, channels))
+        path = png(tmp_path / "a.png", image.astype(dtype))
+        done(path, tmp_path / "b.png", "--no-bloom")
+        assert np.array_equal(pixels(tmp_path / "b.png"), image)
+
+    def test_float_to_png(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3, dtype="float16")
+        done(stored(tmp_path / "a.exr", image), tmp_path / "b.png")
+        expected = levels(applied(image))
+        assert np.abs(pixels(tmp_path / "b.png") - expected).max() <= ROUNDING
+
+    def test_png_to_float(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3, dtype="uint8")
+        done(png(tmp_path / "a.png", image), tmp_path / "b.exr")
+        assert pixels(tmp_path / "b.exr").dtype == np.float32
+        assert np.allclose(pixels(tmp_path / "b.exr"), applied(linear(image)), rtol=1e-5, atol=1e-7)
+
+    def test_radiance(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3)
+        # Rounded to what the format holds.
+        image = pixels(stored(tmp_path / "a.hdr", image))
+        done(tmp_path / "a.hdr", tmp_path / "b.hdr")
+        written, expected = pixels(tmp_path / "b.hdr"), applied(image)
+        assert (np.abs(written - expected).max(axis=2) <= expected.max(axis=2) / 128).all()
+
+    def test_jpeg(self, tmp_path: Path) -> None:
+        image = np.full((20, 30, 3), 60, np.uint8)
+        image[5:15, 10:20] = 200
+        done(png(tmp_path / "a.png", image), tmp_path / "a.jpg", "--no-bloom")
+        done(tmp_path / "a.jpg", tmp_path / "b.jpg", "--no-bloom")
+        assert np.abs(pixels(tmp_path / "b.jpg").astype(int) - image).mean() < 3
+
+    @pytest.mark.parametrize("with_alpha", [False, True])
+    def test_grey_stays_grey(self, tmp_path: Path, with_alpha: bool) -> None:
+        image = light(20, 30, 1 + with_alpha, dtype="uint8")
+        done(png(tmp_path / "a.png", image), tmp_path / "b.png", "--tonemap", "aces")
+        written = pixels(tmp_path / "b.png")
+        assert written.shape == image.shape
+        rgb = linear(np.repeat(image[:, :, :1], 3, axis=2))
+        expected = levels(applied(rgb, Separable(tonemap="aces")))
+        assert np.abs(written[:, :, 0] - expected[:, :, 0]).max() <= ROUNDING
+        if with_alpha:
+            assert np.array_equal(written[:, :, 1], image[:, :, 1])
+
+    @pytest.mark.parametrize("raw", [False, True])
+    def test_alpha_stays(self, tmp_path: Path, raw: bool) -> None:
+        image = light(20, 30, 4, dtype="uint8")
+        image[:, :, 3] = np.arange(30)
+        done(png(tmp_path / "a.png", image), tmp_path / "b.png", *(["--raw"] * raw))
+        written = pixels(tmp_path / "b.png")
+        assert np.array_equal(written[:, :, 3], image[:, :, 3])
+        assert (written[:, :, :3] != image[:, :, :3]).any()
+
+    def test_raw(self, tmp_path: Path) -> None:
+        image = light(20, 30, 4, dtype="uint8")
+        done(png(tmp_path / "a.png", image), tmp_path / "b.png", "--raw", "--threshold", "0.3")
+        assert np.array_equal(pixels(tmp_path / "b.png"), applied(image, Separable(threshold=0.3)))
+
+    def test_windows(self, tmp_path: Path) -> None:
+        image = light(10, 12, 3, dtype="float16")
+        path = tmp_path / "a.exr"
+        spec = oiio.ImageSpec(12, 10, 3, "half")
+        spec.x, spec.y = 4, 3
+        spec.full_width, spec.full_height = 24, 20
+        writer = oiio.ImageOutput.create(str(path))
+        assert writer.open(str(path), spec)
+        assert writer.write_image(image)
+        assert writer.close()
+        done(path, tmp_path / "b.exr")
+        whole = np.zeros((20, 24, 3), np.float16)
+        whole[3:13, 4:16] = image
+        assert np.array_equal(pixels(tmp_path / "b.exr"), applied(whole))
+        # The light goes beyond the data that there was.
+        assert pixels(tmp_path / "b.exr")[3:13, 3].any()
+
+    def test_parts(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3)
+        with vkbloom.Renderer() as renderer:
+            frames = renderer.apply(image, Separable(threshold=0.5))
+        frames.save(tmp_path / "a.exr")
+        names = list(frames)
+        last = names.index("final")
+        chosen = ("--subimage", str(last))
+        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", *chosen)
+        assert np.array_equal(pixels(tmp_path / "b.exr"), frames["final"])
+        result = run(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
+        assert "a.exr: the first of its parts 0 glow, 1 blur_vertical, " in result.stderr
+        assert np.array_equal(pixels(tmp_path / "b.exr"), frames[names[0]])
+
+    def test_in_place(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3)
+        path = stored(tmp_path / "a.exr", image)
+        done(path, path)
+        assert np.array_equal(pixels(path), applied(image))
+
+
+class TestColours:
+    def test_linear_integers(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3, dtype="uint8")
+        path = png(tmp_path / "a.png", image)
+        colours = ("--input-colour", "linear", "--output-colour", "linear")
+        done(path, tmp_path / "b.png", *colours)
+        expected = np.clip(applied((image / 255).astype(np.float32)), 0, 1) * 255
+        assert np.abs(pixels(tmp_path / "b.png") - expected).max() <= ROUNDING
+        # The file says so, and is taken as what it says.
+        done(tmp_path / "b.png", tmp_path / "c.png", "--no-bloom", "--output-colour", "linear")
+        assert np.array_equal(pixels(tmp_path / "c.png"), pixels(tmp_path / "b.png"))
+
+    def test_encoded_floats(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3)
+        path = stored(tmp_path / "a.exr", image)
+        colours = ("--input-colour", "srgb", "--output-colour", "srgb")
+        done(path, tmp_path / "b.exr", *colours)
+        expected = encode_srgb(applied(decode_srgb(image)))
+        assert np.allclose(pixels(tmp_path / "b.exr"), expected, rtol=1e-5, atol=1e-6)
+
+    @pytest.mark.parametrize("encoding", ["srgb", "gamma22"])
+    def test_an_encoding_is_the_only_one(self, tmp_path: Path, encoding: Any) -> None:
+        image = light(20, 30, 3)
+        path = stored(tmp_path / "a.exr", image)
+        options = ("--tonemap", "reinhard", "--encoding", encoding)
+        for name in ("b.exr", "b.png"):
+            done(path, tmp_path / name, *options)
+        expected = applied(image, Separable(tonemap="reinhard", encoding=encoding))
+        assert np.array_equal(pixels(tmp_path / "b.exr"), expected)
+        assert np.abs(pixels(tmp_path / "b.png") - expected * 255.0).max() <= ROUNDING
+
+    def test_settings_are_those_of_render(self, tmp_path: Path) -> None:
+        image = light(40, 30, 3)
+        path = stored(tmp_path / "a.exr", image)
+        words = "--method pyramid --levels 3 --threshold 0.5 --knee 0.2 --intensity 0.5"
+        done(path, tmp_path / "b.exr", *words.split())
+        settings = Pyramid(levels=3, threshold=0.5, knee=0.2, intensity=0.5)
+        assert np.array_equal(pixels(tmp_path / "b.exr"), applied(image, settings))
+        kept = oiio.ImageBuf(str(tmp_path / "b.exr")).spec()["vkbloom:settings"]
+        assert json.loads(kept) == json.loads(json.dumps(settings.as_dict()))
+        done(path, tmp_path / "c.exr", "--preset", "outline")
+        outline = vkbloom.presets["outline"]
+        assert np.array_equal(pixels(tmp_path / "c.exr"), applied(image, outline))
+
+    def test_nan_and_infinity_are_told(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3)
+        image[0, 0], image[1, 1, 0] = np.nan, -np.inf
+        path = stored(tmp_path / "a.exr", image)
+        result = run(path, tmp_path / "b.exr")
+        assert result.exit_code == 0
+        assert result.stderr == (
+            f"vkbloom: note: {path} holds NaN 3 times and infinity 1 times: 0 in the bloom, kept "
+            "at their own pixels\n"
+        )
+        written = pixels(tmp_path / "b.exr")
+        assert np.isnan(written[0, 0]).all()
+        assert np.isneginf(written[1, 1, 0])
+        assert np.isfinite(written).sum() == image.size - 4
+        result = run(path, tmp_path / "b.png")
+        assert result.exit_code == 0
+        assert "b.png holds integers: NaN is written as 0, infinity as 1" in result.stderr
+        assert (pixels(tmp_path / "b.png")[0, 0] == 0).all()
+
+    def test_nan_of_grey_counts_once(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        image = light(20, 30, 3)
+        image[0, 0] = np.nan
+        save(Picture(**{**vars(Picture.of_values(image, "float")), "grey": True}), path)
+        assert "NaN 1 times" in run(path, tmp_path / "b.exr").stderr
+
+    def test_what_is_lost_is_told(self, tmp_path: Path) -> None:
+        image = light(20, 30, 4)
+        path = stored(tmp_path / "a.exr", image)
+        (line,) = run(path, tmp_path / "b.jpg").stderr.splitlines()
+        assert line.startswith("vkbloom: note: ")
+        assert line.endswith("b.jpg has no place for the alpha, which is not 1 everywhere")
+
+
+class TestAttachments:
+    def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
+        image = light(20, 30, 3, dtype="float16")
+        path = stored(tmp_path / "a.exr", image)
+        result = done(path, tmp_path / "b.exr", "--attachments", "all")
+        with vkbloom.Renderer() as renderer:
+            frames = renderer.apply(image)
+        others = [name for name in frames if name != "final"]
+        assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
+            ["a.exr", "b.exr", *(f"b_{name}.exr" for name in others)]
+        )
+        for name in others:
+            assert np.array_equal(pixels(tmp_path / f"b_{name}.exr"), frames[name])
+        written = [line for line in result.stdout.splitlines() if line.startswith("wrote ")]
+        assert len(written) == len(frames)
+
+    def test_floats_beside_a_png_are_exr(self, tmp_path: Path) -> None:
+        path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
+        done(path, tmp_path / "b.png", "--attachments", "bloom,final")
+        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_bloom.exr"}
+
+    def test_raw_ones_are_png(self, tmp_path: Path) -> None:
+        path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
+        done(path, tmp_path / "b.png", "--attachments", "glow", "--raw")
+        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_glow.png"}
+
+    def test_only_final_without_the_option(self, tmp_path: Path) -> None:
+        path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
+        done(path, tmp_path / "b.png")
+        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png"}
+
+
+class TestErrors:
+    @pytest.mark.parametrize(
+        ("arguments", "status", "message"),
+        [
+            ("no.png b.png", 1, "no.png: No such file or directory"),
+            (". b.png", 1, ".: Is a directory"),
+            ("bad.png b.png", 1, "bad.png: not an image that can be read"),
+            ("bad.exr b.png", 1, "bad.exr: not an image that can be read"),
+            ("cut.exr b.png", 1, "cut.exr: damaged"),
+            ("xyz.exr b.png", 1, "xyz.exr: the channels are X, Y, Z; R, G, B or one"),
+            ("a.exr none/b.png", 1, "none/b.png: No such file or directory"),
+            ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold such a picture"),
+            ("a.exr b.png --subimage 1", 1, "a.exr: there is no part 1, only 0 to 0"),
+            ("a.exr b.unknown", 2, "no image format for the extension '.unknown'"),
+            ("a.exr b", 2, "no image format for the extension ''"),
+            ("a.exr", 2, "Missing argument 'OUT'"),
+            ("a.exr b.png c.png", 2, "c.png"),
+            ("a.exr b.png --blur-scale 17", 2, "blur_scale: 17.0 is out of range, 0 to 16"),
+            ("a.exr b.png --levels 3", 2, "the method separable has no --levels"),
+            ("a.exr b.png --attachments glare", 2, "attachments: there is no 'glare' here"),
+            ("a.exr b.png --input-colour red", 2, "'--input-colour': 'red'"),
+            ("a.exr b.png --subimage -1", 2, "--subimage"),
+            ("a.exr b.png --raw", 2, "--raw is for files of 8-bit integers; a.exr holds float"),
+            ("a.exr b.png --raw --input-colour srgb", 2, "--raw leaves colours as they are"),
+            ("a.exr b.png --encoding srgb --output-colour srgb", 2, "--output-colour does not go"),
+            ("a.exr b.png --attachments bloom --no-bloom", 2, "attachments"),
+        ],
+    )
+    def test_are_one_line_and_leave_nothing(
+        self,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        arguments: str,
+        status: int,
+        message: str,
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        content = stored(Path("a.exr"), light(20, 30, 3)).read_bytes()
+        Path("cut.exr").write_bytes(content[: len(content) // 2])
+        for name in ("bad.png", "bad.exr"):
+            Path(name).write_bytes(b"nothing of the kind")
+        spec = oiio.ImageSpec(2, 2, 3, "float")
+        spec.channelnames = ("X", "Y", "Z")
+        writer = oiio.ImageOutput.create("xyz.exr")
+        assert writer.open("xyz.exr", spec)
+        assert writer.write_image(light(20, 30, 3)[:2, :2])
+        assert writer.close()
+        Path("b.png").write_bytes(b"before")
+        result = run(*arguments.split())
+        assert result.exit_code == status
+        assert result.stderr.startswith("vkbloom: ")
+        assert result.stderr.count("\n") == 1
+        assert message in result.stderr
+        assert Path("b.png").read_bytes() == b"before"
+        assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+            ["a.exr", "b.png", "bad.exr", "bad.png", "cut.exr", "xyz.exr"]
+        )
+
+    @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "tif"])
+    def test_libraries_are_silenced(self, tmp_path: Path, suffix: str) -> None:
+        path = tmp_path / f"a.{suffix}"
+        values = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
+        save(Picture.of_values(values), path)
+        content = path.read_bytes()
+        path.write_bytes(content[: len(content) // 2])
+        # As a process, because libpng writes to the descriptor.
+        ended = subprocess.run(
+            [sys.executable, "-m", "vkbloom.cli", "apply", str(path), str(tmp_path / "b.png")],
+            env=dict(os.environ),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (ended.returncode, ended.stdout) == (1, "")
+        assert ended.stderr.startswith(f"vkbloom: {path}: ")
+        assert ended.stderr.count("\n") == 1
+        assert not (tmp_path / "b.png").exists()
+
+    def test_no_adapter(self, tmp_path: Path) -> None:
+        path = stored(tmp_path / "a.exr", light(20, 30, 3))
+        result = run(path, tmp_path / "b.exr", adapter="no such")
+        assert result.exit_code == 1
+        assert 'no Vulkan adapter for "no such"' in result.stderr
+        assert not (tmp_path / "b.exr").exists()
+
+    def test_a_failure_on_the_device_leaves_the_output(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def fail(*_: Any, **__: Any) -> None:
+            raise vkbloom.DeviceLostError("the device is lost")
+
+        path = stored(tmp_path / "a.exr", light(20, 30, 3))
+        before = path.read_bytes()
+        monkeypatch.setattr(vkbloom.Renderer, "apply", fail)
+        result = run(path, path)
+        assert (result.exit_code, result.stderr) == (1, "vkbloom: the device is lost\n")
+        assert path.read_bytes() == before
+
+    def test_passes_validation(self, tmp_path: Path) -> None:
+        path = stored(tmp_path / "a.exr", light(20, 30, 4) + np.float32(0))
+        result = run(path, tmp_path / "b.exr", "--validation", "--attachments", "all")
+        assert (result.exit_code, result.stderr) == (0, "")
+
+    def test_validation_is_handed_on(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
+        path = stored(tmp_path / "a.exr", light(20, 30, 3))
+        result = run(path, tmp_path / "b.exr", "--validation")
+        assert result.exit_code == 1
+        assert "validation" in result.stderr
+
+
+def test_the_help_tells_of_colours() -> None:
+    text = " ".join(CliRunner().invoke(program, ["apply", "--help"]).stdout.split())
+    for sentence in (
+        "Files of 8 or 16 bit integers are decoded from sRGB to 32-bit floats",
+        "Files of floats are taken as linear",
+        "Integers are encoded to sRGB and clipped to 0..1",
+        "floats (as in OpenEXR and Radiance HDR) are written linear",
+        "Alpha is kept",
+        "OUT is replaced when it is complete",
+    ):
+        assert sentence in text
+
+
+@pytest.mark.parametrize("name", ["BrightRings", "Desk"])
+def test_real_hdr_images(shared_data: Path, tmp_path: Path, name: str) -> None:
+    path = shared_data / "hdr" / f"{name}.exr"
+    image = pixels(path)
+    for suffix in ("exr", "png"):
+        done(path, tmp_path / f"b.{suffix}", "--threshold", "1", "--intensity", "0.2")
+    expected = applied(image, Separable(threshold=1.0, intensity=0.2))
+    assert np.array_equal(pixels(tmp_path / "b.exr"), expected)
+    assert np.abs(pixels(tmp_path / "b.png") - levels(expected)).max() <= ROUNDING
+    assert not np.array_equal(expected, image)
+
+
+def test_real_frames_come_back(shared_data: Path, tmp_path: Path) -> None:
+    path = shared_data / "seed_frames" / "final.png"
+    done(path, tmp_path / "b.png", "--no-bloom")
+    assert np.array_equal(pixels(tmp_path / "b.png"), pixels(path))

@@ -1,0 +1,527 @@
+"""``vkbloom grid``: axes in words, files of options, stores and image files, resumed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import vkbloom
+from tests.framebuffers import noise
+from vkbloom import Pyramid, Renderer, Separable
+from vkbloom.cli.axis_options import axis_values
+from vkbloom.cli.program import program
+from vkbloom.io.image_reading import load
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
+
+pytest.importorskip("OpenImageIO")
+xr = pytest.importorskip("xarray")
+
+
+def run(*arguments: Any) -> Result:
+    words = ["grid", *(str(argument) for argument in arguments)]
+    return CliRunner().invoke(program, words)
+
+
+def done(*arguments: Any) -> str:
+    result = run(*arguments)
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result.stdout
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    values = np.random.default_rng(5).random((9, 12, 3)).astype(np.float32)
+    save(Picture.of_values(values, "float"), tmp_path / "a.exr")
+    return tmp_path / "a.exr"
+
+
+class TestAxes:
+    @pytest.mark.parametrize(
+        ("word", "expected"),
+        [
+            ("blur_scale=0.1:2:3", [0.1, 1.05, 2.0]),
+            ("blur-scale=1:4:3:log", [1.0, 2.0, 4.0]),
+            ("blur_scale=2", [2.0]),
+            ("time=0,0.5", [0.0, 0.5]),
+            ("loops=1,2", [1, 2]),
+            ("tonemap=none,aces", ["none", "aces"]),
+            ("threshold=none,0.5", [None, 0.5]),
+            ("direct=off,on", [False, True]),
+            ("bloom_size=none,64x32", [None, (64, 32)]),
+            ("weights=0.5,0.25;1;", [(0.5, 0.25), (1.0,)]),
+            ("layers=1:1,2:0.5;1:1", [((1.0, 1.0), (2.0, 0.5)), ((1.0, 1.0),)]),
+        ],
+    )
+    def test_words(self, word: str, expected: list[Any]) -> None:
+        (found,) = axis_values([word], Separable()).values()
+        if word.endswith("log"):
+            np.testing.assert_allclose(found, expected)
+        else:
+            assert list(found) == expected
+
+    @pytest.mark.parametrize(
+        ("word", "told"),
+        [
+            ("blur_scale", "NAME=FIRST:LAST:COUNT"),
+            ("blur_sale=1", "no such field"),
+            ("radius=1", "no such field"),
+            ("method=separable,pyramid", "no such field"),
+            ("blur_scale=1:2", "not a valid float"),
+            ("blur_scale=1:2:0", "out of range"),
+            ("blur_scale=0:2:3:log", "above 0"),
+            ("blur_scale=0:2:3:lin", "not FIRST:LAST:COUNT"),
+            ("tonemap=nice", "is not one of"),
+            ("blur_scale=1,99", "blur_scale: 99.0 is out of range"),
+            ("loops=1:2:4", "whole number"),
+        ],
+    )
+    def test_wrong_use_is_one_line(self, tmp_path: Path, word: str, told: str) -> None:
+        result = run("--axis", word, "-o", tmp_path / "a.zarr")
+        assert result.exit_code == 2
+        assert told in result.stderr
+        assert result.stderr.count("\n") == 1
+        assert not (tmp_path / "a.zarr").exists()
+
+
+class TestStores:
+    def test_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
+        out = tmp_path / "a.zarr"
+        told = done(
+            "--axis", "time=0,0.25", "--axis", "blur_scale=1:2:2", "--size", "32x18",
+            "--tonemap", "aces", "-o", out, "--reduce", "mean", "--reduce",
+            "like=psnr:final@blur_scale=1", "--attachments", "final,depth",
+            "--sheet", tmp_path / "s.png", "--curves", tmp_path / "c.svg", "--chunk", "time=2",
+        )  # fmt: skip
+        assert "4 points; passes run" in told
+        found = xr.open_zarr(out)
+        expected = renderer.render(
+            scene, Separable(blur_scale=2, tonemap="aces"), (32, 18), time=0.25
+        )
+        np.testing.assert_array_equal(found["final"].values[1, 1], expected["final"])
+        assert found["final"].chunks[0] == (2,)
+        assert np.isinf(found["like"].values[:, 0]).all()
+        assert load(tmp_path / "s.png").pixels.shape[2] == 3
+        assert "<svg" in (tmp_path / "c.svg").read_text()
+
+    def test_images_by_their_names(self, tmp_path: Path, picture: Path) -> None:
+        save(Picture.of_values(noise(9, 12, 3, dtype="float32"), "float"), tmp_path / "b.exr")
+        done(
+            picture,
+            tmp_path / "b.exr",
+            "--axis",
+            "radius=1,2",
+            "--method",
+            "pyramid",
+            "--attachments",
+            "none",
+            "--reduce",
+            f"psnr@{picture}",
+            "-o",
+            tmp_path / "a.zarr",
+        )
+        found = xr.open_zarr(tmp_path / "a.zarr")
+        assert set(found) == {"done", "psnr"}
+        assert list(found["image"].values) == [str(picture), str(tmp_path / "b.exr")]
+
+    def test_resumed_only_when_asked(self, tmp_path: Path, picture: Path) -> None:
+        words = [picture, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
+        done(*words)
+        (tmp_path / "a.zarr" / "final" / "c.0.0.0.0").write_bytes(b"")
+        again = run(*words)
+        assert again.exit_code == 1
+        assert "resume it" in again.stderr
+        mended = run(*words, "--resume")
+        assert mended.exit_code == 0
+        assert "c.0.0.0.0 was damaged" in mended.stderr
+        assert "exposure=0..1" in mended.stderr
+        other = run(*words, "--resume", "--intensity", "0.5")
+        assert other.exit_code == 1
+        assert "settings.intensity: 1.0 in the store, 0.5 asked for" in other.stderr
+
+    def test_workers(self, tmp_path: Path, picture: Path) -> None:
+        words = [picture, "--axis", "exposure=0:1:4"]
+        # Dask's own port is often taken, by a notebook's cluster or another grid.
+        with socket.socket() as other:
+            with contextlib.suppress(OSError):
+                other.bind(("", 8787))
+                other.listen()
+            told = done(*words, "-o", tmp_path / "a.zarr", "--workers", "1")
+        assert "4 points" in told
+        done(*words, "-o", tmp_path / "b.zarr")
+        found, expected = (xr.open_zarr(tmp_path / name) for name in ("a.zarr", "b.zarr"))
+        np.testing.assert_array_equal(found["final"].values, expected["final"].values)
+
+    def test_an_interrupt_of_all_processes(self, tmp_path: Path, picture: Path) -> None:
+        """Ctrl-C on a terminal, which the workers get as well."""
+        out = tmp_path / "a.zarr"
+        words = [picture, "-o", out, "--axis", "exposure=0:1:5000", "--workers", "2"]
+        running = subprocess.Popen(
+            [sys.executable, "-m", "vkbloom.cli", "grid", *map(str, words)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        while not (out / "zarr.json").exists() and running.poll() is None:
+            time.sleep(0.05)
+        os.killpg(running.pid, signal.SIGINT)
+        stdout, stderr = running.communicate()
+        assert (running.returncode, stdout, stderr) == (1, "", "\nvkbloom: interrupted\n")
+
+    @pytest.mark.parametrize(
+        ("words", "told"),
+        [
+            (["--workers", "1", "--scheduler", "tcp://localhost:1"], "give one of them"),
+            (["--reduce", "median"], "'median' is not one of"),
+            (["--reduce", "ssim"], "needs @REFERENCE"),
+            (["--reduce", "mean@blur_scale=1"], "has no @REFERENCE"),
+            (["--reduce", "ssim@blur_scale=3"], "is not a value of the grid"),
+            (["--chunk", "blur_scale"], "NAME=COUNT"),
+            (["--size", "3x3"], "only scenes"),
+            (["--attachments", "none"], "nothing is asked for"),
+            (["--sheet", "a.jpg"], "--sheet a.jpg: its extension is none of .png"),
+            (["--curves", "a"], "--curves a: its extension is none of .png, .svg, .pdf"),
+            (["--sheet", "a.png", "--attachments", "none", "--reduce", "mean"], "keeps none"),
+            (["--curves", "a.svg", "--axis", "blur_scale=1"], "more than one value"),
+        ],
+        ids=str,
+    )
+    def test_wrong_use(self, tmp_path: Path, picture: Path, words: list[str], told: str) -> None:
+        out = tmp_path / "a.zarr"
+        result = run(picture, "--axis", "blur_scale=1,2", "-o", out, *words)
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert told in result.stderr
+        assert not out.exists()
+
+    def test_a_reference_of_several_images(self, tmp_path: Path, picture: Path) -> None:
+        arrays = {"glow": noise(9, 12, 3, dtype="float32"), "final": load(picture).pixels}
+        file = tmp_path / "frames.exr"
+        vkbloom.Frames(arrays, timings={}, settings=Separable(), info={}).save(file)
+        result = run(picture, "-o", tmp_path / "a.zarr", "--reduce", f"psnr@{file}")
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert "frames.exr holds several images" in result.stderr
+
+    @pytest.mark.parametrize("option", ["--sheet", "--curves"])
+    def test_drawings_that_cannot_be_written(
+        self, tmp_path: Path, picture: Path, option: str
+    ) -> None:
+        """Known before anything is rendered."""
+        out = tmp_path / "a.zarr"
+        (tmp_path / "folder.png").mkdir()
+        for name, told in (("no/a.png", "No such file"), ("folder.png", "Is a directory")):
+            file = tmp_path / name
+            result = run(picture, "--axis", "blur_scale=1,2", "-o", out, option, file)
+            assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+            assert result.stderr.startswith(f"vkbloom: {file}: {told}")
+            assert not out.exists()
+
+
+class TestImageFiles:
+    def test_one_a_point_in_the_colours_of_apply(self, tmp_path: Path, picture: Path) -> None:
+        out = tmp_path / "files"
+        done(
+            picture,
+            "--axis",
+            "intensity=0,1",
+            "--axis",
+            "exposure=-1,0",
+            "-o",
+            out,
+            "--attachments",
+            "final,bloom",
+        )
+        assert sorted(path.name for path in out.iterdir()) == sorted(
+            [
+                f"00{i}_00{j}_{name}"
+                for i in (0, 1)
+                for j in (0, 1)
+                for name in ("final.png", "bloom.exr")
+            ]
+            + ["grid.json"]
+        )
+        CliRunner().invoke(
+            program,
+            [
+                "apply",
+                str(picture),
+                str(tmp_path / "one.png"),
+                "--exposure",
+                "-1",
+            ],
+        )
+        np.testing.assert_array_equal(
+            load(out / "001_000_final.png").pixels, load(tmp_path / "one.png").pixels
+        )
+
+    def test_exr_of_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
+        out = tmp_path / "files"
+        done(
+            "--axis",
+            "blur_scale=1,2",
+            "--size",
+            "20x10",
+            "-o",
+            out,
+            "--image-format",
+            "exr",
+            "--attachments",
+            "final",
+        )
+        expected = renderer.render(scene, Separable(blur_scale=2), (20, 10))["final"]
+        found = load(out / "001_final.exr").pixels
+        np.testing.assert_array_equal(np.rint(found * np.float32(255)), expected)
+
+    def test_resumed(self, tmp_path: Path, picture: Path) -> None:
+        out = tmp_path / "files"
+        words = [picture, "--axis", "exposure=0,1,2", "-o", out, "--image-format", "exr"]
+        done(*words)
+        names = sorted(path.name for path in out.iterdir())
+        before = load(out / "001_final.exr").pixels
+        (out / "001_final.exr").unlink()
+        assert "there is a grid already" in run(*words).stderr
+        assert "passes run 0" not in done(*words, "--resume")
+        assert sorted(path.name for path in out.iterdir()) == names
+        # (Not the bytes of the file, which has the time of its writing in it.)
+        np.testing.assert_array_equal(load(out / "001_final.exr").pixels, before)
+        assert "passes run 0" in done(*words, "--resume")
+        other = run(*words, "--resume", "--knee", "0.5")
+        assert other.exit_code == 1
+        assert "settings.knee" in other.stderr
+
+    def test_something_else_is_left_alone(self, tmp_path: Path, picture: Path) -> None:
+        (tmp_path / "files").mkdir()
+        (tmp_path / "files" / "letter.txt").write_text("dear")
+        result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", "--resume")
+        assert result.exit_code == 1
+        assert "there is no grid in it" in result.stderr
+
+    @pytest.mark.parametrize(
+        ("content", "told"),
+        [
+            (b"{", "grid.json: damaged"),
+            (b"\xff", "grid.json: damaged"),
+            (b"[" * 100_000, "grid.json: damaged"),
+            (b"[]", "another grid is there"),
+            (b'{"settings": 3}', "another grid is there"),
+        ],
+        ids=["half", "no text", "deep", "a list", "a number"],
+    )
+    def test_a_damaged_index(
+        self, tmp_path: Path, picture: Path, content: bytes, told: str
+    ) -> None:
+        out = tmp_path / "files"
+        done(picture, "-o", out)
+        (out / "grid.json").write_bytes(content)
+        before = {path: path.read_bytes() for path in out.iterdir()}
+        result = run(picture, "-o", out, "--resume")
+        assert result.exit_code == 1
+        assert told in result.stderr
+        assert {path: path.read_bytes() for path in out.iterdir()} == before
+
+    def test_what_is_for_stores(self, tmp_path: Path, picture: Path) -> None:
+        for words in (["--reduce", "mean"], ["--sheet", "a.png"], ["--chunk", "exposure=1"]):
+            result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", *words)
+            assert result.exit_code == 2
+            assert "for a store" in result.stderr
+
+    def test_formats_that_are_not_there(self, tmp_path: Path, picture: Path) -> None:
+        out = tmp_path / "files"
+        result = run(picture, "--axis", "exposure=0", "-o", out, "--image-format", "no")
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert "no image format for the extension '.no'" in result.stderr
+        assert not out.exists()
+
+
+TOML = """
+out = "{out}"
+images = ["{picture}"]
+attachments = "final,bloom"
+
+[settings]
+method = "pyramid"
+levels = 3
+firefly_filter = true
+bloom_size = [16, 8]
+
+[axes]
+radius = "0.5:2:2"
+intensity = [0.25, 1]
+tonemap = ["none", "aces"]
+
+[reduce]
+mean = "mean"
+energy = "encircled_energy:bloom"
+
+[chunks]
+intensity = 2
+"""
+
+YAML = """
+out: "{out}"
+images: "{picture}"
+attachments: final,bloom
+settings: {{method: pyramid, levels: 3, firefly_filter: true, bloom_size: [16, 8]}}
+axes:
+  radius: 0.5:2:2
+  intensity: [0.25, 1]
+  tonemap: [none, aces]
+reduce: {{mean: mean, energy: "encircled_energy:bloom"}}
+chunks: {{intensity: 2}}
+"""
+
+
+#: Lists in lists, 50 at a time, each within the next.
+CHAIN = "a0: &a0 1\n" + "".join(
+    f"a{i + 1}: &a{i + 1} {'[' * 50}*a{i}{']' * 50}\n" for i in range(40)
+)
+
+
+class TestOptionFiles:
+    @pytest.mark.parametrize(("suffix", "text"), [("toml", TOML), ("yaml", YAML)])
+    def test_holds_options(self, tmp_path: Path, picture: Path, suffix: str, text: str) -> None:
+        file = tmp_path / f"a.{suffix}"
+        file.write_text(text.format(out=tmp_path / "a.zarr", picture=picture))
+        done("--from", file)
+        found = xr.open_zarr(tmp_path / "a.zarr")
+        settings = json.loads(found.attrs["settings"])
+        assert (settings["levels"], settings["bloom_size"]) == (3, [16, 8])
+        assert settings["firefly_filter"] is True
+        assert dict(found.sizes)["radius"] == 2
+        assert list(found["tonemap"].values) == ["none", "aces"]
+        assert found["final"].chunks[1] == (2,)
+        assert {"mean", "energy"} <= set(found)
+        image = load(picture).pixels
+        with Renderer() as renderer:
+            expected = renderer.apply(
+                image,
+                Pyramid(
+                    levels=3,
+                    firefly_filter=True,
+                    radius=2,
+                    bloom_size=(16, 8),
+                    intensity=0.25,
+                    tonemap="aces",
+                ),
+            )
+        np.testing.assert_array_equal(found["final"].values[1, 0, 1], expected["final"])
+
+    def test_the_command_line_comes_on_top(self, tmp_path: Path, picture: Path) -> None:
+        file = tmp_path / "a.toml"
+        file.write_text(TOML.format(out=tmp_path / "a.zarr", picture=picture))
+        done(f"--from={file}", "--levels", "2", "-o", tmp_path / "b.zarr")
+        settings = json.loads(xr.open_zarr(tmp_path / "b.zarr").attrs["settings"])
+        assert settings["levels"] == 2
+        assert not (tmp_path / "a.zarr").exists()
+
+    def test_lists_in_lists(self, tmp_path: Path, picture: Path) -> None:
+        file = tmp_path / "a.toml"
+        file.write_text(
+            "[settings]\nlayers = [[1, 1], [2, 0.5]]\n[axes]\nbloom_size = [[4, 4], [8, 8]]\n"
+            "weights = [[0.5, 0.25], [1.0]]\n"
+        )
+        done(picture, "--from", file, "-o", tmp_path / "a.zarr")
+        found = xr.open_zarr(tmp_path / "a.zarr")
+        assert list(found["bloom_size"].values) == ["[4, 4]", "[8, 8]"]
+        assert list(found["weights"].values) == ["[0.5, 0.25]", "[1.0]"]
+        assert json.loads(found.attrs["settings"])["layers"] == [[1.0, 1.0], [2.0, 0.5]]
+
+    @pytest.mark.parametrize(
+        ("name", "text", "status", "told"),
+        [
+            ("a.toml", "a = ", 1, "a.toml: "),
+            ("a.yaml", "a: [", 1, "a.yaml: "),
+            ("a.yaml", "3", 1, "names and values"),
+            ("a.txt", "", 1, "none of .toml"),
+            ("a.toml", "axes = 3", 1, "axes must be a table"),
+            ("a.toml", "nonsense = 3", 2, "--nonsense"),
+            ("missing.toml", None, 1, "missing.toml: No such file"),
+            ("a.toml", 'from = "b.toml"', 1, "a.toml: from cannot stand in a file"),
+            ("a.toml", '"" = 1', 1, "a.toml: '' cannot name an option"),
+            # Found by fuzzing, or while its targets were written.
+            ("a.yaml", "images:", 1, "a.yaml: images must be a list"),
+            ("a.toml", "images = 3", 1, "a.toml: images must be a list"),
+            ("a.toml", 'resume = "yes"', 1, "a.toml: resume must be true or false, not 'yes'"),
+            ("a.toml", "settings = {bloom = 1}", 1, "a.toml: bloom must be true or false, not 1"),
+            ("a.yaml", "axes: {1: [[1, 2]]}", 2, "--axis 1: the method separable has no such"),
+            ("a.yaml", "a: !!bool x", 1, "a.yaml: a value does not fit its tag"),
+            ("a.yaml", "a: !!timestamp x", 1, "a.yaml: a value does not fit its tag"),
+            ("a.yaml", "a: !!float ''", 1, "a.yaml: a value does not fit its tag"),
+            ("a.yaml", "a: 2001-99-99", 1, "a.yaml: month must be"),
+            ("a.yaml", "a: &a [*a]", 1, "a.yaml: its values are too many, or hold each other"),
+            ("a.yaml", "axes: &a {b: *a}", 1, "a.yaml: its values are too many, or hold each"),
+            ("a.yaml", CHAIN, 1, "a.yaml: its values are too many, or hold each other"),
+            ("a.yaml", "a: " + "[" * 5000, 1, "a.yaml: its values are too many"),
+            ("a.toml", "a = " + "[" * 5000, 1, "a.toml: its values are too many"),
+            ("a.toml", "a" + ".a" * 500 + " = 1", 1, "a.toml: its values are too many"),
+            ("a.toml", "a = 0x" + "f" * 6000, 1, "a.toml: a whole number of over 64 bits"),
+            ("a.toml", 'axes = {exposure = ";"}', 2, "--axis exposure=;: it has no values"),
+            (
+                "a.toml",
+                'reduce = {p = "psnr@exposure=;"}\naxes = {exposure = [1]}',
+                2,
+                "--axis exposure=;: it has no values",
+            ),
+            ("a.toml", f"chunks = {{exposure = '{'9' * 5000}'}}", 2, "NAME=COUNT is needed"),
+            (
+                "a.toml",
+                'axes = {exposure = "0:1:600000", knee = "0:1:600000"}',
+                2,
+                "600000 values are out of range, 1 to 400000",
+            ),
+        ],
+        ids=lambda value: str(value)[:40],
+    )
+    def test_files_that_do_not_load(
+        self, tmp_path: Path, name: str, text: str | None, status: int, told: str
+    ) -> None:
+        if text is not None:
+            (tmp_path / name).write_text(text)
+        result = run("--from", tmp_path / name, "-o", tmp_path / "a.zarr")
+        assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
+        assert told in result.stderr
+
+    def test_bytes_that_are_no_text(self, tmp_path: Path) -> None:
+        (tmp_path / "a.toml").write_bytes(b"\xff")
+        result = run("--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
+        assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+        assert "a.toml: 'utf-8'" in result.stderr
+
+    @pytest.mark.parametrize("sequence", ["[{}]", "!!pairs [x: {}]"])
+    def test_values_that_are_named_many_times(self, tmp_path: Path, sequence: str) -> None:
+        # 9**12 letters, were they spelled.
+        lines = ["a0: &a0 lol"]
+        separator = ", x: " if "pairs" in sequence else ", "
+        for number in range(12):
+            listed = sequence.format(separator.join([f"*a{number}"] * 9))
+            lines.append(f"a{number + 1}: &a{number + 1} {listed}")
+        (tmp_path / "a.yaml").write_text("\n".join(lines))
+        tracemalloc.start()
+        try:
+            result = run("--from", tmp_path / "a.yaml", "-o", tmp_path / "a.zarr")
+            _, most = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        assert result.exit_code == 1
+        assert "a.yaml: its values are too many, or hold each other" in result.stderr
+        # The file's own words and modules that the first call loads take some MB.
+        assert most < 64 << 20
+
+    def test_a_flag_that_is_off(self, tmp_path: Path, picture: Path) -> None:
+        (tmp_path / "a.toml").write_text("resume = false\nraw = false\n[settings]\nbloom = false")
+        done(picture, "--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
+        settings = json.loads(xr.open_zarr(tmp_path / "a.zarr").attrs["settings"])
+        assert settings["bloom"] is False

@@ -1,0 +1,599 @@
+"""The doctor: right about this machine, and about machines where something is missing or broken."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from vkbloom import doctor
+from vkbloom.doctor import child, drivers, installation, trial
+from vkbloom.doctor.finding import Finding
+from vkbloom.io import pipeline_cache
+
+linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader works on Linux")
+
+# What makes the loader look elsewhere than on a machine where nothing is set.
+VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES")
+
+
+def by_topic(findings: Iterable[Finding], topic: str) -> Finding:
+    (found,) = (finding for finding in findings if finding.topic == topic)
+    return found
+
+
+def python(*arguments: str, **changes: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *arguments],
+        env={**os.environ, **changes},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
+    """Run ``vkbloom doctor --json``; return its status, its answer and its findings."""
+    ended = python("-m", "vkbloom.cli", "doctor", "--json", **changes)
+    assert ended.stderr == ""
+    answer = json.loads(ended.stdout)
+    return ended.returncode, answer, [Finding(**entry) for entry in answer["findings"]]
+
+
+@pytest.fixture(scope="module")
+def lavapipe() -> Path:
+    """Return the manifest of lavapipe."""
+    (manifest,) = (
+        Path(finding.found.partition(":")[0])
+        for finding in drivers.examine(None)
+        if finding.topic.startswith("driver lvp")
+    )
+    return manifest
+
+
+@pytest.fixture
+def without_variables(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+
+
+# As a whole
+
+
+def test_this_machine_can_render() -> None:
+    status, answer, findings = examined()
+    assert status == 0
+    assert answer["can_render"] is True
+    assert answer["version"] == vkbloom.__version__
+    for topic in ("vkbloom", "Vulkan loader", "adapters", "chosen adapter", "test render"):
+        assert by_topic(findings, topic).status == "ok"
+    for adapter in vkbloom.adapters():
+        assert adapter.name in by_topic(findings, "adapters").found
+    with vkbloom.Renderer() as renderer:
+        assert by_topic(findings, "chosen adapter").found.startswith(renderer.info.summary)
+
+
+def test_what_is_not_ok_has_advice_or_explains_itself() -> None:
+    _, _, findings = examined(VKBLOOM_ADAPTER="nonsense", VKBLOOM_CACHE_DIR="/dev/null/cache")
+    assert {finding.status for finding in findings} == {"ok", "note", "problem"}
+    for finding in findings:
+        assert finding.found
+        assert finding.advice or finding.status != "problem"
+
+
+def test_the_table_has_a_line_for_each_finding() -> None:
+    ended = python("-m", "vkbloom.cli", "doctor", VKBLOOM_ADAPTER="nonsense")
+    assert (ended.returncode, ended.stderr) == (0, "")
+    lines = ended.stdout.splitlines()
+    chosen = next(index for index, line in enumerate(lines) if "chosen adapter" in line)
+    assert lines[chosen].startswith("problem  ")
+    assert lines[chosen + 1].strip() == "-> Correct or unset VKBLOOM_ADAPTER."
+    assert lines[-1] == "This machine can render. Problems found: 1."
+
+
+@linux_only
+@pytest.mark.parametrize("variable", ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"])
+def test_no_driver(without_variables: None, variable: str) -> None:
+    status, answer, findings = examined(**{variable: "/nonexistent"})
+    assert (status, answer["can_render"]) == (1, False)
+    assert by_topic(findings, "Vulkan loader").status == "ok"
+    manifest = by_topic(findings, "driver nonexistent")
+    assert manifest.status == "problem"
+    assert f"/nonexistent, of {variable}, cannot be read: No such file" in manifest.found
+    assert by_topic(findings, "adapters").status == "problem"
+    assert f"{variable}=/nonexistent" in by_topic(findings, "environment").found
+    assert "test render" not in {finding.topic for finding in findings}
+
+
+@linux_only
+def test_no_driver_in_words(without_variables: None) -> None:
+    ended = python("-m", "vkbloom.cli", "doctor", VK_DRIVER_FILES="/nonexistent")
+    assert (ended.returncode, ended.stderr) == (1, "")
+    assert ended.stdout.endswith("\nNothing can render here. Problems found: 2.\n")
+
+
+@linux_only
+def test_broken_manifests(without_variables: None, tmp_path: Path) -> None:
+    damaged, missing = tmp_path / "damaged.json", tmp_path / "missing.json"
+    damaged.write_text("{broken")
+    missing.write_text(json.dumps({"ICD": {"library_path": str(tmp_path / "none.so")}}))
+    status, _, findings = examined(VK_DRIVER_FILES=f"{damaged}:{missing}")
+    assert status == 1
+    assert f"{damaged} is damaged: no JSON in line 1" in (
+        by_topic(findings, "driver damaged.json").found
+    )
+    assert f"{tmp_path / 'none.so'}: cannot open shared object file" in (
+        by_topic(findings, "driver missing.json").found
+    )
+    adapters = by_topic(findings, "adapters")
+    assert "the loader says: " in adapters.found
+    assert adapters.advice == "See to the problems above first."
+
+
+@linux_only
+def test_a_broken_driver_beside_one_that_works(
+    without_variables: None, tmp_path: Path, lavapipe: Path
+) -> None:
+    missing = tmp_path / "missing.json"
+    missing.write_text(
+        json.dumps({"file_format_version": "1.0.0", "ICD": {"library_path": "/none.so"}})
+    )
+    status, answer, findings = examined(VK_DRIVER_FILES=f"{missing}:{lavapipe}")
+    assert (status, answer["can_render"]) == (0, True)
+    assert by_topic(findings, "driver missing.json").status == "problem"
+    assert by_topic(findings, f"driver {lavapipe.name}").status == "ok"
+
+
+@pytest.fixture
+def without_loader(tmp_path: Path) -> dict[str, str]:
+    """Return an environment in which the loader does not open: a damaged file comes first."""
+    for name in ("libvulkan.so.1", "libvulkan.so"):
+        (tmp_path / name).touch()
+    return {"LD_LIBRARY_PATH": str(tmp_path)}
+
+
+@linux_only
+def test_the_package_works_without_a_loader(without_loader: dict[str, str]) -> None:
+    program = """
+import vkbloom
+assert vkbloom.adapters() == ()
+vkbloom.reference.gain(vkbloom.Separable())
+try:
+    vkbloom.Renderer()
+except vkbloom.AdapterNotFoundError as error:
+    print(error)
+"""
+    ended = python("-c", program, **without_loader)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "the Vulkan loader (libvulkan.so.1) is missing" in ended.stdout
+    assert "apt install libvulkan1 mesa-vulkan-drivers" in ended.stdout
+
+
+@linux_only
+def test_no_loader(without_loader: dict[str, str]) -> None:
+    status, answer, findings = examined(**without_loader)
+    assert (status, answer["can_render"]) == (1, False)
+    loader = by_topic(findings, "Vulkan loader")
+    assert loader.status == "problem"
+    assert loader.found.startswith("not found: ")
+    assert "apt install libvulkan1" in loader.advice
+    assert "loader (libvulkan.so.1) is missing" in by_topic(findings, "adapters").found
+
+
+def test_an_adapter_that_is_not_there() -> None:
+    status, _, findings = examined(VKBLOOM_ADAPTER="nonsense")
+    assert status == 0
+    chosen = by_topic(findings, "chosen adapter")
+    assert chosen.status == "problem"
+    assert "VKBLOOM_ADAPTER is 'nonsense'" in chosen.found
+    assert by_topic(findings, "test render").status == "ok"
+
+
+def test_a_chosen_adapter_tells_its_reason() -> None:
+    _, _, findings = examined(VKBLOOM_ADAPTER="software")
+    assert "VKBLOOM_ADAPTER is 'software'" in by_topic(findings, "chosen adapter").found
+
+
+@linux_only
+def test_no_validation_layer(tmp_path: Path) -> None:
+    status, _, findings = examined(VK_LAYER_PATH=str(tmp_path))
+    layer = by_topic(findings, "validation layer")
+    assert (status, layer.status) == (0, "note")
+    assert "is not installed" in layer.found
+    assert "apt install vulkan-validationlayers" in layer.advice
+
+
+@linux_only
+def test_a_validation_layer_that_does_not_open(tmp_path: Path) -> None:
+    (tmp_path / "layer.json").write_text(
+        json.dumps(
+            {
+                "file_format_version": "1.2.0",
+                "layer": {
+                    "name": "VK_LAYER_KHRONOS_validation",
+                    "type": "GLOBAL",
+                    "library_path": "/none.so",
+                    "api_version": "1.3.0",
+                    "implementation_version": "1",
+                    "description": "none",
+                },
+            }
+        )
+    )
+    status, _, findings = examined(VK_LAYER_PATH=str(tmp_path))
+    layer = by_topic(findings, "validation layer")
+    assert (status, layer.status) == (0, "problem")
+    assert "version 1.3.0 is installed, but the test render fails with it" in layer.found
+
+
+def test_nothing_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every process fails: the doctor still reports."""
+    failed = child.Answer(None, "no answer within 60 s", ("driver says no",))
+    monkeypatch.setattr(child, "ask", lambda *_, **__: failed)
+    report = doctor.examine()
+    assert not report.can_render
+    assert by_topic(report.findings, "Vulkan loader").found == "not found: no answer within 60 s"
+    assert "driver says no" in by_topic(report.findings, "adapters").found
+
+
+def test_wrong_pictures_are_no_rendering(monkeypatch: pytest.MonkeyPatch) -> None:
+    ask = child.ask
+
+    def tampered(*question: str, **options: Any) -> child.Answer:
+        answer = ask(*question, **options)
+        if question[0] == "render" and answer.value is not None:
+            return child.Answer({**answer.value, "differences": ["bloom is up to 9 off"]})
+        return answer
+
+    monkeypatch.setattr(child, "ask", tampered)
+    report = doctor.examine()
+    assert not report.can_render
+    render = by_topic(report.findings, "test render")
+    assert (render.status, "bloom is up to 9 off" in render.found) == ("problem", True)
+
+
+# Manifests
+
+
+@linux_only
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "no JSON in line 1"),
+        (b'{"ICD":\n{]', "no JSON in line 2"),
+        (b"[" * 100_000, "nested too deeply"),
+        (b"\xff\xfe\xff", "it is no text"),
+        (b"[]", 'it has no object "ICD"'),
+        (b'{"ICD": 1}', 'it has no object "ICD"'),
+        (b'{"ICD": {}}', 'its "ICD" has no "library_path"'),
+        (b'{"ICD": {"library_path": 5}}', 'its "ICD" has no "library_path"'),
+        (b'{"ICD": {"library_path": "a\\u0000b"}}', 'its "ICD" has no "library_path"'),
+        (b'{"ICD": {"library_path": "/none.so"}}', "/none.so: cannot open"),
+        (b'{"ICD": {"library_path": "./none.so"}}', "{tmp}/none.so: cannot open"),
+        (b'{"ICD": {"library_path": "libnone.so"}}', "libnone.so: cannot open"),
+        (b'{"ICD": {"library_path": "./driver.json"}}', "{tmp}/driver.json: "),
+        (b'{"ICD": {"library_path": "libc.so.6"}}', "undefined symbol: vk_icdGetInstanceProcAddr"),
+    ],
+)
+def test_a_manifest_that_does_not_work(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, content: bytes, reason: str
+) -> None:
+    manifest = tmp_path / "driver.json"
+    manifest.write_bytes(content)
+    monkeypatch.setenv("VK_DRIVER_FILES", str(manifest))
+    finding = by_topic(drivers.examine(None), "driver driver.json")
+    assert finding.status == "problem"
+    assert finding.found.startswith(str(manifest))
+    assert reason.replace("{tmp}", str(tmp_path)) in finding.found
+
+
+@linux_only
+def test_a_manifest_of_another_architecture(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    manifest = tmp_path / "driver.json"
+    bits = 32 if sys.maxsize > 2**32 else 64
+    manifest.write_text(
+        json.dumps({"ICD": {"library_path": "/none.so", "library_arch": str(bits)}})
+    )
+    monkeypatch.setenv("VK_DRIVER_FILES", str(manifest))
+    finding = by_topic(drivers.examine(None), "driver driver.json")
+    assert finding.status == "note"
+    assert f"for {bits}-bit programs" in finding.found
+
+
+@linux_only
+def test_a_folder_of_manifests(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, lavapipe: Path
+) -> None:
+    (tmp_path / "b.json").write_text("{")
+    (tmp_path / "a.json").symlink_to(lavapipe)
+    (tmp_path / "readme.txt").touch()
+    monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path))
+    found = [(finding.topic, finding.status) for finding in drivers.examine(None)]
+    assert found == [("drivers", "note"), ("driver a.json", "ok"), ("driver b.json", "problem")]
+
+
+@linux_only
+def test_the_search_follows_the_loaders_order(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, without_variables: None
+) -> None:
+    names = ("XDG_CONFIG_HOME", "XDG_CONFIG_DIRS", "XDG_DATA_HOME", "XDG_DATA_DIRS")
+    for name in reversed(names):
+        folder = tmp_path / name / "vulkan/icd.d"
+        folder.mkdir(parents=True)
+        (folder / f"{name}.json").write_text("{")
+        monkeypatch.setenv(name, str(tmp_path / name))
+    added = tmp_path / "added.json"
+    added.write_text("{")
+    monkeypatch.setenv("VK_ADD_DRIVER_FILES", str(added))
+    topics = [finding.topic for finding in drivers.examine(None)]
+    ours = [topic for topic in topics if topic.startswith(("driver XDG", "driver added"))]
+    assert ours == ["driver added.json", *(f"driver {name}.json" for name in names)]
+
+    monkeypatch.setenv("VK_DRIVER_FILES", "/nonexistent")
+    assert [finding.topic for finding in drivers.examine(None)] == ["drivers", "driver nonexistent"]
+
+
+@linux_only
+def test_nowhere_a_manifest(monkeypatch: pytest.MonkeyPatch, without_variables: None) -> None:
+    monkeypatch.setattr(drivers, "_standard_folders", lambda: [Path("/nonexistent/icd.d")])
+    (finding,) = drivers.examine(None)
+    assert finding.status == "problem"
+    assert "/nonexistent/icd.d" in finding.found
+    assert "apt install mesa-vulkan-drivers" in finding.advice
+
+
+@linux_only
+def test_an_empty_variable_hides_every_driver(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VK_DRIVER_FILES", "")
+    (finding,) = drivers.examine(None)
+    assert finding.status == "problem"
+    assert finding.advice.startswith("Unset VK_DRIVER_FILES")
+    status, _, _ = examined(VK_DRIVER_FILES="")
+    assert status == 1
+
+
+@linux_only
+@pytest.mark.parametrize(("version", "knows"), [((1, 3, 204), False), ((1, 3, 207), True)])
+def test_an_old_loader_knows_the_old_variable_only(
+    monkeypatch: pytest.MonkeyPatch,
+    without_variables: None,
+    version: tuple[int, ...],
+    knows: bool,
+) -> None:
+    monkeypatch.setenv("VK_DRIVER_FILES", "/new.json")
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/old.json")
+    findings = drivers.examine(version)
+    topics = {finding.topic for finding in findings}
+    assert ("driver new.json" in topics, "driver old.json" in topics) == (knows, not knows)
+    advice = {finding.advice for finding in findings}
+    assert ("Set VK_ICD_FILENAMES to the same value." in advice) == (not knows)
+
+
+# Processes of their own
+
+
+@linux_only
+def test_a_driver_that_crashes_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    crash = "import os; os.kill(os.getpid(), 11)"
+    monkeypatch.setattr(child, "_OPEN_DRIVER", crash)
+    assert child.why_driver_does_not_open("any.so") == (
+        "the process that tried it was ended by signal 11 (SIGSEGV)"
+    )
+
+
+def test_a_driver_that_never_returns_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(child, "_OPEN_DRIVER", "import time; time.sleep(60)")
+    monkeypatch.setattr(child, "TIMEOUT", 0.25)
+    assert child.why_driver_does_not_open("any.so") == "no answer within 0.25 s"
+
+
+@linux_only
+@pytest.mark.parametrize(
+    ("executable", "failure"),
+    [
+        ("", "this Python does not know its own executable"),
+        ("/nonexistent", "/nonexistent does not start: No such file"),
+        ("/bin/true", "ended without an answer"),
+        ("/bin/false", "exit 1"),
+    ],
+)
+def test_a_process_that_gives_no_answer(
+    monkeypatch: pytest.MonkeyPatch, executable: str, failure: str
+) -> None:
+    monkeypatch.setattr(sys, "executable", executable)
+    answer = child.ask("loader")
+    assert answer.value is None
+    assert failure in answer.failure
+
+
+def test_a_question_that_fails_is_answered() -> None:
+    answer = child.ask("render", "no such adapter", "plain")
+    assert answer.value is None
+    # Without the advice for those who do not ask the doctor.
+    assert answer.failure.startswith('no Vulkan adapter for "no such adapter"; found: ')
+    assert "apt install" not in answer.failure
+
+
+# The test render
+
+
+@pytest.fixture(scope="module")
+def frames() -> vkbloom.Frames:
+    with vkbloom.Renderer("software") as renderer:
+        return trial.render(renderer)
+
+
+def test_a_right_render_has_no_differences(frames: vkbloom.Frames) -> None:
+    assert trial.differences(frames) == []
+
+
+@pytest.mark.parametrize("name", ["glow", "blur_vertical", "bloom", "depth", "final"])
+def test_a_wrong_framebuffer_is_found(frames: vkbloom.Frames, name: str) -> None:
+    arrays = {key: array.copy() for key, array in frames.items()}
+    arrays[name][5, 7] = np.where(arrays[name][5, 7] > 0.5, 0, 1) * (1 if name == "depth" else 99)
+    tampered = vkbloom.Frames(arrays, timings={}, settings=frames.settings, info={})
+    found = trial.differences(tampered)
+    assert any(sentence.startswith(f"{name} is up to ") for sentence in found)
+
+
+def test_a_mirrored_picture_is_found(frames: vkbloom.Frames) -> None:
+    arrays = {key: array[:, ::-1].copy() for key, array in frames.items()}
+    tampered = vkbloom.Frames(arrays, timings={}, settings=frames.settings, info={})
+    assert any(sentence.startswith("glow ") for sentence in trial.differences(tampered))
+
+
+def test_an_upside_down_picture_is_found(frames: vkbloom.Frames) -> None:
+    arrays = {key: array[::-1].copy() for key, array in frames.items()}
+    tampered = vkbloom.Frames(arrays, timings={}, settings=frames.settings, info={})
+    assert any(sentence.startswith("depth ") for sentence in trial.differences(tampered))
+
+
+def test_nan_is_found(frames: vkbloom.Frames) -> None:
+    arrays = {key: array.copy() for key, array in frames.items()}
+    arrays["depth"][0, 0] = np.nan
+    tampered = vkbloom.Frames(arrays, timings={}, settings=frames.settings, info={})
+    assert [sentence.split()[0] for sentence in trial.differences(tampered)] == ["depth"]
+
+
+# The installation
+
+
+def test_the_cache_of_a_render_is_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
+    assert installation.cache([]) == Finding("pipeline cache", "ok", f"{tmp_path}; no file yet")
+    with vkbloom.Renderer("software") as renderer:
+        trial.render(renderer)
+    (file,) = tmp_path.iterdir()
+    uuid = file.stem.removeprefix("pipelines-")
+    here = f"{file.name} ({file.stat().st_size} bytes, whole, of a driver that is "
+    finding = installation.cache([uuid])
+    assert (finding.status, f"{here}here)" in finding.found) == ("ok", True)
+    assert f"{here}not here)" in installation.cache([]).found
+
+
+def test_a_damaged_cache_is_noted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
+    uuid = bytes(range(16))
+    pipeline_cache.write(uuid, b"pipelines")
+    file = tmp_path / f"pipelines-{uuid.hex()}.bin"
+    file.write_bytes(file.read_bytes()[:-1])
+    (tmp_path / "pipelines-of-mine.bin").touch()
+    finding = installation.cache([])
+    assert finding.status == "note"
+    assert f"{file.name} is damaged" in finding.found
+    assert "pipelines-of-mine.bin is not of vkbloom" in finding.found
+
+
+def test_a_cache_file_that_cannot_be_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
+    # A folder, as permissions do not stop root.
+    (tmp_path / f"pipelines-{'00' * 16}.bin").mkdir()
+    assert "is damaged or cannot be read" in installation.cache([]).found
+
+
+@pytest.mark.parametrize("below", ["", "/below", "/far/below"])
+def test_a_cache_folder_that_cannot_be(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, below: str
+) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", f"{file}{below}")
+    finding = installation.cache([])
+    assert finding.status == "note"
+    assert "not writable" in finding.found
+    assert "VKBLOOM_CACHE_DIR" in finding.advice
+
+
+def test_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
+    finding = installation.cache([])
+    assert finding.found == "off, as VKBLOOM_CACHE_DIR is set to nothing"
+
+
+def test_examining_the_cache_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "new"))
+    assert installation.cache([]).status == "ok"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_extras_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    # The others are for work on the package, or stand for several.
+    of_users = {*project["optional-dependencies"]} - {"all", "test", "docs", "lint"}
+    findings = {finding.topic.removeprefix("extra "): finding for finding in installation.extras()}
+    assert findings.keys() == of_users
+    # What an extra needs is that of the version that is installed, which may be an older one.
+    for name in of_users & {*metadata.metadata("vkbloom").get_all("Provides-Extra", [])}:
+        assert findings[name].found.partition(";")[0], "it needs something"
+
+    version = metadata.version
+
+    def without_openimageio(name: str) -> str:
+        if name == "OpenImageIO":
+            raise metadata.PackageNotFoundError(name)
+        return version(name)
+
+    monkeypatch.setattr(metadata, "version", without_openimageio)
+    finding = by_topic(installation.extras(), "extra images")
+    assert finding.status == "note"
+    assert finding.found.startswith("missing: OpenImageIO; for ")
+    assert "pip install vkbloom[images]" in finding.advice
+
+
+@linux_only
+@pytest.mark.parametrize(
+    ("accessible", "has_adapter", "status", "text"),
+    [
+        (True, True, "ok", "an adapter that uses it"),
+        (True, False, "note", "no Vulkan adapter that uses it"),
+        (False, False, "problem", "cannot be opened by this user"),
+        (False, True, "ok", "cannot be opened by this user"),
+    ],
+)
+def test_gpus(
+    monkeypatch: pytest.MonkeyPatch, accessible: bool, has_adapter: bool, status: str, text: str
+) -> None:
+    node = Path("/dev/dri/renderD128")
+    monkeypatch.setattr(Path, "glob", lambda _, pattern: [node] if "render" in pattern else [])
+    monkeypatch.setattr(os, "access", lambda *_: accessible)
+    (finding,) = installation.gpu_nodes(has_adapter)
+    assert (finding.status, str(node) in finding.found, text in finding.found) == (
+        status,
+        True,
+        True,
+    )
+
+
+def test_no_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "glob", lambda *_: [])
+    assert installation.gpu_nodes(False) == []
+
+
+@pytest.mark.parametrize(
+    ("driver_info", "status"),
+    [
+        ("Mesa 22.3.6 (LLVM 15.0.6)", "ok"),
+        ("Mesa 25.0.7-2~bpo12+1 (LLVM 15.0.6)", "ok"),
+        ("Mesa 22.3.60 (LLVM 15.0.6)", "note"),
+        ("Mesa 24.2.8-1ubuntu1 (LLVM 19.1.1)", "note"),
+        ("", "note"),
+    ],
+)
+def test_lavapipe_versions(driver_info: str, status: str) -> None:
+    finding = doctor._software([{"type": "cpu", "driver_info": driver_info}])
+    assert finding.status == status
+    assert "22.3.6 and 25.0.7" in finding.found

@@ -1,0 +1,319 @@
+"""Make every call of workloads fail once, and print what came of each as one line of JSON.
+
+Runs over a core built with VKBLOOM_FAULTS: ``python fault_walk.py STRIDE [WORKLOAD ...]``. Point n
+is the n-th Vulkan call or allocation; the walk ends where the workload passes without reaching it.
+Of STRIDE points one is walked (1: all of them); without workloads, all of them are.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+import tempfile
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.screens import CAMERA, panel
+from vkbloom import Renderer, Scene, _core
+from vkbloom.scene.textures import Texture
+
+OUT_OF_DEVICE_MEMORY = -2
+DEVICE_LOST = -4
+#: The calls that find out that a device is lost.
+CAN_LOSE = "vkQueueSubmit vkWaitForFences vkGetQueryPoolResults"
+SIZE = (24, 16)
+
+Arrays = Mapping[str, NDArray[Any]]
+Work = Callable[[Renderer], Arrays]
+Result = TypeVar("Result")
+core: Any = _core  # arm_fault and fault_state are in test builds only
+
+
+def textured() -> Scene:
+    """Return a scene with textures of two meshes, of which one emits."""
+    colours = np.random.default_rng(1).random((5, 7, 4)).astype(np.float16)
+    body = panel(SIZE, Texture((colours,)), Texture((colours[:3, :3],)), radiance=(1.0, 2.0, 1.0))
+    glow = panel(SIZE, Texture((colours[:, :2],)), across=(0.2, 0.5))
+    return Scene(body=body, glow=glow, camera=CAMERA)
+
+
+def picture(size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
+    values = np.random.default_rng(2).random((size[1], size[0], 4)) ** 8
+    return (values * 255).astype(dtype) if dtype == np.uint8 else values.astype(dtype)
+
+
+def method(settings: vkbloom.Settings) -> Work:
+    return lambda renderer: renderer.apply(picture(SIZE), settings)
+
+
+def batch(renderer: Renderer) -> Arrays:
+    settings = [vkbloom.Separable(exposure=step / 4, loops=1 + step // 5) for step in range(8)]
+    frames = renderer.apply_many(picture(SIZE), settings)
+    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+
+
+def grid(renderer: Renderer) -> Arrays:
+    settings = [vkbloom.Pyramid(levels=2, radius=step / 2) for step in range(5)]
+    frames = renderer.render_many(UFO, settings, SIZE, attachments=("final", "bloom"))
+    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+
+
+def readback(renderer: Renderer) -> Arrays:
+    """Large enough for the device to write into the arrays themselves.
+
+    The caller's own array, the renderer's new pages, and the same pages once their array is gone.
+    """
+    image = picture((512, 512), np.uint8)
+
+    def final(exposure: float, **out: Any) -> NDArray[Any]:
+        settings = vkbloom.Separable(exposure=exposure)
+        return renderer.apply(image, settings, attachments="final", **out)["final"]
+
+    own = final(1.0, out={"final": np.zeros((512, 512, 4), np.uint8)})
+    first = final(0.5)
+    place, new = first.ctypes.data, first.copy()
+    del first
+    again = final(0.25)
+    # Neither this process nor a fault takes idle pages away.
+    assert again.ctypes.data == place
+    return {"own": own, "new": new, "again": again}
+
+
+def variables(dataset: Any) -> Arrays:
+    return {str(name): variable.values for name, variable in dataset.variables.items()}
+
+
+AXES = {"radius": [0.25, 0.5, 0.75], "exposure": [0.5, 1.0]}
+
+
+def grid_in_memory(renderer: Renderer) -> Arrays:
+    base = vkbloom.Pyramid(levels=2)
+    return variables(renderer.grid(picture(SIZE), base, AXES, progress=False))
+
+
+#: Where the grid lies that a fault has ended; the next call goes on with it.
+FOLDER = Path(tempfile.gettempdir()) / f"vkbloom-fault-walk-{os.getpid()}"
+
+
+def grid_to_zarr(_: Renderer) -> Arrays:
+    """Opens its own renderer. What is whole is removed, so that the next one begins anew."""
+    base = vkbloom.Pyramid(levels=2)
+    dataset = vkbloom.grid_to_zarr(
+        picture(SIZE),
+        base,
+        AXES,
+        FOLDER,
+        chunks={"exposure": 2},
+        reduce={"mean": vkbloom.reductions.Mean()},
+        validation=True,
+        progress=False,
+    )
+    arrays = variables(dataset)
+    assert arrays["done"].all()
+    shutil.rmtree(FOLDER)
+    return arrays
+
+
+UFO = Scene.ufo()
+WORK: dict[str, Work] = {
+    "render forward": lambda renderer: renderer.render(UFO, size=SIZE),
+    "render deferred": lambda renderer: renderer.render(textured(), size=SIZE, shading="deferred"),
+    "batch": batch,
+    "grid": grid,
+    "grid in memory": grid_in_memory,
+    "grid to Zarr": grid_to_zarr,
+    "readback": readback,
+    **{
+        f"apply {preset} {form}": method(settings)
+        for preset, settings in vkbloom.presets.items()
+        for form in ("fragment", "cpu", "gpu")
+    },
+}
+
+
+def state() -> dict[str, int]:
+    """Return what must be as before when all renderers are closed."""
+    _, _, blocks, messages = core.fault_state()
+    count = {"blocks": blocks, "messages": messages}
+    if Path("/proc/self/fd").is_dir():
+        count["descriptors"] = len(os.listdir("/proc/self/fd"))
+    return count
+
+
+def open_renderer() -> Renderer:
+    return Renderer(validation=True)
+
+
+def check_error(error: BaseException, failed: str, result: int) -> None:
+    """The exception says what failed, and is of the class that fits."""
+    if failed == "vkb_alloc":
+        assert isinstance(error, MemoryError), error
+        return
+    assert isinstance(error, vkbloom.Error), error
+    if failed == "vkEnumerateInstanceLayerProperties":
+        assert "validation was asked for" in str(error), error
+        return
+    if failed == "volkInitialize":
+        assert isinstance(error, vkbloom.AdapterNotFoundError), error
+        return
+    expected = vkbloom.OutOfMemoryError if result != DEVICE_LOST else vkbloom.DeviceLostError
+    assert type(error) is expected, error
+    assert (error.vk_call, error.vk_result) == (failed, result)
+    assert failed in str(error)
+
+
+def same(arrays: Arrays, right: Arrays) -> None:
+    assert list(arrays) == list(right)
+    for name, array in right.items():
+        np.testing.assert_array_equal(arrays[name], array, err_msg=name)
+
+
+class Walk:
+    """One workload, point after point.
+
+    Attributes
+    ----------
+    walked, raised, survived : int
+        Points; those that raised; those that the workload did without.
+    calls : dict
+        How often each call was the one to fail.
+    """
+
+    def __init__(self, name: str, work: Work | None) -> None:
+        self.name, self.work = name, work
+        self.walked = self.raised = self.survived = self.points = 0
+        self.calls: dict[str, int] = {}
+
+    def _fail(self, error: BaseException | None, failed: str, result: int) -> None:
+        self.walked += 1
+        self.calls[failed] = self.calls.get(failed, 0) + 1
+        self.raised += error is not None
+        self.survived += error is None
+        if error is not None:
+            check_error(error, failed, result)
+
+    def _at(
+        self, n: int, result: int, names: str, call: Callable[[], Result]
+    ) -> tuple[Result | None, BaseException | None, bool]:
+        """Call with a fault at the n-th point: what is returned, raised, and whether it was met."""
+        value: Result | None = None
+        error: BaseException | None = None
+        core.arm_fault(n, result, names)
+        try:
+            value = call()
+        except Exception as raised:
+            # Without its frames, which hold the batch and this variable.
+            error = raised.with_traceback(None)
+        passed, failed, *_ = core.fault_state()
+        core.arm_fault(0, 0, "")
+        if failed:
+            self._fail(error, failed, result)
+        self.points = max(self.points, passed)
+        return value, error, bool(failed)
+
+    def renderer_at(self, n: int, result: int) -> bool:
+        """Opening a renderer with a fault at its n-th point; False: there are fewer."""
+        renderer, error, failed = self._at(n, result, "", open_renderer)
+        if error is not None and not failed:
+            raise error
+        if renderer is not None:
+            renderer.close()
+        with open_renderer() as again:
+            assert not again.closed
+        return failed
+
+    def close_at(self, n: int, result: int, names: str) -> bool:
+        """Closing a renderer while the device is at work for it."""
+        renderer = open_renderer()
+        frames = renderer.apply_many(picture((64, 64)), [vkbloom.Separable()] * 9)
+        next(frames)
+        next(frames)
+        _, _, failed = self._at(n, result, names, renderer.close)
+        assert renderer.closed
+        return failed
+
+    def work_at(self, n: int, right: Arrays, result: int, names: str) -> bool:
+        """A workload in a new renderer; afterwards the same without a fault, if that can be."""
+        assert self.work is not None
+        work, renderer = self.work, open_renderer()
+        arrays, error, failed = self._at(n, result, names, lambda: work(renderer))
+        if error is not None and not failed:
+            raise error
+        if arrays is not None:
+            same(arrays, right)
+        # A grid in a store has a renderer of its own, which is closed by now.
+        if isinstance(error, vkbloom.DeviceLostError) and self.work is not grid_to_zarr:
+            for _ in range(2):
+                try:
+                    self.work(renderer)
+                except vkbloom.DeviceLostError:
+                    pass
+                else:
+                    raise AssertionError("a lost device worked")
+        else:
+            same(self.work(renderer), right)
+        renderer.close()
+        return failed
+
+
+def walk(point: Callable[[int], bool], first: int, stride: int, before: dict[str, int]) -> None:
+    n = first
+    while True:
+        try:
+            there = point(n)
+            assert state() == before, (state(), before)
+        except BaseException as error:
+            error.add_note(f"at point {n}: {core.fault_state()}")
+            raise
+        if not there:
+            return
+        n += stride
+
+
+def walk_one(name: str, stride: int) -> None:
+    os.environ["VKBLOOM_FORM"] = name.rsplit(" ", 1)[1] if name.startswith("apply ") else "auto"
+    one = Walk(name, WORK.get(name))
+    # Strides start elsewhere for each workload, so that they do not leave out the same calls.
+    start = 1 + zlib.crc32(name.encode()) % stride
+    before = state()
+    if name == "create":
+        walk(lambda n: one.renderer_at(n, OUT_OF_DEVICE_MEMORY), start, stride, before)
+    elif name == "close":
+        walk(lambda n: one.close_at(n, OUT_OF_DEVICE_MEMORY, ""), 1, 1, before)
+        walk(lambda n: one.close_at(n, DEVICE_LOST, CAN_LOSE), 1, 1, before)
+    else:
+        assert one.work is not None
+        with open_renderer() as renderer:
+            right = {key: array.copy() for key, array in one.work(renderer).items()}
+        # With the libraries' event loops and the like, which the first grid of a process opens.
+        opened = state()
+        assert {**opened, "descriptors": 0} == {**before, "descriptors": 0}, (opened, before)
+        before = opened
+        walk(lambda n: one.work_at(n, right, OUT_OF_DEVICE_MEMORY, ""), start, stride, before)
+        walk(lambda n: one.work_at(n, right, DEVICE_LOST, CAN_LOSE), 1 + start % 4, stride, before)
+    columns = ("points", "walked", "raised", "survived", "calls")
+    figures = {column: getattr(one, column) for column in columns}
+    print(json.dumps({"workload": name, **figures}), flush=True)
+
+
+def main(stride: int, names: list[str]) -> None:
+    # What is made once in a process is there before anything is counted.
+    with open_renderer() as renderer:
+        WORK["render forward"](renderer)
+    try:
+        for name in names or ["create", "close", *WORK]:
+            walk_one(name, stride)
+    finally:
+        shutil.rmtree(FOLDER, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2:])

@@ -1,0 +1,91 @@
+"""What a renderer does on a lesser device, of which test_lesser_devices.py tells; prints JSON."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import vkbloom
+from tests import tolerance
+from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, UnrealBloom
+from vkbloom.scene import skybox
+
+DTYPES = ("uint8", "float16", "float32")
+# One of each form: lines, strips and tiles, levels half and twice as large, sums of all levels.
+SETTINGS = {
+    "whole": Separable(threshold=0.4),
+    "smaller": Separable(bloom_scale=0.5),
+    "layers": Separable(layers=((1.0, 0.5), (2.0, 0.5))),
+    "pyramid": Pyramid(levels=3, threshold=0.4, knee=0.5),
+    "kawase": DualKawase(levels=2),
+    "gathered": UnrealBloom(),
+}
+
+#: Beyond it images come back past the staging memory, where the device can do that.
+LARGE = (600, 500)
+
+
+def picture(size: tuple[int, int], channels: int, dtype: str) -> Any:
+    width, height = size
+    values = np.random.default_rng(5).random((height, width, channels), dtype=np.float32)
+    return (values * 255).astype(dtype) if dtype == "uint8" else values.astype(dtype)
+
+
+def try_all(renderer: Renderer) -> dict[str, str]:
+    """Return what went wrong, by what it was."""
+    wrong: dict[str, str] = {}
+
+    def attempt(name: str, call: Callable[[], object]) -> None:
+        try:
+            call()
+        except Exception as error:
+            wrong[name] = f"{type(error).__name__}: {error}"
+
+    def apply(image: Any, settings: vkbloom.Settings) -> None:
+        tolerance.assert_matches_reference(renderer.apply(image, settings), image, settings)
+        last = settings.replace(exposure=0.5)
+        alone = renderer.apply(image, last, attachments=("final",))["final"]
+        np.testing.assert_array_equal(alone, renderer.apply(image, last)["final"])
+
+    scene = Scene.ufo()
+    for name, settings in SETTINGS.items():
+        for dtype in DTYPES:
+            image = picture((28, 20), 3, dtype)
+            attempt(f"{name} {dtype}", lambda: apply(image, settings))  # noqa: B023  called here
+        for shading in ("forward", "deferred"):
+            attempt(
+                f"{name} {shading}",
+                lambda: renderer.render(scene, settings, (40, 30), shading=shading),  # noqa: B023
+            )
+    large = picture(LARGE, 4, "uint8")
+    attempt("large", lambda: apply(large, Separable()))
+    for dtype in DTYPES:
+        sky = skybox.load(picture((4, 24), 4, dtype).reshape(6, 4, 4, 4))
+        with_sky = dataclasses.replace(scene, skybox=sky)
+        attempt(f"sky {dtype}", lambda: renderer.render(with_sky, None, (40, 30)))  # noqa: B023
+    for size in ((6000, 1), (1, 6000)):
+        attempt(f"{size[0]} x {size[1]}", lambda: renderer.render(scene, None, size))  # noqa: B023
+    return wrong
+
+
+def timed(frames: Frames) -> bool:
+    return not any(math.isnan(seconds) for seconds in frames.timings.values())
+
+
+def main() -> None:
+    renderer = Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True)
+    wrong = try_all(renderer)
+    # Other settings than before, so that passes run.
+    frames = renderer.apply(picture((9, 9), 3, "uint8"), Separable(blur_strength=0.125))
+    print(json.dumps({"type": renderer.info.type, "wrong": wrong, "timed": timed(frames)}))
+    renderer.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,81 @@
+"""Refuse each of Python's own allocations in a frame once; print how many there were.
+
+A small frame, and one whose array is in pages of the renderer's.
+
+CPython's tests can tell its allocators to fail from the n-th request on. The batch of a frame is
+filled, submitted and collected with one request refused: it raises MemoryError or does without, no
+block of the core is left, and the next frame is exact. Runs over a core built with VKBLOOM_FAULTS.
+"""
+
+from __future__ import annotations
+
+import _testcapi  # type: ignore[import-not-found]
+from typing import Any
+
+import numpy as np
+from numpy._core.multiarray import get_handler_name
+from numpy.typing import NDArray
+
+from tests.core.fault_walk import SIZE, core, open_renderer, picture
+from vkbloom import Renderer, Separable
+from vkbloom.renderer import _allocator
+
+BEYOND = 40  # a frame that does without one refused block may stop at the next
+
+
+def collected(
+    renderer: Renderer, image: NDArray[Any], n: int
+) -> tuple[bool, dict[str, Any] | None]:
+    """Return whether request n was refused (0: none is), and the frame, or None after an error."""
+    settings, allocate = Separable(), _allocator(renderer._core, None)
+    result = None
+    failed = False
+    if n:
+        _testcapi.set_nomemory(n - 1, n)
+    try:
+        batch = renderer._core.apply(image, ("glow", "final"))
+        batch.add(settings, allocate)
+        batch.submit()
+        result = batch.collect()[0][0]
+    except MemoryError:
+        failed = True
+    finally:
+        _testcapi.remove_mem_hooks()
+    return failed, result
+
+
+def walk(image: NDArray[Any]) -> tuple[int, int]:
+    """Walk until as many requests as BEYOND in a row were not refused; return both counts."""
+    with open_renderer() as renderer:
+        # Two at once, as below: with the pages of both.
+        frames = [collected(renderer, image, 0)[1] for _ in range(2)]
+        frame = frames.pop()
+        assert frame is not None
+        right = {name: array.copy() for name, array in frame.items()}
+        frames, frame = [], None
+        before = core.fault_state()[2]
+        refused = beyond = n = 0
+        while beyond < BEYOND:
+            n += 1
+            failed, result = collected(renderer, image, n)
+            assert get_handler_name() == "default_allocator"
+            refused += failed
+            beyond = 0 if failed else beyond + 1
+            for frame in (result, collected(renderer, image, 0)[1]):
+                if frame is not None:
+                    for name, array in right.items():
+                        np.testing.assert_array_equal(frame[name], array)
+            frame = result = None
+            assert core.fault_state()[2] == before, (n, core.fault_state())
+    return n - BEYOND, refused
+
+
+def main() -> None:
+    """Walk both frames, and print the counts of both together."""
+    walks = [walk(picture(SIZE)), walk(picture((512, 300)))]
+    requests, refused = (sum(counts) for counts in zip(*walks, strict=True))
+    print(f"{requests} requests of memory, {refused} raised MemoryError")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,527 @@
+"""Many settings over one source: the same frames as one by one, in order, whatever happens."""
+
+from __future__ import annotations
+
+import gc
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from vkbloom import (
+    DualKawase,
+    Frames,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    _core,
+    requests,
+)
+from vkbloom.renderer import _scene_arrays
+
+SIZE = (64, 36)
+
+
+def picture(width: int, height: int, channels: int, seed: int) -> Any:
+    return np.random.default_rng(seed).random((height, width, channels), dtype=np.float32)
+
+
+def assert_same(frames: Frames, expected: Frames) -> None:
+    assert frames.settings == expected.settings
+    assert list(frames) == list(expected)
+    for name in expected:
+        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
+
+
+#: Changes of one pass, of all, of the images' number, sizes and formats; more than one batch.
+SEQUENCE: list[Settings] = [
+    *(Separable(exposure=exposure / 8, tonemap="aces") for exposure in range(12)),
+    *(Separable(blur_strength=strength / 4) for strength in range(12)),
+    *(Separable(threshold=threshold / 8) for threshold in range(6)),
+    *(Separable(bloom_size=(10 + size, 20 - size)) for size in range(6)),
+    Separable(loops=3),
+    Separable(direct=True),
+    Separable(direct=True, exposure=1.0),
+    *(Pyramid(levels=levels) for levels in (1, 2, 3, 3)),
+    *(DualKawase(offset=offset) for offset in (0.5, 1.0, 1.5)),
+    Separable(bloom=False),
+    *(Separable(format=format) for format in ("rgba8unorm", "rgba16float", "rgba32float")),
+    Separable(),
+]
+
+
+# The same frames
+
+
+@pytest.mark.parametrize("attachments", ["all", ("bloom", "final"), "final", ()], ids=str)
+def test_images_one_by_one_and_many(
+    new_renderer: Callable[[], Renderer], attachments: str | Sequence[str]
+) -> None:
+    image = picture(40, 30, 3, 1)
+    alone, together = new_renderer(), new_renderer()
+    sequence = [settings for settings in SEQUENCE if settings.bloom or "bloom" not in attachments]
+    expected = [alone.apply(image, s, attachments=attachments) for s in sequence]
+    frames = list(together.apply_many(image, sequence, attachments=attachments))
+    assert len(frames) == len(sequence)
+    for got, right in zip(frames, expected, strict=True):
+        assert_same(got, right)
+        # Each point runs what is out of date at its place, and has times of its own.
+        assert list(got.timings) == list(right.timings)
+        assert all(seconds >= 0.0 for seconds in got.timings.values())
+        assert got.info == right.info
+    # The device is where the last single call would have left it.
+    assert_same(together.apply(image, SEQUENCE[-1]), alone.apply(image, SEQUENCE[-1]))
+
+
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_scenes_one_by_one_and_many(
+    new_renderer: Callable[[], Renderer], scene: Scene, shading: Any
+) -> None:
+    alone, together = new_renderer(), new_renderer()
+    sequence = [settings for settings in SEQUENCE if isinstance(settings, Separable)]
+    expected = [alone.render(scene, s, SIZE, shading=shading, time=0.2) for s in sequence]
+    frames = list(together.render_many(scene, sequence, SIZE, shading=shading, time=0.2))
+    for got, right in zip(frames, expected, strict=True):
+        assert_same(got, right)
+        assert list(got.timings) == list(right.timings)
+
+
+@pytest.mark.parametrize("points", [1, 2, 5])
+def test_frames_that_fill_a_batch_alone(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, points: int
+) -> None:
+    image = picture(33, 21, 4, 2)
+    monkeypatch.setattr(requests, "BYTES", points * image.nbytes)
+    monkeypatch.setattr(requests, "SECONDS", 1e6)
+    sizes = []
+
+    def open_batch() -> Any:
+        batch = renderer._core.apply(image, ("final",))
+        sizes.append(batch)
+        return batch
+
+    settings = [Separable(exposure=exposure / 8) for exposure in range(20)]
+    results = list(requests.run(settings, open_batch, lambda _, *array: np.empty(*array)))
+    assert len(results) == 20
+    assert max(batch.size for batch in sizes) == points * image.nbytes
+    for point, (arrays, _, _) in results:
+        np.testing.assert_array_equal(arrays["final"], renderer.apply(image, point)["final"])
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, requests.POINTS)])
+def test_a_batch_is_as_long_as_a_wait_may_be(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
+) -> None:
+    image = picture(33, 21, 4, 2)
+    monkeypatch.setattr(requests, "SECONDS", seconds)
+    counts: list[int] = []
+
+    def open_batch() -> Any:
+        counts.append(0)
+        return renderer._core.apply(image, ("final",))
+
+    def allocate(_: str, *array: Any) -> Any:
+        counts[-1] += 1
+        return np.empty(*array)
+
+    settings = [Separable(exposure=step / 8) for step in range(100)]
+    results = list(requests.run(settings, open_batch, allocate))
+    assert [point for point, _ in results] == settings
+    # The first one goes alone, whatever it takes.
+    assert max(counts) == most
+    assert sum(counts) == len(settings)
+
+
+def test_arrays_are_the_takers(renderer: Renderer) -> None:
+    image = picture(20, 10, 4, 3)
+    frames = list(renderer.apply_many(image, [Separable()] * 10))
+    kept = frames[0]["final"].copy()
+    for one in frames:
+        for array in one.values():
+            assert array.flags.owndata
+            assert array.flags.writeable
+    for one in frames[1:]:
+        one["final"][:] = 0
+    np.testing.assert_array_equal(frames[0]["final"], kept)
+
+
+def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
+    image = picture(20, 10, 4, 4)
+    image[3, 4] = (np.nan, np.inf, 0.0, -np.inf)
+    frames = list(renderer.apply_many(image, [Separable(), Pyramid(), Separable()]))
+    assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
+
+
+def test_settings_that_are_no_sequence(renderer: Renderer) -> None:
+    wrong: Any = Separable()
+    with pytest.raises(TypeError, match=r"^settings_seq: "):
+        list(renderer.apply_many(picture(4, 4, 3, 5), wrong))
+
+
+def test_no_settings(renderer: Renderer, scene: Scene) -> None:
+    assert list(renderer.apply_many(picture(4, 4, 3, 5), [])) == []
+    assert list(renderer.render_many(scene, [], SIZE)) == []
+
+
+# Taken ahead, and no further
+
+
+@pytest.mark.parametrize("slow", [0, 1, 2, 5])
+def test_settings_are_taken_a_bounded_way_ahead(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, slow: int
+) -> None:
+    taken = collected = 0
+    took = requests._Points.took
+
+    def took_long(points: Any, seconds: float, count: int) -> None:
+        # The first batches, on whose time the next ones' size depends.
+        nonlocal collected
+        collected += 1
+        took(points, 1e6 if collected <= slow else seconds, count)
+
+    monkeypatch.setattr(requests._Points, "took", took_long)
+
+    def endless() -> Iterator[Settings]:
+        nonlocal taken
+        while True:
+            taken += 1
+            yield Separable(exposure=taken % 7 / 7)
+
+    frames = renderer.apply_many(picture(8, 8, 4, 6), endless(), attachments=("final",))
+    assert taken == 0
+    next(frames)
+    assert taken == 1
+    limit = (requests.AHEAD + 1) * requests.POINTS
+    for given in range(2, 300):
+        next(frames)
+        assert given <= taken <= given + limit
+        # The batches grow with what was used: of few frames few are made in vain.
+        assert taken < 4 * given
+    frames.close()  # type: ignore[attr-defined]
+
+
+# Other calls between two frames
+
+
+def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> None:
+    image, other = picture(40, 30, 3, 7), picture(25, 50, 4, 8)
+    settings = [Separable(blur_strength=strength / 8) for strength in range(24)]
+    expected = [renderer.apply(image, s) for s in settings]
+    of_other, of_scene = renderer.apply(other), renderer.render(scene, None, SIZE)
+    last = renderer.apply(1.0 - image)
+    calls: list[Callable[[], None]] = [
+        lambda: assert_same(renderer.apply(other), of_other),
+        lambda: assert_same(renderer.render(scene, None, SIZE), of_scene),
+        # Of the same size: what lies on the device and in staging memory is written over.
+        lambda: assert_same(renderer.apply(1.0 - image), last),
+        lambda: None,
+    ]
+    for index, frames in enumerate(renderer.apply_many(image, settings)):
+        assert_same(frames, expected[index])
+        calls[index % len(calls)]()
+
+
+def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
+    image = picture(40, 30, 3, 9)
+    settings = [Separable(exposure=exposure / 8, loops=1 + exposure % 2) for exposure in range(24)]
+    expected = [(renderer.apply(image, s), renderer.render(scene, s, SIZE)) for s in settings]
+    both = zip(
+        renderer.apply_many(image, settings),
+        renderer.render_many(scene, settings, SIZE),
+        strict=True,
+    )
+    for (of_image, of_scene), (right_image, right_scene) in zip(both, expected, strict=True):
+        assert_same(of_image, right_image)
+        assert_same(of_scene, right_scene)
+
+
+def test_threads(renderer: Renderer, scene: Scene) -> None:
+    images = [picture(30, 20, 3, 10), picture(30, 20, 4, 11), picture(17, 40, 4, 12)]
+    settings = [Separable(blur_strength=strength / 8) for strength in range(20)]
+    many = [[renderer.apply(image, s) for s in settings] for image in images]
+    single = renderer.render(scene, None, SIZE)
+    start = threading.Barrier(5)
+
+    def sequences(which: int) -> None:
+        start.wait()
+        for _ in range(3):
+            got = renderer.apply_many(images[which], settings)
+            for frames, right in zip(got, many[which], strict=True):
+                assert_same(frames, right)
+
+    def abandoned() -> None:
+        start.wait()
+        for step in range(12):
+            got = renderer.apply_many(images[step % 3], settings)
+            for index in range(step % 5):
+                assert_same(next(got), many[step % 3][index])
+
+    def singles() -> None:
+        start.wait()
+        for _ in range(30):
+            assert_same(renderer.render(scene, None, SIZE), single)
+
+    with ThreadPoolExecutor(5) as pool:
+        work = [pool.submit(sequences, which) for which in range(3)]
+        work += [pool.submit(abandoned), pool.submit(singles)]
+        for result in work:
+            result.result()
+
+
+def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
+    image = picture(30, 20, 3, 13)
+    settings = [Separable(blur_strength=strength / 8) for strength in range(12)]
+    expected = [renderer.apply(image, s) for s in settings]
+    frames = renderer.apply_many(image, settings)
+    for right in expected:
+        with ThreadPoolExecutor(1) as pool:
+            assert_same(pool.submit(next, frames).result(), right)
+
+
+# Ends before the end
+
+
+@pytest.mark.parametrize("taken", [0, 1, 2, 5])
+@pytest.mark.parametrize("end", ["close", "forget"])
+def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> None:
+    image = picture(40, 30, 3, 14)
+    right = renderer.apply(image)
+    for _ in range(3):
+        frames = renderer.apply_many(image, SEQUENCE)
+        for _ in range(taken):
+            next(frames)
+        if end == "close":
+            frames.close()  # type: ignore[attr-defined]
+        del frames
+        gc.collect()
+        assert_same(renderer.apply(image), right)
+
+
+def test_a_sequence_forgotten_with_its_renderer() -> None:
+    renderer = Renderer(validation=True)
+    frames = renderer.apply_many(picture(40, 30, 3, 15), SEQUENCE)
+    for _ in range(4):
+        next(frames)
+    del renderer, frames
+    gc.collect()
+
+
+def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Renderer]) -> None:
+    image = picture(40, 30, 3, 16)
+    renderer = new_renderer()
+    expected = [renderer.apply(image, settings) for settings in SEQUENCE]
+    frames = renderer.apply_many(image, SEQUENCE)
+    got = [next(frames) for _ in range(4)]
+    # Under validation: what is in the air is waited for, and nothing is left behind.
+    renderer.close()
+    with pytest.raises(ValueError, match="closed"):
+        got.extend(frames)
+    assert len(got) < len(SEQUENCE)
+    for one, right in zip(got, expected, strict=False):
+        assert_same(one, right)
+    with pytest.raises(StopIteration):
+        next(frames)
+
+
+# Errors
+
+
+def wrong_ones() -> list[tuple[Any, type[Exception], str]]:
+    return [
+        ("separable", TypeError, "settings"),
+        (Separable(bloom_size=(100_000, 1)), ValueError, "100000 x 1"),
+        (Separable(bloom=False), ValueError, "attachments: there is no 'bloom'"),
+    ]
+
+
+@pytest.mark.parametrize(("wrong", "kind", "words"), wrong_ones(), ids=["type", "size", "name"])
+@pytest.mark.parametrize("place", [0, 1, 2, 4, 6, 13])
+def test_an_error_comes_in_its_turn(
+    renderer: Renderer, place: int, wrong: Any, kind: type[Exception], words: str
+) -> None:
+    image = picture(20, 30, 4, 17)
+    right = [Separable(blur_strength=strength / 8) for strength in range(20)]
+    sequence = [*right[:place], wrong, *right[place:]]
+    frames = renderer.apply_many(image, sequence, attachments=("bloom", "final"))
+    for settings in right[:place]:
+        assert_same(next(frames), renderer.apply(image, settings, attachments=("bloom", "final")))
+    with pytest.raises(kind, match=words):
+        next(frames)
+    with pytest.raises(StopIteration):
+        next(frames)
+
+
+@pytest.mark.parametrize("place", [0, 1, 5])
+def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: int) -> None:
+    def broken() -> Iterator[Settings]:
+        for exposure in range(place):
+            yield Separable(exposure=exposure)
+        raise KeyError("mine")
+
+    frames = renderer.apply_many(picture(4, 4, 3, 18), broken())
+    for _ in range(place):
+        next(frames)
+    with pytest.raises(KeyError, match="mine"):
+        next(frames)
+
+
+def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) -> None:
+    wrong: Any = [[0.0]]
+    with pytest.raises(TypeError, match="image"):
+        next(renderer.apply_many(wrong, [Separable()]))
+    with pytest.raises(TypeError, match="attachments"):
+        next(renderer.apply_many(picture(4, 4, 3, 19), [Separable()], attachments=wrong))
+    with pytest.raises(ValueError, match="shading"):
+        next(renderer.render_many(scene, [Separable()], shading=wrong))
+    with pytest.raises(TypeError):
+        next(renderer.apply_many(picture(4, 4, 3, 19), Separable()))  # type: ignore[arg-type]
+
+
+# The core's errors: from a device that fails where it is told to
+
+
+class FailingBatch:
+    """A batch whose submission fails where it holds one of the settings given."""
+
+    def __init__(self, failing: dict[Settings, Exception]) -> None:
+        self.failing = failing
+        self.settings: list[Settings] = []
+        self.size = 0
+
+    def add(self, settings: Settings, _: object) -> bool:
+        self.settings.append(settings)
+        return True
+
+    def submit(self) -> None:
+        for settings in self.settings:
+            if settings in self.failing:
+                raise self.failing[settings]
+
+    def collect(self) -> list[Any]:
+        return [(settings, {}, (0, 0)) for settings in self.settings]
+
+
+def run_failing(
+    settings: list[Settings], failing: dict[Settings, Exception]
+) -> tuple[list[Any], Exception | None]:
+    results: list[Any] = []
+
+    def open_batch() -> Any:
+        return FailingBatch(failing)
+
+    def allocate(*_: object) -> Any:
+        raise AssertionError
+
+    try:
+        for result in requests.run(settings, open_batch, allocate):
+            results.append(result)
+    except Exception as error:
+        return results, error
+    return results, None
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 3, 6, 20, 99])
+def test_a_setting_that_the_device_cannot_run(place: int) -> None:
+    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
+    blame = _core.OutOfMemoryError("no memory")
+    results, error = run_failing(settings, {settings[place]: blame})
+    assert error is blame
+    assert [point for point, _ in results] == settings[:place]
+    assert [arrays for _, (arrays, _, _) in results] == settings[:place]
+
+
+@pytest.mark.parametrize("kind", [_core.ValidationError, _core.DeviceLostError, ValueError])
+def test_errors_that_no_setting_is_to_blame_for(
+    kind: type[Exception], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # However slow the machine is, batches double up to the most there can be.
+    monkeypatch.setattr(requests, "SECONDS", 1e6)
+    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
+    blame = kind("all")
+    results, error = run_failing(settings, {settings[50]: blame})
+    assert error is blame
+    # All of the batch that it was in, which begins after 1 + 2 + 4 + 8 + 16, are lost, no others.
+    assert [point for point, _ in results] == settings[:31]
+
+
+def test_of_two_errors_the_first_is_raised() -> None:
+    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(6)]
+    first, second = _core.OutOfMemoryError("first"), _core.OutOfMemoryError("second")
+    results, error = run_failing(settings, {settings[4]: first, settings[5]: second})
+    assert error is first
+    assert len(results) == 4
+
+
+def test_nothing_fails() -> None:
+    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
+    results, error = run_failing(settings, {})
+    assert error is None
+    assert [point for point, _ in results] == settings
+
+
+# The core's own type
+
+
+def test_a_batch_is_submitted_and_collected_once(renderer: Renderer) -> None:
+    def allocate(_: str, shape: tuple[int, ...], dtype: str) -> Any:
+        return np.empty(shape, dtype)
+
+    batch = renderer._core.apply(picture(8, 8, 4, 20), None)
+    with pytest.raises(RuntimeError):
+        batch.submit()
+    assert batch.add(Separable(), allocate)
+    assert batch.add(Separable(blur_strength=1.0), allocate)
+    # Other images: they are made when nothing uses the old ones.
+    assert not batch.add(Separable(bloom_size=(3, 3)), allocate)
+    with pytest.raises(RuntimeError):
+        batch.collect()
+    batch.submit()
+    with pytest.raises(RuntimeError):
+        batch.submit()
+    with pytest.raises(RuntimeError):
+        batch.add(Separable(), allocate)
+    assert len(batch.collect()) == 2
+    for again in (batch.collect, batch.submit):
+        with pytest.raises(RuntimeError):
+            again()
+    with pytest.raises(TypeError):
+        type(batch)()
+
+
+def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
+    # Scenes cannot have them; the device must never.
+    serial, (vertices, indices, *mesh), *others = _scene_arrays(scene)
+    wrong = indices.copy()
+    wrong[-1] = len(vertices)
+    camera = ((0.0, 0.0, -10.0), (0.0, 0.0, 0.0), 45.0, 0.1, 256.0)
+    arguments = (camera, SIZE, "forward", 0.0, 1.0, None)
+    right = renderer.render(scene, None, SIZE)
+    batch = renderer._core.render((2**63, (vertices, wrong, *mesh), *others), *arguments)
+    batch.add(Separable(), lambda _, shape, dtype: np.empty(shape, dtype))
+    with pytest.raises(ValueError, match=f"index {len(vertices)} is beyond the mesh's"):
+        batch.submit()
+    assert_same(renderer.render(scene, None, SIZE), right)
+    assert serial != 2**63
+
+
+def test_a_batch_of_a_closed_renderer() -> None:
+    def allocate(_: str, shape: tuple[int, ...], dtype: str) -> Any:
+        return np.empty(shape, dtype)
+
+    renderer = vkbloom.Renderer(validation=True)
+    waiting, flying = (renderer._core.apply(picture(8, 8, 4, 21), None) for _ in range(2))
+    for batch in (waiting, flying):
+        batch.add(Separable(), allocate)
+    flying.submit()
+    renderer.close()
+    for call in (waiting.submit, flying.collect):
+        with pytest.raises(ValueError, match="closed"):
+            call()
+    with pytest.raises(ValueError, match="closed"):
+        renderer._core.apply(picture(8, 8, 4, 21), None).add(Separable(), allocate)

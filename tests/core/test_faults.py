@@ -1,0 +1,135 @@
+"""Every call fails once: the right error, nothing left behind, and a renderer that goes on.
+
+A core of its own is built, in which the n-th Vulkan call or allocation can be made to fail;
+fault_walk.py walks through all n.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import vkbloom
+
+ROOT = Path(__file__).resolve().parents[2]
+
+pytestmark = pytest.mark.skipif(
+    "VKBLOOM_SANITIZED" in os.environ, reason="the walk has a core of its own, without sanitizers"
+)
+
+
+def build(tree: Path) -> Path:
+    """Build a core with faults; return the folder to import it from."""
+    for folder in ("csrc", "shaders", "python"):
+        ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__", "*.egg-info")
+        shutil.copytree(ROOT / folder, tree / folder, ignore=ignored)
+    for name in ("setup.py", "pyproject.toml", "README.md"):
+        shutil.copy(ROOT / name, tree / name)
+    built = subprocess.run(
+        [sys.executable, "setup.py", "--quiet", "build_ext", "--inplace"],
+        cwd=tree,
+        # Not optimized: the compiler takes most of the time.
+        env={**os.environ, "CFLAGS": "-O0", "VKBLOOM_CFLAGS": "-DVKBLOOM_FAULTS -Wall -Werror"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    return tree / "python"
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment of a process with the core that fails on demand."""
+    package = build(tmp_path_factory.mktemp("faults") / "tree")
+    # Without a cache on disk, whose reading and writing has a test of its own.
+    return {**os.environ, "PYTHONPATH": str(package), "VKBLOOM_CACHE_DIR": ""}
+
+
+def walk(faulty: dict[str, str], stride: int) -> dict[str, dict[str, Any]]:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.core.fault_walk", str(stride)],
+        cwd=ROOT,
+        env=faulty,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    return {row["workload"]: row for row in rows}
+
+
+def show(rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
+    with capsys.disabled():
+        print("\n\nfault points: there, walked, raised, done without")
+        for name, row in rows.items():
+            counts = (row[key] for key in ("points", "walked", "raised", "survived"))
+            print(f"{name:<32}" + "".join(f"{count:>7}" for count in counts))
+
+
+def names() -> set[str]:
+    """Return what must be among the workloads, whatever else is."""
+    methods = {
+        f"apply {preset} {form}"
+        for preset in vkbloom.presets
+        for form in ("fragment", "cpu", "gpu")
+    }
+    return methods | {
+        "create",
+        "close",
+        "render forward",
+        "render deferred",
+        "batch",
+        "grid",
+        "grid in memory",
+        "grid to Zarr",
+        "readback",
+    }
+
+
+def test_what_is_shipped_cannot_be_told_to_fail() -> None:
+    assert not hasattr(vkbloom._core, "arm_fault")
+
+
+def test_points_of_every_workload(
+    faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    # All of them, with VKBLOOM_FAULT_STRIDE=1, take about 25 minutes.
+    stride = int(os.environ.get("VKBLOOM_FAULT_STRIDE", "40"))
+    rows = walk(faulty, stride)
+    show(rows, capsys)
+    assert set(rows) == names()
+    assert sum(row["raised"] for row in rows.values()) > 60
+    for name, row in rows.items():
+        if stride == 1:
+            # Each was reached, and most have no way round them; closing goes on whatever fails.
+            assert row["walked"] >= 0.6 * row["points"] > 0, name
+            assert row["raised"] > 0 or name == "close", name
+
+
+def test_memory_that_python_does_not_get(
+    faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    if importlib.util.find_spec("_testcapi") is None:
+        pytest.skip("CPython's own tests, which can refuse it memory, are not here")
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.core.memory_walk"],
+        cwd=ROOT,
+        env=faulty,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    with capsys.disabled():
+        print(f"\n\nPython: {done.stdout.strip()}")
+    assert int(done.stdout.split()[4]) > 10

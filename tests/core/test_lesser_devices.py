@@ -1,0 +1,179 @@
+"""What other adapters lack, or have less of: another form or a clear error, and the same pictures.
+
+A layer between the validation layer and the adapter takes it away (lesser_device.c).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vkbloom import Renderer
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = Path(__file__).with_name("lesser_device.c")
+
+# Where the validation layer is, which must be found first to lie above the one of these tests.
+EXPLICIT_LAYERS = tuple(
+    str(folder / "vulkan/explicit_layer.d")
+    for folder in (Path("/usr/share"), Path("/usr/local/share"), Path("/etc"))
+)
+
+pytestmark = [
+    pytest.mark.skipif(os.name == "nt", reason="the layer is built as on Unix"),
+    pytest.mark.skipif(
+        "VKBLOOM_SANITIZED" in os.environ, reason="another process, whose core is not sanitized"
+    ),
+]
+
+#: What goes wrong, by the name that lesser_work.py has for it.
+LAYERS = {
+    "layers float32": "Error: .* cannot add up layers in rgba32float images, but in rgba16float"
+}
+SKY = {"sky float32": "ValueError: skybox: the adapter .* cannot filter float32; uint8 and float16"}
+
+
+def too_large(most: int) -> dict[str, str]:
+    sizes = ("6000 x 1", "1 x 6000")
+    return {size: f"ValueError: size: a size of {size} is out of .* 1 to {most} " for size in sizes}
+
+
+@pytest.fixture(scope="module")
+def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the layer; return the folder of its manifest."""
+    folder = tmp_path_factory.mktemp("layer")
+    library = folder / "lesser_device.so"
+    compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
+    subprocess.run(
+        [
+            *(*compiler.split(), "-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"),
+            *("-fvisibility=hidden", str(SOURCE), "-o", str(library)),
+        ],
+        check=True,
+    )
+    about = {
+        "name": "VK_LAYER_VKBLOOM_lesser_device",
+        "type": "GLOBAL",
+        "library_path": str(library),
+        "api_version": "1.3.0",
+        "implementation_version": "1",
+        "description": "The device below with less than it has",
+    }
+    manifest = {"file_format_version": "1.2.0", "layer": about}
+    (folder / "lesser_device.json").write_text(json.dumps(manifest))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def name() -> str:
+    """A name that finds the software adapter also where it is no longer one."""
+    with Renderer("software") as renderer:
+        return renderer.info.name
+
+
+WORK = ("-m", "tests.core.lesser_work")
+
+
+def run(
+    layer: Path, name: str, lesser: str, program: tuple[str, ...] = WORK, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    folders = (os.environ.get("VK_LAYER_PATH"), *EXPLICIT_LAYERS)
+    return subprocess.run(
+        [sys.executable, *program],
+        cwd=ROOT,
+        env={
+            **os.environ,
+            "VK_LAYER_PATH": os.pathsep.join(filter(None, (*folders, str(layer)))),
+            "VK_INSTANCE_LAYERS": os.pathsep.join(
+                ("VK_LAYER_KHRONOS_validation", "VK_LAYER_VKBLOOM_lesser_device")
+            ),
+            "VKBLOOM_LESSER": lesser,
+            "VKBLOOM_TEST_NAME": name,
+            "VKBLOOM_CACHE_DIR": "",
+            **environment,
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("lesser", "errors"),
+    [
+        # No more than every device has, of what limits say.
+        ("limits", too_large(4096)),
+        ("cpu,limits", too_large(4096)),
+        # An image may be no larger than the least of several limits; nothing is timed; no memory
+        # comes from the host.
+        ("wide,timestamps,import", too_large(5000)),
+        # The same; compute shaders cannot write images.
+        ("high,storage", too_large(5000)),
+        # Memory of the device's own, and the host's, which is coherent or cached.
+        ("memory", {}),
+        ("cpu,memory", {}),
+        # Images of single floats are neither blended nor filtered.
+        ("blend,filter", {**LAYERS, **SKY}),
+        ("cpu,blend,filter", {**LAYERS, **SKY}),
+    ],
+)
+def test_lesser_devices(layer: Path, name: str, lesser: str, errors: dict[str, str]) -> None:
+    done = run(layer, name, lesser)
+    assert done.returncode == 0, done.stderr
+    result: dict[str, Any] = json.loads(done.stdout)
+    assert result["wrong"].keys() == errors.keys(), result["wrong"]
+    for case, words in errors.items():
+        assert re.search(words, result["wrong"][case]), result["wrong"][case]
+    taken = lesser.split(",")
+    assert result["type"] == ("discrete" if "cpu" in taken else "cpu")
+    assert result["timed"] is ("timestamps" not in taken)
+
+
+def test_no_depth(layer: Path, name: str) -> None:
+    done = run(layer, name, "depth")
+    assert done.returncode == 0, done.stderr
+    wrong: dict[str, str] = json.loads(done.stdout)["wrong"]
+    assert wrong.keys() >= {"whole forward", "whole deferred", "sky uint8"}
+    for case, error in wrong.items():
+        assert not case.endswith(("uint8", "float16", "float32")) or case.startswith("sky ")
+        assert re.search("^Error: the adapter .* cannot render to depth32float images", error) or (
+            re.search("^ValueError: size: ", error)
+        )
+
+
+def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
+    done = run(layer, name, "indices")
+    assert done.returncode == 0, done.stderr
+    wrong: dict[str, str] = json.loads(done.stdout)["wrong"]
+    words = r"^ValueError: scene: index \d+ is beyond this adapter's limit of 9$"
+    assert re.search(words, wrong["whole forward"])
+    assert re.search(words, wrong["whole deferred"])
+    assert "whole uint8" not in wrong
+
+
+def test_a_form_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
+    done = run(layer, name, "storage", VKBLOOM_FORM="tiles")
+    assert "ValueError: VKBLOOM_FORM: tiles is not one of auto" in done.stderr
+
+
+def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> None:
+    done = run(layer, name, "timestamps,storage", ("-m", "vkbloom.cli", "doctor", "--json"))
+    findings = {finding["topic"]: finding for finding in json.loads(done.stdout)["findings"]}
+    render = findings["test render"]
+    assert render["status"] == "ok"
+    assert "it does not time its passes" in render["found"]
+    assert findings["validation layer"]["status"] == "ok"
+
+
+def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
+    done = run(layer, name, "bindings")
+    assert "ValidationError" in done.stderr
+    assert "maxPerStageDescriptorStorageImages limit (0)" in done.stderr

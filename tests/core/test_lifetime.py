@@ -1,0 +1,335 @@
+"""Renderers come and go: nothing is left behind, nothing is taken along; threads share one."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import threading
+import weakref
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypedDict
+
+import numpy as np
+import pytest
+
+from tests.screens import noise, screen
+from vkbloom import Frames, Renderer, Scene, Separable, adapters, gaussian_weights
+
+SIZE = (64, 36)
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+def in_use() -> tuple[int, int]:
+    """Return how many file descriptors and threads this process has."""
+    return len(os.listdir("/proc/self/fd")), len(os.listdir("/proc/self/task"))
+
+
+def assert_same(frames: Frames, expected: Frames) -> None:
+    assert list(frames) == list(expected)
+    for name in expected:
+        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
+
+
+# One renderer
+
+
+def test_arrays_outlive_the_renderer(scene: Scene) -> None:
+    with Renderer(validation=True) as renderer:
+        frames = renderer.render(scene, None, SIZE)
+        kept = {name: array.copy() for name, array in frames.items()}
+    # Another renderer may get the memory of the first.
+    with Renderer() as other:
+        other.render(scene, Separable(blur_strength=0.2), SIZE, time=0.5)
+        for name, array in frames.items():
+            np.testing.assert_array_equal(array, kept[name])
+            assert array.flags.owndata
+            array[:] = 0
+
+
+def test_close_twice() -> None:
+    renderer = Renderer(validation=True)
+    assert not renderer.closed
+    renderer.close()
+    assert renderer.closed
+    renderer.close()
+    assert renderer.closed
+
+
+def test_context_manager(scene: Scene) -> None:
+    with Renderer(validation=True) as renderer:
+        assert not renderer.closed
+        renderer.render(scene, None, SIZE)
+    assert renderer.closed
+    with pytest.raises(KeyError, match="mine"), Renderer(validation=True) as other:
+        raise KeyError("mine")
+    assert other.closed
+    with Renderer(validation=True) as third:
+        third.close()
+    assert third.closed
+    with pytest.raises(ValueError, match="closed"), third:
+        pass
+
+
+@LINUX
+def test_a_renderer_that_is_not_closed_is_collected(scene: Scene) -> None:
+    with Renderer():
+        before = in_use()
+        renderer = Renderer(validation=True)
+        frames = renderer.render(scene, None, SIZE)
+        kept = frames["final"].copy()
+        assert in_use() > before
+        reference = weakref.ref(renderer)
+        del renderer
+        gc.collect()
+        assert reference() is None
+        assert in_use() == before
+        np.testing.assert_array_equal(frames["final"], kept)
+
+
+def test_two_renderers_do_not_know_each_other(scene: Scene) -> None:
+    with Renderer(validation=True) as one, Renderer() as other:
+        right = one.render(scene, None, SIZE)
+        other.render(scene, Separable(loops=2), SIZE, time=0.3)
+        other.close()
+        assert_same(one.render(scene, None, SIZE), right)
+
+
+# Prints what a renderer under validation raises where the layer has something to say.
+OBJECTION = """
+import vkbloom
+try:
+    with vkbloom.Renderer(validation=True) as renderer:
+        renderer.render(vkbloom.Scene.ufo(), size=(8, 8))
+except vkbloom.ValidationError as error:
+    print("raised", error)
+with vkbloom.Renderer() as renderer:
+    print("without", renderer.render(vkbloom.Scene.ufo(), size=(8, 8))["final"].shape)
+"""
+
+
+def test_a_message_of_the_validation_layer_is_an_error() -> None:
+    # All other tests pass where the layer is silent. With its checks of best practices, which the
+    # environment turns on, it is not: it warns of the extension that its messages come through.
+    more = {"VK_LAYER_ENABLES": "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT"}
+    done = subprocess.run(
+        [sys.executable, "-c", OBJECTION],
+        env={**os.environ, **more},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    raised, without = done.stdout.strip().splitlines()
+    assert raised.startswith("raised Validation")
+    assert "BestPractices" in raised
+    assert without == "without (8, 8, 4)"
+
+
+# Many renderers
+
+
+class Measured(TypedDict):
+    """What tools/renderer_memory.py prints: by thing, then by kind, for one of each."""
+
+    unloaded: dict[str, dict[str, float]]
+    loaded: dict[str, dict[str, float]]
+    open: dict[str, float]
+
+
+@pytest.fixture(scope="module")
+def grown() -> Measured:
+    """What 500 renderers and 2,000 frames leave behind."""
+    if os.environ.get("VKBLOOM_SANITIZED"):
+        pytest.skip("a sanitizer's own heap is not what is measured")
+    tool = Path(__file__).resolve().parents[2] / "tools" / "renderer_memory.py"
+    done = subprocess.run(
+        [sys.executable, str(tool), "500"], capture_output=True, text=True, check=True
+    )
+    measured: Measured = json.loads(done.stdout)
+    return measured
+
+
+@LINUX
+@pytest.mark.slow
+def test_renderers_leave_no_descriptors_and_no_threads(grown: Measured) -> None:
+    for case in (grown["unloaded"], grown["loaded"]):
+        for thing in ("renderer", "frame"):
+            assert case[thing]["descriptors"] == 0
+            assert case[thing]["threads"] == 0
+
+
+@LINUX
+@pytest.mark.slow
+def test_renderers_leave_no_memory(grown: Measured) -> None:
+    # Bytes a renderer. The smallest block of the heap is 24, a page 4096; half of each is left to
+    # what Python and the loader keep for themselves.
+    for thing in ("device", "renderer", "frame"):
+        assert grown["loaded"][thing]["heap"] < 12
+        assert grown["loaded"][thing]["data"] < 2048
+        assert grown["loaded"][thing]["code"] == 0
+
+
+@LINUX
+@pytest.mark.slow
+def test_what_is_left_is_the_drivers(grown: Measured) -> None:
+    # The driver's library loses something whenever the loader unloads it, also for a bare device;
+    # a renderer adds nothing to that.
+    bare, renderer = grown["unloaded"]["device"], grown["unloaded"]["renderer"]
+    assert abs(renderer["heap"] - bare["heap"]) < 12
+    assert renderer["code"] == bare["code"]
+
+
+@LINUX
+@pytest.mark.slow
+def test_frames_leave_no_memory(grown: Measured) -> None:
+    # Sizes, formats and kernels change all the time.
+    assert grown["open"]["heap"] < 12
+    assert grown["open"]["data"] < 2048
+    assert grown["open"]["code"] == 0
+    assert grown["open"]["descriptors"] == grown["open"]["threads"] == 0
+
+
+@LINUX
+def test_lists_of_adapters_leave_nothing() -> None:
+    adapters()
+    before = in_use()
+    for _ in range(20):
+        adapters()
+    assert in_use() == before
+
+
+@LINUX
+def test_renderers_that_fail_leave_nothing(scene: Scene) -> None:
+    with Renderer() as renderer:
+        renderer.render(scene, None, SIZE)
+        before = in_use()
+        for _ in range(20):
+            with pytest.raises(RuntimeError):
+                Renderer("no such adapter")
+        assert in_use() == before
+
+
+def test_many_frames_of_changing_size(renderer: Renderer, scene: Scene) -> None:
+    # Under validation, which at the close of the renderer reports any object that is left.
+    for step in range(60):
+        size = (1 + 7 * step % 50, 1 + 11 * step % 40)
+        settings = Separable(
+            bloom_size=(1 + step % 17, 1 + step % 23),
+            loops=1 + step % 3,
+            format="rgba16float" if step % 2 else "rgba8unorm",
+            direct=step % 5 == 0,
+        )
+        frames = renderer.render(scene, settings, size, time=step / 60)
+        assert frames["final"].shape == (size[1], size[0], 4)
+
+
+# Threads
+
+VARIANTS = [
+    Separable(),
+    Separable(blur_strength=0.4, bloom_size=(100, 60)),
+    Separable(layers=((1.0, 1.0), (2.0, 0.5)), format="rgba16float"),
+    Separable(direct=True, tonemap="aces"),
+]
+
+
+def test_four_threads_and_one_renderer(renderer: Renderer, scene: Scene) -> None:
+    other_scene = screen(noise((16, 9)), SIZE)
+    requests = [
+        (which, settings, index / 4)
+        for which in (scene, other_scene)
+        for index, settings in enumerate(VARIANTS)
+    ]
+    right = [renderer.render(which, settings, SIZE, time=t) for which, settings, t in requests]
+    start = threading.Barrier(4)
+
+    def work(thread: int) -> None:
+        start.wait()
+        for step in range(3 * len(requests)):
+            # Each thread goes through all requests in an order of its own.
+            number = (thread + (2 * thread + 1) * step) % len(requests)
+            which, settings, t = requests[number]
+            assert_same(renderer.render(which, settings, SIZE, time=t), right[number])
+
+    with ThreadPoolExecutor(4) as pool:
+        for result in [pool.submit(work, thread) for thread in range(4)]:
+            result.result()
+
+
+def test_a_renderer_for_each_of_four_threads(scene: Scene) -> None:
+    def work(settings: Separable) -> Frames:
+        with Renderer(validation=True) as renderer:
+            return renderer.render(scene, settings, SIZE)
+
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(work, VARIANTS))
+    for settings, frames in zip(VARIANTS, together, strict=True):
+        assert_same(frames, work(settings))
+
+
+def test_close_while_other_threads_render(scene: Scene) -> None:
+    renderer = Renderer(validation=True)
+    right = renderer.render(scene, None, SIZE)
+    started = threading.Semaphore(0)
+
+    def work() -> int:
+        for done in range(10_000):
+            try:
+                frames = renderer.render(scene, None, SIZE)
+            except ValueError:
+                assert renderer.closed
+                return done
+            assert_same(frames, right)
+            started.release()
+        return -1
+
+    with ThreadPoolExecutor(3) as pool:
+        results = [pool.submit(work) for _ in range(3)]
+        for _ in range(6):
+            assert started.acquire(timeout=120)
+        renderer.close()
+        counts = [result.result() for result in results]
+    assert min(counts) >= 0
+    assert sum(counts) >= 6
+
+
+def ticks_during(work: Callable[[], object]) -> int:
+    """Return how often another Python thread came round, a millisecond apart, during the work."""
+    stop = threading.Event()
+    ticking = threading.Event()
+    ticks = 0
+
+    def tick() -> None:
+        nonlocal ticks
+        while not stop.wait(0.001):
+            ticks += 1
+            ticking.set()
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    ticking.wait()
+    before = ticks
+    work()
+    during = ticks - before
+    stop.set()
+    thread.join()
+    return during
+
+
+def test_python_goes_on_while_the_device_works(scene: Scene) -> None:
+    # 65 x 65 taps a pixel, filtered by hand: a second or so of one core. With the lock held the
+    # other thread would come round once before the work takes it, and once after.
+    settings = Separable(
+        weights=gaussian_weights(10.0, 32),
+        blur_scale=0.5,
+        direct=True,
+        format="rgba32float",
+        bloom_size=(200, 200),
+    )
+    with Renderer() as renderer:
+        renderer.render(scene, settings, (4, 4))
+        assert ticks_during(lambda: renderer.render(scene, settings, (300, 200))) > 10

@@ -1,0 +1,147 @@
+"""One pass changed on purpose: the check fails, and the report names that pass as the first.
+
+Each mutation is an edit of a shader, compiled into a core of its own, so that everything after the
+changed pass differs as it would in an engine.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+IMAGE = """
+import numpy as np
+import vkbloom
+
+def test_bloom(bloom_renderer, frame_regression):
+    image = np.random.default_rng(7).random((48, 64, 3), dtype=np.float32) ** 8
+    frame_regression.check(bloom_renderer.apply(image, vkbloom.{settings}))
+"""
+SCENE = """
+import vkbloom
+
+def test_bloom(bloom_renderer, frame_regression):
+    frame_regression.check(bloom_renderer.render(vkbloom.Scene.ufo(), size=(64, 36)))
+"""
+
+
+@dataclasses.dataclass(frozen=True)
+class Mutation:
+    """What is changed, seen by which test, in which framebuffer first."""
+
+    shader: str
+    original: str
+    mutated: str
+    test: str
+    equal: tuple[str, ...]  # before the change, or beside it
+    different: tuple[str, ...]  # the first one is what the mutated pass writes
+
+
+MUTATIONS = {
+    # In the horizontal pass of two, the second tap to each side is read where the third one is.
+    "tap moved by one": Mutation(
+        shader="blur.frag",
+        original="tap_pair(place, centre, float(tap) * tap_step)",
+        mutated="tap_pair(place, centre, float(DIRECTION == DIRECTION_HORIZONTAL && tap == 2"
+        " ? 3 : tap) * tap_step)",
+        test=IMAGE.format(settings="Separable()"),
+        equal=("glow", "blur_vertical"),
+        different=("bloom", "final"),
+    ),
+    # The centre of the tent, on the way up: 0.25 becomes 0.255.
+    "weight wrong by 2 %": Mutation(
+        shader="pyramid_up.frag",
+        original="            sum += weight * sample_at(",
+        mutated="            sum += (x == 0 && y == 0 ? 1.02 : 1.0) * weight * sample_at(",
+        test=IMAGE.format(settings="Pyramid(levels=3)"),
+        equal=("glow", "down_0", "down_1", "down_2"),
+        different=("up_1", "up_0", "bloom", "final"),
+    ),
+    "missing half-texel": Mutation(
+        shader="kawase_up.frag",
+        original="    Place place = PLACE_IN(smaller);\n",
+        mutated="    Place place = PLACE_IN(smaller);\n    place.part -= 0.5;\n",
+        test=IMAGE.format(settings="DualKawase(levels=3)"),
+        equal=("glow", "down_0", "down_1", "down_2"),
+        different=("up_1", "up_0", "bloom", "final"),
+    ),
+    # In the vertical pass of two, of a scene.
+    "rows flipped": Mutation(
+        shader="blur.frag",
+        original="    Place place = PLACE_IN(source);\n",
+        mutated="    Place place = PLACE_IN(source);\n    if (DIRECTION == DIRECTION_VERTICAL)\n"
+        "        place.texel.y = textureSize(source, 0).y - 1 - place.texel.y;\n",
+        test=SCENE,
+        equal=("glow", "glow_depth", "scene", "depth"),
+        different=("blur_vertical", "bloom", "final"),
+    ),
+}
+
+
+def build(mutation: Mutation, tree: Path) -> Path:
+    """Build a core with the mutation; return the folder to import it from."""
+    for folder in ("csrc", "shaders", "python"):
+        ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__", "*.egg-info")
+        shutil.copytree(ROOT / folder, tree / folder, ignore=ignored)
+    for name in ("setup.py", "pyproject.toml", "README.md"):
+        shutil.copy(ROOT / name, tree / name)
+    (shader,) = (tree / "shaders").rglob(mutation.shader)
+    text = shader.read_text()
+    assert text.count(mutation.original) == 1
+    shader.write_text(text.replace(mutation.original, mutation.mutated))
+    command = [sys.executable, "setup.py", "--quiet", "build_ext", "--inplace"]
+    built = subprocess.run(
+        command,
+        cwd=tree,
+        # Not optimized: the compiler takes most of the time.
+        env={**os.environ, "CFLAGS": "-O0"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    return tree / "python"
+
+
+@pytest.mark.parametrize("name", MUTATIONS)
+def test_is_found_and_named(
+    name: str,
+    pytester: pytest.Pytester,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mutation = MUTATIONS[name]
+    pytester.makepyfile(test_one=mutation.test)
+    # Without other plugins, which take most of such a short run's time.
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    # The form whose shaders the mutations change.
+    monkeypatch.setenv("VKBLOOM_FORM", "fragment")
+    options = ("-p", "no:cacheprovider", "-p", "vkbloom", "--bloom-adapter=software")
+    pytester.runpytest_subprocess(*options, "--bloom-update").assert_outcomes(passed=1)
+
+    mutant = build(mutation, tmp_path_factory.mktemp("mutant"))
+    monkeypatch.setenv("PYTHONPATH", str(mutant))
+    # The pipelines of the right shaders must not be taken for these.
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path_factory.mktemp("pipelines")))
+    result = pytester.runpytest_subprocess(*options, "--bloom-report=report")
+
+    result.assert_outcomes(failed=1)
+    first = mutation.different[0]
+    result.stdout.fnmatch_lines([f"*test_bloom: the first framebuffer that differs is {first} (*"])
+    report = pytester.path / "report"
+    (check,) = json.loads((report / "report.json").read_text())["checks"]
+    assert check["first_failure"] == first
+    outcomes = {each["name"]: each["outcome"] for each in check["framebuffers"]}
+    assert outcomes == dict.fromkeys(mutation.equal, "equal") | dict.fromkeys(
+        mutation.different, "failed"
+    )
+    assert f"</a>: <strong>{first}</strong>" in (report / "index.html").read_text()

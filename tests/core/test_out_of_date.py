@@ -1,0 +1,250 @@
+"""A pass runs only when it is out of date, and the pictures are the same as if all had run."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.screens import noise, screen
+from vkbloom import Camera, Frames, Renderer, Scene, Separable
+
+SIZE = (160, 90)
+ALL = ["glow", "blur_vertical", "bloom", "scene", "final"]
+BLUR = ["blur_vertical", "bloom", "final"]
+
+
+@pytest.fixture
+def opened(new_renderer: Callable[[], Renderer], scene: Scene) -> Renderer:
+    """A renderer that has just rendered the default frame."""
+    renderer = new_renderer()
+    assert list(renderer.render(scene, None, SIZE).timings) == ALL
+    return renderer
+
+
+def fresh(*arguments: Any, **more: Any) -> Frames:
+    """Return the frames of a renderer that renders nothing else."""
+    with Renderer() as renderer:
+        return renderer.render(*arguments, **more)
+
+
+@pytest.fixture(scope="module")
+def default(scene: Scene) -> Frames:
+    return fresh(scene, None, SIZE)
+
+
+def assert_same(frames: Frames, expected: Frames) -> None:
+    assert list(frames) == list(expected)
+    for name in expected:
+        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
+
+
+# What runs after one change
+
+CHANGES: list[tuple[dict[str, Any], list[str]]] = [
+    ({}, []),
+    ({"blur_strength": 0.7}, BLUR),
+    ({"blur_scale": 2.0}, BLUR),
+    ({"weights": (0.4, 0.3)}, BLUR),
+    ({"first_tap": 0}, BLUR),
+    ({"loops": 2}, ["blur_vertical_0_0", "blur_horizontal_0_0", *BLUR]),
+    ({"layers": ((1.0, 1.0), (2.0, 0.5))}, ["blur_vertical_0_0", *BLUR]),
+    ({"direct": True}, ["bloom", "final"]),
+    # Texels of square buffers are as wide as they are high.
+    ({"texel": "x"}, []),
+    ({"intensity": 0.5}, ["final"]),
+    ({"exposure": 1.0}, ["final"]),
+    ({"composite": "screen"}, ["final"]),
+    ({"tonemap": "aces"}, ["final"]),
+    ({"encoding": "srgb"}, ["final"]),
+    ({"bloom": False}, ["final"]),
+    ({"threshold": 0.5}, ["glow", *BLUR]),
+    ({"bloom_size": (64, 64)}, ["glow", *BLUR]),
+    ({"format": "rgba16float"}, ["glow", *BLUR]),
+    # The same picture by another name.
+    ({"bloom_size": (256, 256)}, []),
+    ({"format": "rgba8unorm"}, []),
+    # A knee has no threshold to soften.
+    ({"knee": 0.5}, []),
+]
+
+
+@pytest.mark.parametrize(("changes", "ran"), CHANGES, ids=str)
+def test_what_runs_after_a_change_of_settings(
+    opened: Renderer,
+    scene: Scene,
+    default: Frames,
+    changes: dict[str, Any],
+    ran: list[str],
+) -> None:
+    settings = Separable(**changes)
+    frames = opened.render(scene, settings, SIZE)
+    assert sorted(frames.timings) == sorted(ran)
+    assert_same(frames, fresh(scene, settings, SIZE))
+    # And back again, to what other frames have written over.
+    assert_same(opened.render(scene, None, SIZE), default)
+
+
+def test_nothing_runs_twice(opened: Renderer, scene: Scene) -> None:
+    first = opened.render(scene, None, SIZE)
+    second = opened.render(scene, Separable(), SIZE, time=1.0)
+    assert list(first.timings) == list(second.timings) == []
+    assert_same(first, second)
+
+
+def test_time_changes_all(opened: Renderer, scene: Scene) -> None:
+    frames = opened.render(scene, None, SIZE, time=0.3)
+    assert list(frames.timings) == ALL
+    assert_same(frames, fresh(scene, None, SIZE, time=0.3))
+
+
+def test_a_size_of_the_same_aspect_leaves_the_bloom_buffers(opened: Renderer, scene: Scene) -> None:
+    size = (2 * SIZE[0], 2 * SIZE[1])
+    frames = opened.render(scene, None, size)
+    assert list(frames.timings) == ["bloom", "scene", "final"]
+    assert_same(frames, fresh(scene, None, size))
+
+
+def test_another_aspect_changes_all(opened: Renderer, scene: Scene) -> None:
+    for size in ((100, 100), (90, 160), SIZE):
+        frames = opened.render(scene, None, size)
+        assert list(frames.timings) == ALL
+        assert_same(frames, fresh(scene, None, size))
+
+
+def test_the_camera_changes_all(opened: Renderer, scene: Scene) -> None:
+    moved = scene.with_camera(Camera(position=(0.5, 0, -8)))
+    frames = opened.render(moved, None, SIZE)
+    assert list(frames.timings) == ALL
+    assert_same(frames, fresh(moved, None, SIZE))
+
+
+def test_another_scene_changes_all(opened: Renderer, scene: Scene) -> None:
+    other = screen(noise((8, 8)), SIZE)
+    frames = opened.render(other, None, SIZE)
+    assert list(frames.timings) == ALL
+    assert_same(frames, fresh(other, None, SIZE))
+    back = opened.render(scene, None, SIZE)
+    assert list(back.timings) == ALL
+    assert_same(back, fresh(scene, None, SIZE))
+
+
+def test_scenes_of_the_same_camera_are_told_apart(opened: Renderer, scene: Scene) -> None:
+    # Nothing but the meshes, the glow or the sky differs, not even a matrix.
+    before = opened.render(scene, None, SIZE)
+    for changes in ({"glow": None}, {"skybox": None}, {"body": scene.glow}):
+        frames = opened.render(dataclasses.replace(scene, **changes), None, SIZE)
+        assert not np.array_equal(frames["final"], before["final"])
+        assert_same(opened.render(scene, None, SIZE), before)
+
+
+# Attachments
+
+
+@pytest.mark.parametrize(
+    ("wanted", "ran"),
+    [
+        (["glow"], ["glow"]),
+        (["glow_depth"], ["glow"]),
+        (["blur_vertical"], ["glow", "blur_vertical"]),
+        (["bloom"], ["glow", "blur_vertical", "bloom"]),
+        (["scene"], ["scene"]),
+        (["depth"], ["scene"]),
+        (["final"], ALL),
+        (["glow", "depth"], ["glow", "scene"]),
+        ([], []),
+    ],
+    ids=str,
+)
+def test_what_is_not_wanted_does_not_run(
+    new_renderer: Callable[[], Renderer],
+    scene: Scene,
+    default: Frames,
+    wanted: list[str],
+    ran: list[str],
+) -> None:
+    renderer = new_renderer()
+    part = renderer.render(scene, None, SIZE, attachments=wanted)
+    assert list(part.timings) == ran
+    whole = renderer.render(scene, None, SIZE)
+    left = [name for name in ALL if name not in ran]
+    # Where only `final` is wanted, the bloom is not enlarged to an image of its own.
+    assert list(whole.timings) == (["bloom"] if wanted == ["final"] else left)
+    assert_same(whole, default)
+    for name in wanted:
+        np.testing.assert_array_equal(part[name], whole[name])
+
+
+def test_what_is_not_wanted_stays_as_it_was(opened: Renderer, scene: Scene) -> None:
+    # The scene of another time is rendered, the glow's is not: each is as old as it is.
+    opened.render(scene, None, SIZE, time=0.5, attachments="scene")
+    frames = opened.render(scene, None, SIZE)
+    assert list(frames.timings) == ["scene", "final"]
+    assert_same(frames, fresh(scene, None, SIZE))
+
+
+def test_what_is_not_wanted_is_not_allocated(opened: Renderer, scene: Scene) -> None:
+    # Bloom buffers beyond any memory are no trouble where nothing of them is wanted.
+    huge = Separable(bloom_size=(16384, 16384), format="rgba32float")
+    frames = opened.render(scene, huge, SIZE, attachments=["scene", "depth"])
+    assert list(frames) == ["scene", "depth"]
+    assert list(frames.timings) == []
+
+
+# Many changes
+
+
+def test_alternating_settings(opened: Renderer, scene: Scene) -> None:
+    one, other = Separable(), Separable(blur_strength=0.3)
+    right = {s: fresh(scene, s, SIZE) for s in (one, other)}
+    for settings in (other, one, other, one):
+        frames = opened.render(scene, settings, SIZE)
+        assert list(frames.timings) == BLUR
+        assert_same(frames, right[settings])
+
+
+def test_bloom_off_and_on(opened: Renderer, scene: Scene) -> None:
+    right = fresh(scene, None, SIZE)
+    for settings in (Separable(bloom=False), Separable()) * 2:
+        frames = opened.render(scene, settings, SIZE)
+        assert list(frames.timings) == ["final"]
+    assert_same(frames, right)
+
+
+def test_a_failed_call_leaves_nothing_half_done(opened: Renderer, scene: Scene) -> None:
+    settings = Separable(blur_strength=0.2)
+    with pytest.raises(ValueError, match="out"):
+        opened.render(scene, settings, SIZE, out={"final": np.empty(1, np.uint8)})
+    frames = opened.render(scene, settings, SIZE)
+    assert list(frames.timings) == BLUR
+    assert_same(frames, fresh(scene, settings, SIZE))
+
+
+def test_a_walk_through_many_settings(opened: Renderer, scene: Scene) -> None:
+    """Random changes of everything at once, each picture against a renderer that saw only it."""
+    generator = np.random.default_rng(5)
+
+    def pick(values: Sequence[Any]) -> Any:
+        return values[int(generator.integers(len(values)))]
+
+    for step in range(61):
+        settings = Separable(
+            blur_strength=pick([0.5, 1.5]),
+            loops=pick([1, 2]),
+            layers=pick([((1.0, 1.0),), ((1.0, 0.5), (2.0, 0.5))]),
+            bloom_size=pick([None, (40, 30)]),
+            format=pick([None, "rgba16float"]),
+            bloom=pick([True, True, False]),
+            tonemap=pick(["none", "aces"]),
+        )
+        size, time = pick([SIZE, (50, 50)]), pick([0.0, 0.6])
+        wanted = pick(["all", "all", "final", "scene", "depth"])
+        frames = opened.render(scene, settings, size, time=time, attachments=wanted)
+        if step % 4 == 0:
+            assert_same(
+                frames,
+                fresh(scene, settings, size, time=time, attachments=wanted),
+            )

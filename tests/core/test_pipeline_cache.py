@@ -1,0 +1,187 @@
+"""The pipeline cache on disk: kept, read, and never trusted."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from vkbloom import Renderer, Scene, Separable
+from vkbloom.io import pipeline_cache
+
+SIZE = (16, 16)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "not" / "there yet"
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(folder))
+    return folder
+
+
+def render(scene: Scene) -> None:
+    with Renderer(validation=True) as renderer:
+        renderer.render(scene, size=SIZE)
+
+
+def only_file(folder: Path) -> Path:
+    """Return the one file that is there: no temporary one is left."""
+    (file,) = folder.iterdir()
+    return file
+
+
+def driver_of(file: Path) -> bytes:
+    return bytes.fromhex(file.stem.removeprefix("pipelines-"))
+
+
+def test_a_file_is_made_for_the_driver(folder: Path, scene: Scene) -> None:
+    with Renderer() as renderer:
+        assert not folder.exists()
+        renderer.render(scene, size=SIZE)
+        file = only_file(folder)
+        assert file.read_bytes().startswith(pipeline_cache.MAGIC)
+        kept = pipeline_cache.read(driver_of(file))
+        # The header of Vulkan's cache data: its length, 32, and version, 1.
+        assert kept is not None
+        assert kept[:8] == bytes([32, 0, 0, 0, 1, 0, 0, 0])
+        assert len(driver_of(file)) == 16
+
+
+def test_it_is_written_only_for_new_pipelines(folder: Path, scene: Scene) -> None:
+    with Renderer() as renderer:
+        renderer.render(scene, size=SIZE)
+        only_file(folder).unlink()
+        renderer.render(scene, size=SIZE, time=0.5)
+        assert list(folder.iterdir()) == []
+        renderer.render(scene, Separable(tonemap="aces"), size=SIZE)
+        only_file(folder)
+
+
+def test_it_is_given_to_the_driver(
+    folder: Path, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    render(scene)
+    given: list[bytes | None] = []
+
+    def read(driver_uuid: bytes) -> bytes | None:
+        given.append(real_read(driver_uuid))
+        return given[-1]
+
+    real_read = pipeline_cache.read
+    monkeypatch.setattr(pipeline_cache, "read", read)
+    render(scene)
+    assert len(given) == 1
+    assert given[0]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: b"",
+        lambda content: content[:5],
+        lambda content: content[: len(pipeline_cache.MAGIC) + 16],
+        lambda content: content[:-1],
+        lambda content: content + b"more",
+        lambda content: content[:-1] + bytes([content[-1] ^ 1]),
+        lambda content: bytes(len(content)),
+        lambda content: b"another program's file " * 100,
+        lambda content: content.replace(b"pipelines 1", b"pipelines 2"),
+        lambda content: os.urandom(1 << 20),
+    ],
+    ids=[
+        "empty",
+        "begun",
+        "no digest",
+        "cut",
+        "longer",
+        "bit flipped",
+        "zeros",
+        "foreign",
+        "other version",
+        "random",
+    ],
+)
+def test_a_damaged_file_is_replaced(folder: Path, scene: Scene, damage: object) -> None:
+    assert callable(damage)
+    render(scene)
+    file = only_file(folder)
+    content = file.read_bytes()
+    file.write_bytes(damage(content))
+    assert pipeline_cache.read(driver_of(file)) is None
+    render(scene)
+    assert pipeline_cache.read(driver_of(only_file(folder))) is not None
+
+
+def test_another_drivers_file_is_replaced(folder: Path, scene: Scene) -> None:
+    render(scene)
+    file = only_file(folder)
+    driver, other = driver_of(file), bytes(16)
+    data = pipeline_cache.read(driver)
+    assert data is not None
+    # Written for another driver, and then renamed.
+    pipeline_cache.write(other, data)
+    other_file = folder / f"pipelines-{other.hex()}.bin"
+    other_file.replace(file)
+    assert pipeline_cache.read(driver) is None
+    render(scene)
+    assert pipeline_cache.read(driver) is not None
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\0", bytes(32), bytes([255]) * 100, os.urandom(4096)], ids=len
+)
+def test_a_right_digest_over_wrong_data_does_no_harm(
+    folder: Path, scene: Scene, data: bytes
+) -> None:
+    # As a driver might leave it that changed its data but not its UUID. The validation layer says
+    # so if such data reaches the driver with a header that promises more than there is.
+    render(scene)
+    file = only_file(folder)
+    driver = driver_of(file)
+    pipeline_cache.write(driver, data)
+    assert pipeline_cache.read(driver) == data
+    with Renderer() as renderer:
+        renderer.render(scene, size=SIZE)
+    assert pipeline_cache.read(driver) not in (data, None)
+
+
+def test_a_folder_in_place_of_the_file(folder: Path, scene: Scene) -> None:
+    render(scene)
+    file = only_file(folder)
+    file.unlink()
+    file.mkdir()
+    render(scene)
+    assert only_file(folder).is_dir()
+
+
+def test_a_folder_that_cannot_be_written(
+    tmp_path: Path, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Below a file, where also those cannot write who may write anywhere.
+    (tmp_path / "file").write_bytes(b"")
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "file" / "folder"))
+    render(scene)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_no_folder_is_no_cache(
+    tmp_path: Path, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
+    monkeypatch.chdir(tmp_path)
+    render(scene)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_users_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VKBLOOM_CACHE_DIR")
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert pipeline_cache.folder() == tmp_path / "vkbloom"
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for ignored in ("", "relative"):
+        monkeypatch.setenv("XDG_CACHE_HOME", ignored)
+        assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"

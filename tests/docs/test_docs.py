@@ -1,0 +1,111 @@
+"""The documentation: its code is run as it stands there, and so are the example notebooks."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from vkbloom.cli.program import program
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXTS = [ROOT / "README.md", *sorted(ROOT.glob("*/*.md")), *sorted(ROOT.glob("python/*/*/*.md"))]
+# test_guide.py runs the code of testing.md, which is files of tests.
+PAGES = [
+    page
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    if page.name != "testing.md" and "```python" in page.read_text()
+]
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+# Commands of `sh` blocks that do not end, or take long, or want a cluster: only their arguments
+# are read.
+ENDLESS = ("explore", "bench")
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+
+
+def commands() -> Iterator[Any]:
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        for block in blocks(page, "sh"):
+            for line in block.replace("\\\n", " ").splitlines():
+                words = shlex.split(line, comments=True)
+                if words[:1] == ["vkbloom"]:
+                    yield pytest.param(words[1:], id=f"{page.name}: {line.split('#')[0].strip()}")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with the files that pages name."""
+    monkeypatch.chdir(tmp_path)
+    photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)
+    save(Picture.of_values(photo, "half"), "photo.exr")
+    np.save("picture.npy", photo)
+    (grid,) = blocks(ROOT / "docs" / "grids.md", "toml")
+    Path("grid.toml").write_text(grid)
+    return tmp_path
+
+
+# As test_grid_cluster.py says: what Dask's cluster leaves behind is its own.
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+# And so is what it says where something else on this machine is served at its usual port.
+@pytest.mark.filterwarnings("ignore:Port:UserWarning")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_code_of_a_page(page: Path, folder: Path) -> None:
+    """Run a page's code from top to bottom, as one program."""
+    names: dict[str, Any] = {"__name__": "page"}
+    text = page.read_text()
+    for block in blocks(page, "python"):
+        line = text[: text.index(block)].count("\n")
+        # Blank lines before it, so that a traceback names the page's own line.
+        exec(compile("\n" * line + block, page, "exec"), names)
+
+
+@pytest.mark.parametrize("words", list(commands()))
+def test_commands_of_pages(words: list[str], folder: Path) -> None:
+    if words[0] in ENDLESS or "--scheduler" in words or "--from" in words:
+        command = program.get_command(None, words[0])  # type: ignore[arg-type]
+        assert command is not None
+        command.make_context(words[0], words[1:], resilient_parsing=True)
+        return
+    result = CliRunner().invoke(program, words)
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
+def test_notebook(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    nbformat = pytest.importorskip("nbformat")
+    nbclient = pytest.importorskip("nbclient")
+    import vkbloom
+
+    # The kernel runs elsewhere, and has to find the package that runs here.
+    monkeypatch.setenv("PYTHONPATH", str(Path(vkbloom.__file__).parents[1]))
+    monkeypatch.setenv("IPYTHONDIR", str(folder))
+    notebook = nbformat.read(path, 4)
+    assert not any(cell.get("outputs") for cell in notebook.cells), "outputs are not kept"
+    nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    assert any("image/png" in output.get("data", {}) for output in shown)
+    assert not any(output.get("name") == "stderr" for output in shown), shown
+
+
+def test_the_front_page_gets_to_a_picture_in_ten_lines() -> None:
+    (block,) = blocks(ROOT / "docs" / "index.md", "python")
+    assert len([line for line in block.splitlines() if line]) < 10
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if not target.startswith(("http:", "https:", "#")):
+            assert (page.parent / target.partition("#")[0]).exists(), target

@@ -1,0 +1,376 @@
+"""The explorer without a browser: controls, settings as code, and the viewer's answers."""
+
+from __future__ import annotations
+
+import ast
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.framebuffers import decode, make, noise
+from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, presets
+from vkbloom.explorer.controls import METHODS, as_code, controls, settings_from
+from vkbloom.explorer.shown import picture_of, reduced, texts_of
+from vkbloom.explorer.viewer import Viewer
+
+EXAMPLES = [
+    *presets.values(),
+    Separable(weights=(0.5, 0.25), layers=((1, 0.5), (2, 1)), bloom_size=(64, 32), threshold=None),
+    Pyramid(threshold=1.5, tonemap="agx", bloom=False, exposure=-1),
+    *(kind() for kind in METHODS.values()),
+]
+
+
+def ask(viewer: Viewer, **message: Any) -> tuple[dict[str, Any], list[bytes]]:
+    """Ask as a page does: what goes through JSON comes out the same."""
+    answer, buffers = viewer.answer(json.loads(json.dumps(message, allow_nan=False)))
+    return json.loads(json.dumps(answer, allow_nan=False)), buffers
+
+
+def frame(viewer: Viewer, settings: Settings, **rest: Any) -> tuple[dict[str, Any], bytes]:
+    answer, buffers = ask(viewer, kind="frame", sides={"a": settings.as_dict()}, **rest)
+    assert answer["kind"] == "frame", answer
+    assert "error" not in answer["sides"]["a"], answer
+    (picture,) = buffers
+    return answer["sides"]["a"], picture
+
+
+@pytest.fixture
+def image() -> np.ndarray[Any, Any]:
+    return (np.random.default_rng(3).random((30, 40, 3)) ** 8 * 20).astype(np.float16)
+
+
+@pytest.fixture
+def viewer(scene: Scene, renderer: Renderer) -> Viewer:
+    return Viewer(scene, renderer=renderer, size=(64, 36))
+
+
+class TestControls:
+    def test_every_method_has_controls_of_its_fields(self) -> None:
+        described = json.loads(json.dumps(controls(), allow_nan=False))
+        assert list(described["methods"]) == list(METHODS)
+        for name, method in described["methods"].items():
+            fields = {field["name"]: field for field in method["fields"]}
+            defaults = METHODS[name]().as_dict()
+            without = set(defaults) - set(fields)
+            refused = {
+                "filament": {"knee"},
+                "hdrp": {"knee", "threshold"},
+                "separable": {"weights", "layers"},
+                "unreal": {"knee"},
+            }
+            assert without == {"method", "bloom_size"} | refused.get(name, set())
+            assert method["fields"][0]["name"] == "bloom"
+            for field in fields.values():
+                value = defaults[field["name"]]
+                if field["kind"] == "number":
+                    assert field["low"] <= field["from"] < field["to"] <= field["high"]
+                    assert 0 < field["step"] <= field["to"] - field["from"]
+                    # Of 1, 2 and 5 times powers of ten, neighbours are 2.5 times apart at the most.
+                    steps = (field["to"] - field["from"]) / field["step"]
+                    assert field["whole"] or 200 <= steps * (1 + 1e-9) <= 500
+                    assert value is None or field["low"] <= value <= field["high"]
+                    assert field["whole"] == (type(value) is int)
+                elif field["kind"] == "choice":
+                    assert value in field["choices"] or (value is None and field["optional"])
+                else:
+                    assert type(value) is bool
+
+    def test_whatever_is_offered_is_taken(self) -> None:
+        for name, method in controls()["methods"].items():
+            for field in method["fields"]:
+                ends = [field["from"], field["to"]] if field["kind"] == "number" else [False, True]
+                for value in field.get("choices", ends):
+                    METHODS[name](**{field["name"]: value})
+
+    def test_the_ranges_that_were_asked_for(self) -> None:
+        fields = {field["name"]: field for field in controls()["methods"]["separable"]["fields"]}
+        assert (fields["blur_scale"]["from"], fields["blur_scale"]["to"]) == (0.1, 2)
+        assert fields["threshold"]["optional"]
+        assert all(fields[name]["first"] for name in ("bloom", "blur_strength", "tonemap"))
+
+    @pytest.mark.parametrize("settings", EXAMPLES)
+    def test_settings_come_back_from_the_page(self, settings: Settings) -> None:
+        assert settings_from(json.loads(json.dumps(settings.as_dict()))) == settings
+
+    @pytest.mark.parametrize("settings", EXAMPLES)
+    def test_code_makes_the_settings(self, settings: Settings) -> None:
+        code = as_code(settings)
+        ast.parse(code)
+        assert eval(code, {"vkbloom": vkbloom}) == settings
+
+    def test_code_is_short(self) -> None:
+        assert as_code(Separable()) == "vkbloom.Separable()"
+        assert as_code(presets["outline"]) == 'vkbloom.presets["outline"]'
+        assert as_code(KinoBloom(radius=3)) == "vkbloom.KinoBloom(radius=3.0)"
+        assert as_code(Pyramid(tonemap="aces", threshold=0.5)) == (
+            'vkbloom.Pyramid(threshold=0.5, tonemap="aces")'
+        )
+
+    @pytest.mark.parametrize(
+        ("fields", "message"),
+        [
+            (None, "fields by name"),
+            ({}, "method: None"),
+            ({"method": "__class__"}, "is not one of separable"),
+            ({"method": "pyramid", "levels": 99}, "levels: 99 is out of range"),
+            ({"method": "pyramid", "blur_scale": 1.0}, "blur_scale"),
+            ({"method": "kino", "composite": "mix"}, "composite"),
+        ],
+    )
+    def test_what_makes_no_settings(self, fields: Any, message: str) -> None:
+        with pytest.raises((TypeError, ValueError), match=message):
+            settings_from(fields)
+
+
+class TestShown:
+    @pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+    @pytest.mark.parametrize("encoding", ["none", "srgb"])
+    @pytest.mark.parametrize("name", ["final", "bloom", "normal", "position"])
+    def test_pictures_are_those_of_a_contact_sheet(
+        self, dtype: str, encoding: Any, name: str, tmp_path: Path
+    ) -> None:
+        array = noise(9, 14, 4, dtype=dtype)
+        if dtype != "uint8":
+            array = np.abs(array / 200)
+            array[0, 0] = (np.nan, np.inf, -np.inf, 1)
+        whole = make({name: array}, settings=Separable(encoding=encoding))
+        expected = decode(whole._repr_png_(), tmp_path)[:, :, :3].astype(int)
+        picture = picture_of(array, name, is_encoded=encoding != "none", stops=0.0)
+        shown = decode(picture, tmp_path)
+        # float32 colours are rounded to half floats first: a level where two meet.
+        allowed = 1 if dtype == "float32" else 0
+        assert np.abs(shown - expected).max() <= allowed
+
+    def test_stops(self, tmp_path: Path) -> None:
+        array = np.full((1, 1, 3), 4, np.float32)
+        assert (
+            decode(picture_of(array, "bloom", is_encoded=False, stops=-3), tmp_path)[0, 0, 0] == 188
+        )
+        assert (
+            decode(picture_of(array, "final", is_encoded=True, stops=-3), tmp_path)[0, 0, 0] == 128
+        )
+
+    def test_depth(self, tmp_path: Path) -> None:
+        depth = np.array([[0.5, 1.0]], np.float32)
+        shown = decode(picture_of(depth, "depth", is_encoded=False, stops=0), tmp_path)
+        assert shown[0, :, 0].tolist() == [255, 0]
+
+    @pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+    def test_images_are_averaged_until_they_fit(self, dtype: str) -> None:
+        image = np.zeros((40, 60, 3), dtype)
+        image[::2] = 100
+        small = reduced(image, (30, 30))
+        assert small.shape == (20, 30, 3)
+        assert small.dtype == image.dtype
+        assert (small == 50).all()
+        assert reduced(image, (60, 40)) is image
+        assert reduced(image, (1, 1)).shape == (1, 1, 3)
+
+    def test_numbers_have_the_digits_that_tell_them_apart(self) -> None:
+        pixel = np.array([0.0, 0.1, -1e-3, 1e-5, 999999, 1e6, np.nan, -np.inf], np.float32)
+        expected = ["0.0", "0.1", "-0.001", "1.0e-05", "999999.0", "1.0e+06", "nan", "-inf"]
+        assert texts_of(pixel) == expected
+        assert texts_of(pixel[:2].astype(np.float16)) == ["0.0", "0.1"]
+        assert texts_of(np.array([0, 255], np.uint8)) == ["0", "255"]
+
+
+class TestViewer:
+    def test_setup(self, viewer: Viewer) -> None:
+        answer, buffers = ask(viewer, kind="setup", view="v", id=4)
+        assert (answer["kind"], answer["view"], answer["id"], buffers) == ("setup", "v", 4, [])
+        assert answer["sides"]["a"] == json.loads(json.dumps(Separable().as_dict()))
+        assert answer["sides"]["b"]["bloom"] is False
+        assert (answer["animated"], answer["own_size"]) == (True, [64, 36])
+
+    def test_a_frame_is_that_of_the_renderer(
+        self, viewer: Viewer, scene: Scene, renderer: Renderer, tmp_path: Path
+    ) -> None:
+        settings = Separable(blur_scale=1.5)
+        facts, picture = frame(viewer, settings, size=[80, 45], time=0.25)
+        expected = renderer.render(scene, settings, (80, 45), time=0.25)
+        assert np.array_equal(decode(picture, tmp_path), expected["final"][:, :, :3])
+        assert facts["names"] == list(expected)
+        assert (facts["framebuffer"], facts["size"], facts["dtype"]) == ("final", [80, 45], "uint8")
+        assert facts["code"] == "vkbloom.Separable(blur_scale=1.5)"
+        assert set(facts["passes"]) <= {"glow", "blur_vertical", "bloom", "scene", "final"}
+        assert viewer.settings["a"] == settings
+        assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
+        # Without a size, the scene's own.
+        assert frame(viewer, settings)[0]["size"] == [64, 36]
+
+    @pytest.mark.parametrize("shading", ["forward", "deferred"])
+    def test_every_framebuffer_can_be_looked_at(
+        self, scene: Scene, renderer: Renderer, shading: Any
+    ) -> None:
+        viewer = Viewer(scene, renderer=renderer, size=(64, 36), shading=shading)
+        settings = Pyramid(levels=2)
+        names = list(renderer.render(scene, settings, (64, 36), shading=shading))
+        assert frame(viewer, settings)[0]["names"] == names
+        for name in names:
+            assert frame(viewer, settings, framebuffer=name)[0]["framebuffer"] == name
+
+    def test_a_framebuffer_that_is_not_there_is_final(self, viewer: Viewer) -> None:
+        assert frame(viewer, Separable(), framebuffer="down_3")[0]["framebuffer"] == "final"
+
+    def test_both_sides_at_once(self, viewer: Viewer, tmp_path: Path) -> None:
+        sides = {"b": Separable(bloom=False).as_dict(), "a": Separable().as_dict()}
+        answer, buffers = ask(viewer, kind="frame", sides=sides)
+        with_bloom, without = (
+            decode(buffers[answer["sides"][side]["picture"]], tmp_path).astype(int).sum()
+            for side in "ab"
+        )
+        assert with_bloom > without
+
+    def test_an_image_is_reduced_unless_its_own_size_is_asked_for(
+        self, image: Any, renderer: Renderer, tmp_path: Path
+    ) -> None:
+        viewer = Viewer(image, renderer=renderer)
+        settings = Pyramid(levels=2)
+        facts, _ = frame(viewer, settings, size=[20, 99])
+        assert facts["size"] == [20, 15]
+        expected = renderer.apply(reduced(image, (20, 99)), settings)
+        assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
+        for size in (None, [400, 300]):
+            facts, picture = frame(viewer, settings, size=size, stops=-2)
+            assert facts["size"] == [40, 30]
+            whole = renderer.apply(image, settings)["final"]
+            shown = picture_of(whole, "final", is_encoded=False, stops=-2)
+            assert np.array_equal(decode(picture, tmp_path), decode(shown, tmp_path))
+
+    def test_a_later_change_of_the_image_is_not_seen(self, image: Any, renderer: Renderer) -> None:
+        viewer = Viewer(image, Separable(bloom=False), renderer=renderer)
+        before = image.copy()
+        image[...] = 0
+        frame(viewer, Separable(bloom=False))
+        assert np.array_equal(viewer.frames["a"]["final"], before)
+
+    def test_the_pointer_reads_the_framebuffer_itself(self, image: Any, renderer: Renderer) -> None:
+        image[29, 39] = (1.2345, np.inf, 3000)
+        viewer = Viewer(image, renderer=renderer)
+        settings = Separable(bloom=False)
+        facts, _ = frame(viewer, settings, view="v", at=[1, 1])
+        # The half float that is nearest to 1.2345, in as few digits as tell it from the next.
+        assert facts["probe"] == {"x": 39, "y": 29, "values": ["1.234", "inf", "3000.0"]}
+        answer, _ = ask(viewer, kind="probe", view="v", at=[0.5, 0.1])
+        found = answer["sides"]["a"]["probe"]
+        assert (found["x"], found["y"]) == (20, 3)
+        assert np.array_equal(np.array(found["values"], np.float16), image[3, 20])
+        # Another view has shown nothing yet; what many others show is not kept for ever.
+        assert ask(viewer, kind="probe", view="w", at=[0, 0])[0]["sides"] == {}
+        for view in range(20):
+            ask(viewer, kind="probe", view=str(view), at=[0, 0])
+        assert ask(viewer, kind="probe", view="v", at=[0, 0])[0]["sides"] == {}
+
+    def test_a_side_that_fails_leaves_the_other(self, viewer: Viewer) -> None:
+        wrong = {"method": "kino", "composite": "mix"}
+        sides = {"a": wrong, "b": Separable().as_dict()}
+        answer, buffers = ask(viewer, kind="frame", sides=sides)
+        assert "composite: 'mix' is not one of add" in answer["sides"]["a"]["error"]
+        assert "code" in answer["sides"]["b"]
+        assert len(buffers) == 1
+        assert viewer.settings["a"] == Separable()
+
+    @pytest.mark.parametrize(
+        "message",
+        [
+            None,
+            [],
+            {"kind": "close"},
+            {"kind": ["frame"]},
+            {"kind": "frame"},
+            {"kind": "frame", "sides": {"c": {}}},
+            {"kind": "frame", "sides": {}, "size": [0, 5]},
+            {"kind": "frame", "sides": {}, "size": "5x5"},
+            {"kind": "frame", "sides": {}, "time": "now"},
+            {"kind": "frame", "sides": {}, "stops": 1e9},
+            {"kind": "frame", "sides": {}, "at": [2, 0]},
+            {"kind": "probe"},
+            {"kind": "probe", "at": [None, 0]},
+        ],
+    )
+    def test_messages_without_sense(self, viewer: Viewer, message: Any) -> None:
+        answer, buffers = viewer.answer(message)
+        assert (answer["kind"], buffers) == ("error", [])
+        assert answer["error"]
+
+    def test_arguments(self, scene: Scene, renderer: Renderer, image: Any) -> None:
+        for arguments, kind, message in (
+            ((None,), TypeError, "image"),
+            ((image[0],), ValueError, "shape"),
+            ((scene, 3), TypeError, "settings"),
+        ):
+            with pytest.raises(kind, match=message):
+                Viewer(*arguments, renderer=renderer)
+        for options, message in (({"shading": "x"}, "shading"), ({"size": (0, 1)}, "size")):
+            with pytest.raises(ValueError, match=message):
+                Viewer(scene, renderer=renderer, **options)
+
+    def test_the_renderer(
+        self, scene: Scene, renderer: Renderer, new_renderer: Callable[[], Renderer]
+    ) -> None:
+        Viewer(scene, renderer=renderer).close()
+        assert not renderer.closed
+        owner = Viewer(scene)
+        owner.close()
+        owner.close()
+        assert owner.renderer.closed
+        closed = new_renderer()
+        closed.close()
+        with pytest.raises(ValueError, match="closed"):
+            Viewer(scene, renderer=closed)
+
+
+class TestWidget:
+    @pytest.fixture
+    def sent(self, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, Any]]:
+        anywidget = pytest.importorskip("anywidget")
+        found: list[tuple[Any, Any]] = []
+        monkeypatch.setattr(
+            anywidget.AnyWidget,
+            "send",
+            lambda self, content, buffers=None: found.append((content, buffers)),
+        )
+        return found
+
+    def test_messages_are_answered(
+        self, scene: Scene, renderer: Renderer, sent: list[tuple[Any, Any]]
+    ) -> None:
+        explorer = vkbloom.explore(scene, size=(64, 36), renderer=renderer)
+        assert explorer.frames is None
+        settings = Pyramid(levels=3)
+        message = {"kind": "frame", "id": 1, "sides": {"a": settings.as_dict()}}
+        explorer._handle_custom_msg(message, [])
+        ((answer, buffers),) = sent
+        assert answer["sides"]["a"]["framebuffer"] == "final"
+        assert buffers[0].startswith(b"\x89PNG")
+        assert explorer.settings == settings
+        assert explorer.frames is not None
+        assert explorer.frames["final"].shape == (36, 64, 4)
+        explorer.close()
+        assert not renderer.closed
+
+    def test_code_changes_the_page(
+        self, scene: Scene, renderer: Renderer, sent: list[tuple[Any, Any]]
+    ) -> None:
+        against = Separable(loops=2)
+        explorer = vkbloom.explore(scene, renderer=renderer, against=against)
+        assert explorer.against == against
+        explorer.settings = Pyramid()
+        explorer.against = Separable()
+        assert [list(content["sides"]) for content, _ in sent] == [["a"], ["b"]]
+        assert sent[0][0]["sides"]["a"] == Pyramid().as_dict()
+        assert (explorer.settings, explorer.against) == (Pyramid(), Separable())
+        with pytest.raises(TypeError, match="settings"):
+            explorer.settings = "pyramid"  # type: ignore[assignment]
+
+    def test_without_anywidget(self, scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "anywidget", None)
+        with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[notebook\]"):
+            vkbloom.explore(scene)

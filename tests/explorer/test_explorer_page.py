@@ -1,0 +1,408 @@
+"""The explorer's page in a browser: Debian's Chromium, run by playwright.
+
+What is shown is compared, to the pixel, with what the renderer gives: in the page that
+`vkbloom.explorer.server` serves, and in JupyterLab.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.explorer.explorer_hosts import PATIENCE, jupyterlab, served
+from tests.framebuffers import decode
+from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
+from vkbloom.explorer.viewer import Viewer
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
+
+ASPECT = (1280, 720)
+NOTEBOOK = "import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo())\nexplorer"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        # Without a sandbox, which root has not; nothing but our own pages is opened. Without the
+        # screen's colours, so that a screenshot holds what was drawn.
+        arguments = ["--no-sandbox", "--force-color-profile=srgb"]
+        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def serve() -> Iterator[Callable[[Callable[[], Viewer]], str]]:
+    """Serves viewers from a thread, and returns where."""
+    with ExitStack() as stack:
+        yield lambda new_viewer: stack.enter_context(served(new_viewer))
+
+
+@pytest.fixture(scope="module")
+def scene_url(
+    serve: Callable[[Callable[[], Viewer]], str], scene: Scene, renderer: Renderer
+) -> str:
+    return serve(lambda: Viewer(scene, renderer=renderer, size=ASPECT))
+
+
+@contextmanager
+def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
+    """Open a page and wait for its first picture; whatever it complains about fails the test."""
+    page = browser.new_page(viewport={"width": 980, "height": 640}, **options)
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(url)
+    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=1000 * PATIENCE)
+    yield page
+    page.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def page(browser: Browser, scene_url: str) -> Iterator[Page]:
+    with opened(browser, scene_url) as page:
+        yield page
+
+
+def see(page: Page, folder: Path) -> NDArray[np.uint8]:
+    """Return what is on the screen where the framebuffer is shown, but for the wipe's handle."""
+    visibility = 'document.querySelector(".vkb-divider").style.visibility = '
+    page.evaluate(visibility + '"hidden"')
+    # To hide the caret, a style sheet would be put into the page, which lets none in.
+    picture = page.locator(".vkbloom canvas").screenshot(caret="initial")
+    page.evaluate(visibility + '"visible"')
+    return decode(picture, folder)[:, :, :3]
+
+
+def read(page: Page, folder: Path) -> NDArray[np.uint8]:
+    """Return what the canvas holds, for where it may lie between the pixels of the screen."""
+    url = page.evaluate('document.querySelector(".vkbloom canvas").toDataURL("image/png")')
+    return decode(base64.b64decode(url.partition(",")[2]), folder)[:, :, :3]
+
+
+def field(page: Page, name: str) -> Locator:
+    return page.locator(f"[data-field={name}]")
+
+
+def wait_for_code(page: Page, code: str) -> None:
+    from playwright.sync_api import expect
+
+    # It changes with the picture that it is of.
+    expect(page.locator(".vkb-foot code")).to_have_text(code, timeout=1000 * PATIENCE)
+
+
+def size_of(picture: NDArray[Any]) -> tuple[int, int]:
+    return picture.shape[1], picture.shape[0]
+
+
+def drive(page: Page, renderer: Renderer, scene: Scene, shown: Callable[[], Any]) -> None:
+    """Move the controls, and hold each picture against the renderer's."""
+
+    def assert_shows(settings: Any, name: str = "final", **options: Any) -> None:
+        picture = shown()
+        expected = renderer.render(scene, settings, box, attachments=[name], **options)[name]
+        assert np.array_equal(picture, expected[:, :, :3])
+
+    box = size_of(shown())
+    assert abs(box[0] / box[1] - ASPECT[0] / ASPECT[1]) < 0.01
+    assert_shows(Separable())
+
+    field(page, "blur_scale").fill("0.1")
+    wait_for_code(page, "vkbloom.Separable(blur_scale=0.1)")
+    assert_shows(Separable(blur_scale=0.1))
+    field(page, "bloom").uncheck()
+    wait_for_code(page, "vkbloom.Separable(bloom=False, blur_scale=0.1)")
+    assert_shows(Separable(bloom=False))
+
+    page.get_by_label("method").select_option("pyramid")
+    field(page, "bloom").check()
+    field(page, "levels").fill("3")
+    field(page, "tonemap").select_option("aces")
+    field(page, "exposure").fill("1")
+    page.get_by_label("threshold, on").check()
+    field(page, "threshold").fill("0.5")
+    settings = Pyramid(levels=3, tonemap="aces", exposure=1, threshold=0.5)
+    code = 'vkbloom.Pyramid(threshold=0.5, tonemap="aces", exposure=1.0, levels=3)'
+    wait_for_code(page, code)
+    assert_shows(settings)
+
+    # The half on the right is B's: A as it began, without bloom.
+    page.get_by_label("wipe A | B").check()
+    page.locator(".vkb-divider").press("ArrowRight")
+    page.locator(".vkb-status", has_text="until shown").wait_for()
+    left = round(0.52 * box[0])
+    expected = renderer.render(scene, settings, box)["final"][:, :, :3].copy()
+    expected[:, left:] = renderer.render(scene, Separable(bloom=False), box)["final"][:, left:, :3]
+    deadline = time.monotonic() + PATIENCE
+    while not np.array_equal(shown(), expected):
+        # B's picture comes on its own.
+        assert time.monotonic() < deadline
+    page.get_by_label("wipe A | B").uncheck()
+    assert_shows(settings)
+
+
+def test_the_controls_on_its_own_page(
+    page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
+) -> None:
+    drive(page, renderer, scene, lambda: see(page, tmp_path))
+
+
+def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
+    page.get_by_label("preset").select_option("outline")
+    wait_for_code(page, 'vkbloom.presets["outline"]')
+    shown = see(page, tmp_path)
+    expected = renderer.render(scene, presets["outline"], size_of(shown))["final"]
+    assert np.array_equal(shown, expected[:, :, :3])
+    # The picture is developed as before when the method changes.
+    field(page, "exposure").fill("2")
+    page.get_by_label("method").select_option("kino")
+    wait_for_code(page, "vkbloom.KinoBloom(exposure=2.0)")
+    assert page.get_by_label("preset").input_value() == ""
+
+
+def test_what_is_refused_is_said(page: Page) -> None:
+    field(page, "intensity").locator("xpath=following-sibling::input").fill("-1")
+    page.get_by_role("alert").get_by_text("intensity: -1").wait_for()
+    field(page, "intensity").fill("2")
+    wait_for_code(page, "vkbloom.Separable(intensity=2.0)")
+    assert page.get_by_role("alert").inner_text() == ""
+
+
+def test_every_framebuffer(page: Page, renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
+    picker = page.get_by_label("framebuffer")
+    names = picker.locator("option").all_inner_texts()
+    frames = renderer.render(scene, None, (320, 180))
+    assert names == list(frames)
+    picker.select_option("glow")
+    page.locator(".vkb-status", has_text="256 × 256").wait_for()
+    # A square in a wide box: its own aspect, its pixels enlarged.
+    width, height = size_of(see(page, tmp_path))
+    assert abs(width - height) <= 1
+    # Pyramid has no such framebuffer, and Separable none of Pyramid's.
+    picker.select_option("blur_vertical")
+    page.get_by_label("method").select_option("pyramid")
+    wait_for_code(page, "vkbloom.Pyramid()")
+    assert picker.input_value() == "final"
+    assert "down_3" in picker.locator("option").all_inner_texts()
+
+
+def test_the_pointer_reads_values(
+    page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
+) -> None:
+    box = size_of(see(page, tmp_path))
+    expected = renderer.render(scene, None, box)
+    for name in ("final", "depth"):
+        page.get_by_label("framebuffer").select_option(name)
+        page.locator(".vkb-status", has_text=str(expected[name].dtype)).wait_for()
+        page.locator("canvas").hover(position={"x": 123, "y": 45})
+        values = "  ".join(str(value) for value in np.atleast_1d(expected[name][45, 123]))
+        page.get_by_text(f"{name}[45, 123] = {values}", exact=True).wait_for(
+            timeout=1000 * PATIENCE
+        )
+    page.mouse.move(1, 1)
+    page.get_by_text("Point at the picture").wait_for()
+    # It comes to the picture while another framebuffer is on its way, which takes long.
+    page.evaluate(
+        """() => {
+            const decode = window.createImageBitmap;
+            window.createImageBitmap = async (...whatever) => {
+                await new Promise((done) => setTimeout(done, 500));
+                return decode(...whatever);
+            };
+        }"""
+    )
+    page.get_by_label("framebuffer").select_option("final")
+    page.locator("canvas").hover(position={"x": 123, "y": 45})
+    page.locator(".vkb-status", has_text="uint8").wait_for()
+    values = "  ".join(str(value) for value in expected["final"][45, 123])
+    page.get_by_text(f"final[45, 123] = {values}", exact=True).wait_for(timeout=1000 * PATIENCE)
+
+
+def test_time_plays_and_pauses(
+    page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
+) -> None:
+    still = see(page, tmp_path)
+    slider = page.get_by_label("time, in turns")
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(600)
+    page.get_by_role("button", name="Pause").click()
+    moment = float(slider.input_value())
+    assert 0 < moment < 0.9
+    page.wait_for_timeout(300)
+    assert float(slider.input_value()) == moment
+    assert not np.array_equal(see(page, tmp_path), still)
+    slider.fill("0.25")
+    expected = renderer.render(scene, None, size_of(still), time=0.25)["final"]
+    deadline = time.monotonic() + PATIENCE
+    while not np.array_equal(see(page, tmp_path), expected[:, :, :3]):
+        assert time.monotonic() < deadline
+
+
+def test_code_is_copied(browser: Browser, scene_url: str) -> None:
+    with opened(browser, scene_url) as page:
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        field(page, "loops").fill("2")
+        wait_for_code(page, "vkbloom.Separable(loops=2)")
+        page.get_by_role("button", name="Copy as code").click()
+        page.get_by_role("button", name="Copied").wait_for()
+        assert page.evaluate("navigator.clipboard.readText()") == "vkbloom.Separable(loops=2)"
+
+
+def test_the_newest_wins(page: Page) -> None:
+    """Of many changes at once a few are rendered, and the last is what is shown."""
+    page.evaluate(
+        """() => {
+            window.drawn = window.sent = 0;
+            const send = WebSocket.prototype.send;
+            WebSocket.prototype.send = function (message) {
+                ++window.sent;
+                send.call(this, message);
+            };
+            const root = document.querySelector(".vkbloom");
+            root.addEventListener("vkbloom:drawn", () => ++window.drawn);
+            const slider = document.querySelector("[data-field=blur_strength]");
+            for (let step = 0; step <= 400; ++step) {
+                slider.value = step / 100;
+                slider.dispatchEvent(new Event("input", { bubbles: true }));
+            }
+        }"""
+    )
+    wait_for_code(page, "vkbloom.Separable(blur_strength=4.0)")
+    # The first, and what the slider stood at when that had come. The server would drop messages,
+    # too, but a notebook's kernel could not.
+    assert page.evaluate("[window.sent, window.drawn]") == [2, 2]
+
+
+def test_pictures_follow_the_window(page: Page, tmp_path: Path) -> None:
+    before = size_of(see(page, tmp_path))
+    page.set_viewport_size({"width": 1200, "height": 640})
+    page.locator(".vkb-status", has_text=f"{before[0]} × {before[1]}").wait_for(state="detached")
+    after = size_of(see(page, tmp_path))
+    assert after[0] > before[0]
+    page.get_by_text(f"{after[0]} × {after[1]} uint8").wait_for()
+    page.get_by_label("size").select_option("own")
+    page.get_by_text("1280 × 720 uint8").wait_for()
+    assert size_of(see(page, tmp_path)) == after
+
+
+def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Path) -> None:
+    image = (np.random.default_rng(3).random((60, 80, 3)) ** 8 * 20).astype(np.float32)
+    url = serve(lambda: Viewer(image, KinoBloom(), renderer=renderer))
+    with opened(browser, url) as page:
+        assert page.get_by_label("time, in turns").count() == 0
+        expected = renderer.apply(image, KinoBloom())["final"]
+        # It is smaller than it is shown: rendered as it is, and enlarged with hard pixels.
+        page.locator(".vkb-status", has_text="80 × 60 float32").wait_for()
+        area = page.locator("canvas").bounding_box()
+        assert area is not None
+        x, y = (7 + 0.5) * area["width"] / 80, (33 + 0.5) * area["height"] / 60
+        page.locator("canvas").hover(position={"x": x, "y": y})
+        page.get_by_text("final[33, 7] = ").wait_for()
+        values = page.locator(".vkb-readout").inner_text().partition(" = ")[2].split()
+        assert np.array_equal(np.array(values, np.float32), expected[33, 7])
+        dark = see(page, tmp_path).mean()
+        page.get_by_label("view exposure").fill("3")
+        deadline = time.monotonic() + PATIENCE
+        while see(page, tmp_path).mean() < 1.2 * dark:
+            assert time.monotonic() < deadline
+
+
+def test_a_server_that_stops_is_noticed(browser: Browser, serve: Any, renderer: Renderer) -> None:
+    class Failing(Viewer):
+        def answer(self, message: Any) -> Any:
+            if message["kind"] == "frame" and message["sides"]["a"]["bloom"] is False:
+                raise ZeroDivisionError
+            return super().answer(message)
+
+    image = np.zeros((9, 16, 3), np.uint8)
+    with opened(browser, serve(lambda: Failing(image, renderer=renderer))) as page:
+        field(page, "bloom").uncheck()
+        page.get_by_role("alert").get_by_text("The server has stopped.").wait_for()
+
+
+def luminance(colour: str) -> float:
+    red, green, blue = (
+        ((channel + 0.055) / 1.055) ** 2.4 if channel > 0.04045 else channel / 12.92
+        for channel in (float(number) / 255 for number in re.findall(r"[\d.]+", colour)[:3])
+    )
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def assert_is_readable(page: Page, theme: str) -> None:
+    """Hold texts to WCAG 2.2's contrast of 4.5, on a ground that is light or dark as asked."""
+    found = page.evaluate(
+        """() => [".vkbloom", ".vkbloom label", ".vkb-status", ".vkb-foot code"].map((selector) => {
+            const element = document.querySelector(selector);
+            let ground = element;
+            const of = (element) => getComputedStyle(element).backgroundColor;
+            while (/, 0\\)$|transparent/.test(of(ground))) ground = ground.parentElement;
+            return [selector, getComputedStyle(element).color, of(ground)];
+        })"""
+    )
+    for selector, text, ground in found:
+        low, high = sorted([luminance(text), luminance(ground)])
+        assert (luminance(ground) > 0.5) == (theme == "light"), (selector, ground)
+        assert (high + 0.05) / (low + 0.05) >= 4.5, (selector, text, ground)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_themes(browser: Browser, scene_url: str, theme: Any) -> None:
+    with opened(browser, scene_url, color_scheme=theme) as page:
+        assert_is_readable(page, theme)
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A JupyterLab with a notebook, and where it is."""
+    pytest.importorskip("jupyterlab")
+    folder = tmp_path_factory.mktemp("lab")
+    with jupyterlab(folder, [NOTEBOOK], {}) as url:
+        yield url
+
+
+def run_cell(browser: Browser, lab: str, theme: Any) -> Page:
+    page = browser.new_page(viewport={"width": 1280, "height": 900}, color_scheme=theme)
+    page.on("pageerror", lambda error: pytest.fail(str(error)))
+    page.goto(lab)
+    page.get_by_text("Python 3 (ipykernel) | Idle").wait_for(timeout=1000 * PATIENCE)
+    page.locator(".jp-CodeCell .cm-content").first.click()
+    page.keyboard.press("Shift+Enter")
+    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=1000 * PATIENCE)
+    return page
+
+
+def test_jupyterlab(
+    browser: Browser, lab: str, renderer: Renderer, scene: Scene, tmp_path: Path
+) -> None:
+    page = run_cell(browser, lab, "light")
+    assert_is_readable(page, "light")
+    drive(page, renderer, scene, lambda: read(page, tmp_path))
+    # Code sees what the page shows, and changes it.
+    cell = page.locator(".jp-CodeCell .cm-content").nth(1)
+    cell.click()
+    page.keyboard.type("explorer.settings = vkbloom.Separable(loops=3); explorer.against")
+    page.keyboard.press("Shift+Enter")
+    wait_for_code(page, "vkbloom.Separable(loops=3)")
+    page.locator(".jp-OutputArea", has_text="fields at their defaults").wait_for()
+    page.emulate_media(color_scheme="dark")
+    page.locator("body[data-jp-theme-light=false]").wait_for(state="attached")
+    assert_is_readable(page, "dark")
+    page.close()

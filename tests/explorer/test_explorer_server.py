@@ -1,0 +1,251 @@
+"""The server of the explorer's page: what it serves, to whom, and which messages it answers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import struct
+import threading
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+import vkbloom
+from tests.framebuffers import noise
+from vkbloom import Renderer, Separable
+from vkbloom.cli.program import program
+from vkbloom.explorer.viewer import Viewer
+
+tornado = pytest.importorskip("tornado")
+
+from tornado.httpclient import (  # noqa: E402
+    AsyncHTTPClient,
+    HTTPClientError,
+    HTTPRequest,
+    HTTPResponse,
+)
+from tornado.websocket import WebSocketClientConnection, websocket_connect  # noqa: E402
+
+from vkbloom.explorer.server import Server  # noqa: E402
+
+#: Connections of the running test, which it leaves open.
+OPENED: list[WebSocketClientConnection] = []
+
+
+@pytest.fixture
+def serve(renderer: Renderer) -> Callable[[Callable[[Server], Awaitable[None]]], None]:
+    """Runs a coroutine function beside a server."""
+    image = noise(20, 30, 3, dtype="uint8")
+
+    def run(talk: Callable[[Server], Awaitable[None]]) -> None:
+        async def both() -> None:
+            server = Server(lambda: Viewer(image, renderer=renderer))
+            try:
+                await talk(server)
+            finally:
+                while OPENED:
+                    OPENED.pop().close()
+                await server.stop()
+
+        asyncio.run(both())
+
+    return run
+
+
+async def get(url: str, **headers: str) -> HTTPResponse:
+    return await AsyncHTTPClient().fetch(HTTPRequest(url, headers=headers), raise_error=False)
+
+
+async def connect(server: Server, **headers: str) -> WebSocketClientConnection:
+    url = server.url.replace("http:", "ws:") + "socket"
+    given = {"Origin": f"http://127.0.0.1:{server.port}"} | headers
+    OPENED.append(await websocket_connect(HTTPRequest(url, headers=given)))
+    return OPENED[-1]
+
+
+async def answer(connection: WebSocketClientConnection) -> tuple[dict[str, Any], list[bytes]]:
+    data = await connection.read_message()
+    assert isinstance(data, bytes), (data, connection.close_code)
+    (length,) = struct.unpack_from("<I", data)
+    header = json.loads(data[4 : 4 + length])
+    offset, buffers = 4 + length, []
+    for size in header["buffers"]:
+        buffers.append(data[offset : offset + size])
+        offset += size
+    assert offset == len(data)
+    return header, buffers
+
+
+def asked(number: int, *sides: str) -> str:
+    settings = Separable(intensity=number).as_dict()
+    return json.dumps({"kind": "frame", "id": number, "sides": dict.fromkeys(sides, settings)})
+
+
+def test_the_page_and_its_files(serve: Any) -> None:
+    async def talk(server: Server) -> None:
+        for name, kind in {
+            "": "text/html",
+            "page.js": "text/javascript",
+            "start.js": "text/javascript",
+            "page.css": "text/css",
+        }.items():
+            response = await get(server.url + name)
+            assert response.code == 200
+            assert response.headers["Content-Type"].startswith(kind)
+            assert "default-src 'none'" in response.headers["Content-Security-Policy"]
+            assert "frame-ancestors 'none'" in response.headers["Content-Security-Policy"]
+            assert response.headers["Cache-Control"] == "no-store"
+            # Nothing is loaded from elsewhere.
+            assert b"https://" not in response.body
+            assert b"http://" not in response.body
+        for name in ("other.js", "viewer.py", "../server.py", "..%2fserver.py"):
+            assert (await get(server.url + name)).code in (403, 404)
+
+    serve(talk)
+
+
+def test_only_this_machine_is_listened_to(serve: Any) -> None:
+    async def talk(server: Server) -> None:
+        # All of 127.0.0.0/8 is this machine, so that whoever listens everywhere listens there too.
+        for address, listens in (("127.0.0.1", True), ("127.0.0.2", False)):
+            with socket.socket() as attempt:
+                attempt.settimeout(5)
+                assert (attempt.connect_ex((address, server.port)) == 0) == listens, address
+
+    serve(talk)
+
+
+def test_the_token_and_the_host_are_needed(serve: Any) -> None:
+    async def talk(server: Server) -> None:
+        root = f"http://127.0.0.1:{server.port}/"
+        for path in ("", "x/", server.token[:-1] + "/", server.token + "x/page.js", "x/socket"):
+            assert (await get(root + path)).code in (403, 404), path
+        # A foreign name that was made to point here.
+        for host in ("example.org", f"example.org:{server.port}", "127.0.0.1", "127.0.0.1:1"):
+            assert (await get(server.url, Host=host)).code == 403, host
+        assert (await get(server.url, Host=f"localhost:{server.port}")).code == 200
+        # Each server has a token of its own.
+        other = Server(lambda: pytest.fail("nobody asked"))
+        assert other.token != server.token
+        assert len(other.token) >= 32
+        await other.stop()
+
+    serve(talk)
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://example.org", "null", "", "http://127.0.0.1", "https://127.0.0.1:{port}"]
+)
+def test_the_socket_is_for_the_page_itself(serve: Any, origin: str) -> None:
+    async def talk(server: Server) -> None:
+        with pytest.raises(HTTPClientError) as caught:
+            await connect(server, Origin=origin.format(port=server.port))
+        assert caught.value.code == 403
+        with pytest.raises(HTTPClientError):
+            await connect(server, Host="example.org")
+        (await connect(server)).close()
+
+    serve(talk)
+
+
+def test_frames_come_with_their_pictures(serve: Any) -> None:
+    async def talk(server: Server) -> None:
+        page = await connect(server)
+        await page.write_message(json.dumps({"kind": "setup"}))
+        header, buffers = await answer(page)
+        assert (header["kind"], header["own_size"], buffers) == ("setup", [30, 20], [])
+        await page.write_message(asked(1, "a", "b"))
+        header, buffers = await answer(page)
+        assert header["id"] == 1
+        assert [side["picture"] for side in header["sides"].values()] == [0, 1]
+        assert all(buffer.startswith(b"\x89PNG") for buffer in buffers)
+        # Each page has its own viewer.
+        other = await connect(server)
+        await other.write_message(json.dumps({"kind": "setup"}))
+        assert (await answer(other))[0]["sides"]["a"]["intensity"] == 1.0
+        await other.write_message(json.dumps({"kind": "nonsense"}))
+        assert (await answer(other))[0]["kind"] == "error"
+
+    serve(talk)
+
+
+def test_the_newest_wins(serve: Any) -> None:
+    async def talk(server: Server) -> None:
+        page = await connect(server)
+        held = threading.Event()
+        server._worker.submit(held.wait, 30)
+        await page.write_message(asked(1, "a", "b"))
+        # The first is being answered when the others come.
+        await asyncio.sleep(0.1)
+        await page.write_message(asked(2, "b"))
+        for number in range(3, 50):
+            await page.write_message(asked(number, "a"))
+        await page.write_message(json.dumps({"kind": "probe", "id": 50, "at": [0, 0]}))
+        await asyncio.sleep(0.2)
+        held.set()
+        answers = [(await answer(page))[0] for _ in range(3)]
+        assert [(header["kind"], header["id"]) for header in answers] == [
+            ("frame", 1),
+            ("frame", 49),
+            ("probe", 50),
+        ]
+        # What only an older message asked for has not been lost.
+        assert answers[1]["sides"]["a"]["code"] == "vkbloom.Separable(intensity=49.0)"
+        assert answers[1]["sides"]["b"]["code"] == "vkbloom.Separable(intensity=2.0)"
+
+    serve(talk)
+
+
+@pytest.mark.parametrize("message", ["", "{", "[]", "3", "{}", b"\xff"])
+def test_messages_of_no_page(serve: Any, message: str | bytes) -> None:
+    async def talk(server: Server) -> None:
+        page = await connect(server)
+        await page.write_message(message, binary=isinstance(message, bytes))
+        assert await page.read_message() is None
+        assert page.close_code == 1003
+
+    serve(talk)
+
+
+def test_long_messages_are_refused(serve: Any) -> None:
+    async def talk(server: Server) -> None:
+        page = await connect(server)
+        await page.write_message(json.dumps({"kind": "frame", "sides": "x" * 100_000}))
+        assert await page.read_message() is None
+        assert page.close_code == 1009
+
+    serve(talk)
+
+
+def test_a_port_that_is_taken(serve: Any) -> None:
+    async def talk(server: Server) -> None:
+        with pytest.raises(OSError, match="in use"):
+            Server(lambda: pytest.fail("nobody asked"), server.port)
+
+    serve(talk)
+
+
+class TestCommand:
+    def run(self, *arguments: str) -> Any:
+        return CliRunner().invoke(program, ["explore", "--no-open", *arguments])
+
+    def test_wrong_use(self) -> None:
+        result = self.run("photo.exr", "--scene", "ufo")
+        assert result.exit_code == 2
+        assert "do not go with an IMAGE" in result.stderr
+        assert self.run("--size", "0x3").exit_code == 2
+
+    def test_failures(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        result = self.run("missing.exr")
+        assert (result.exit_code, "missing.exr" in result.stderr) == (1, True)
+        monkeypatch.setitem(__import__("sys").modules, "tornado", None)
+        result = self.run()
+        assert result.exit_code == 1
+        assert "pip install vkbloom[notebook]" in result.stderr
+
+
+def test_explore_is_public() -> None:
+    assert "explore" in vkbloom.__all__

@@ -1,0 +1,461 @@
+"""Grids in memory: right values, few passes, named dimensions, clear refusals."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.framebuffers import noise
+from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, Settings, reductions
+from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.order import blocks
+from vkbloom.grid.plan import Grid, PassCounter, ask, lay_out
+from vkbloom.grid.progress import Progress
+
+xr = pytest.importorskip("xarray")
+
+# For images and scenes that no renderer has seen.
+UNSEEN = itertools.count(1000)
+
+AXES: dict[str, list[Any]] = {
+    "exposure": [0.0, 1.0],
+    "threshold": [None, 0.2, 0.6],
+    "tonemap": ["none", "aces"],
+    "blur_scale": [0.5, 1.0, 2.0],
+}
+# Rows of the forward graph and what they depend on, as csrc/README.md has it.
+DEPENDS = {
+    "glow": ["threshold"],
+    "blur_vertical": ["threshold", "blur_scale"],
+    "bloom": ["threshold", "blur_scale"],
+    "final": ["threshold", "blur_scale", "exposure", "tonemap"],
+}
+
+
+@pytest.fixture(scope="module")
+def image() -> Any:
+    return noise(23, 37, 3, dtype="float32")
+
+
+def fewest(depends: dict[str, list[str]], axes: dict[str, list[Any]]) -> int:
+    """Return the sum over passes of the points that differ in what the pass depends on."""
+    return sum(math.prod(len(axes[name]) for name in names) for names in depends.values())
+
+
+class TestValues:
+    def test_every_point_is_that_of_a_single_call(self, renderer: Renderer, image: Any) -> None:
+        dataset = renderer.grid(
+            image, Separable(intensity=0.7), AXES, attachments=("final", "bloom"), progress=False
+        )
+        assert dataset["final"].dims == (*AXES, "y", "x", "channel")
+        assert dataset["bloom"].dims == (*AXES, "y", "x", "bloom_channel")
+        with Renderer() as single:
+            for place in np.ndindex(2, 3, 2, 3):
+                values = {name: AXES[name][i] for (name, i) in zip(AXES, place, strict=True)}
+                expected = single.apply(image, Separable(intensity=0.7).replace(**values))
+                for name in ("final", "bloom"):
+                    np.testing.assert_array_equal(dataset[name].values[place], expected[name])
+
+    def test_scenes_and_time(self, renderer: Renderer, scene: Scene) -> None:
+        axes = {"intensity": [0.5, 1.0], "time": [0.0, 0.25], "blur_scale": [1.0, 3.0]}
+        dataset = renderer.grid(
+            scene, Separable(), axes, size=(48, 27), attachments=("final", "depth")
+        )
+        assert dataset["final"].shape == (2, 2, 2, 27, 48, 4)
+        assert dataset["depth"].dims == (*axes, "y", "x")
+        for place in np.ndindex(2, 2, 2):
+            intensity, time, scale = (axes[n][i] for n, i in zip(axes, place, strict=True))
+            settings = Separable(intensity=intensity, blur_scale=scale)
+            expected = renderer.render(scene, settings, (48, 27), time=time)
+            for name in ("final", "depth"):
+                np.testing.assert_array_equal(dataset[name].values[place], expected[name])
+
+    def test_deferred_shading(self, renderer: Renderer, scene: Scene) -> None:
+        dataset = renderer.grid(
+            scene, Separable(), {"exposure": [-1, 0]}, size=(32, 18), shading="deferred"
+        )
+        expected = renderer.render(scene, Separable(exposure=-1), (32, 18), shading="deferred")
+        np.testing.assert_array_equal(dataset["final"].values[0], expected["final"])
+
+    @pytest.mark.parametrize("labels", [None, ["a", "b", "c"]])
+    def test_lists_of_images(self, renderer: Renderer, labels: list[Any] | None) -> None:
+        images = [noise(9, 11, 4, dtype="uint8", seed=seed) for seed in range(3)]
+        source = images if labels is None else dict(zip(labels, images, strict=True))
+        dataset = renderer.grid(source, Pyramid(), {"radius": [0.5, 2.0], "intensity": [0.1, 1.0]})
+        assert dataset["final"].dims == ("image", "radius", "intensity", "y", "x", "channel")
+        assert list(dataset["image"].values) == (labels or [0, 1, 2])
+        for number, one in enumerate(images):
+            expected = renderer.apply(one, Pyramid(radius=2.0, intensity=0.1))["final"]
+            np.testing.assert_array_equal(dataset["final"].values[number, 1, 0], expected)
+
+    def test_no_axes(self, renderer: Renderer, image: Any) -> None:
+        dataset = renderer.grid(image)
+        assert dataset["final"].dims == ("y", "x", "channel")
+        np.testing.assert_array_equal(dataset["final"].values, renderer.apply(image)["final"])
+
+
+class TestPasses:
+    @pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)], ids=str)
+    def test_the_fewest_whatever_the_order(
+        self, new_renderer: Callable[[], Renderer], image: Any, order: tuple[int, ...]
+    ) -> None:
+        axes: dict[str, list[Any]] = {
+            list(AXES)[number]: list(AXES.values())[number] for number in order
+        }
+        dataset = new_renderer().grid(image, None, axes, attachments="all")
+        assert list(dataset["final"].dims[:4]) == list(axes)
+        points = math.prod(map(len, axes.values()))
+        assert dataset.attrs["passes_run"] == fewest(DEPENDS, axes)
+        assert dataset.attrs["passes_run"] + dataset.attrs["passes_saved"] == 4 * points
+
+    def test_no_more_where_one_framebuffer_is_wanted(
+        self, new_renderer: Callable[[], Renderer], image: Any
+    ) -> None:
+        dataset = new_renderer().grid(image, None, AXES)
+        points = math.prod(map(len, AXES.values()))
+        # Several passes may run as one.
+        assert points <= dataset.attrs["passes_run"] <= fewest(DEPENDS, AXES)
+        assert dataset.attrs["passes_run"] + dataset.attrs["passes_saved"] == 4 * points
+
+    def test_a_scene_is_drawn_once_a_time(
+        self, new_renderer: Callable[[], Renderer], scene: Scene
+    ) -> None:
+        axes = {"exposure": [0.0, 1.0], "time": [0.0, 0.1, 0.2], "blur_scale": [1.0, 2.0]}
+        # All but the depths, which their passes share.
+        names = ("glow", "blur_vertical", "bloom", "scene", "final")
+        dataset = new_renderer().grid(scene, None, axes, size=(32, 18), attachments=names)
+        depends = {
+            "scene": ["time"],
+            "glow": ["time"],
+            "blur_vertical": ["time", "blur_scale"],
+            "bloom": ["time", "blur_scale"],
+            "final": list(axes),
+        }
+        assert dataset.attrs["passes_run"] == fewest(depends, axes)
+
+    def test_the_order_does_not_trust_the_first_corner(
+        self, new_renderer: Callable[[], Renderer], image: Any
+    ) -> None:
+        # Where the bloom is off, a blur costs nothing.
+        grid = ask_for(
+            image, {"intensity": [0.5, 1.0], "blur_scale": [1, 2], "bloom": [False, True]}
+        )
+        layout = lay_out(grid, new_renderer())
+        assert layout.ranking.index(0) > layout.ranking.index(1)
+
+    @pytest.mark.parametrize(
+        "settings",
+        [
+            *vkbloom.presets.values(),
+            Separable(loops=3, layers=((1.0, 1.0), (2.0, 0.5))),
+            Separable(direct=True, loops=2),
+            Separable(bloom=False),
+            Pyramid(levels=3, bloom_scale=0.5),
+            DualKawase(levels=16),
+        ],
+    )
+    @pytest.mark.parametrize("kind", ["image", "forward", "deferred"])
+    @pytest.mark.parametrize("names", ["bloom", "all"])
+    def test_the_count_of_a_point_alone_is_what_runs(
+        self, renderer: Renderer, scene: Scene, settings: Settings, kind: str, names: str
+    ) -> None:
+        if names == "bloom" and not settings.bloom:
+            names = "final"
+        picture = noise(45, 70, 3, dtype="float32", seed=next(UNSEEN))
+        # Another image or scene puts every pass out of date, as in a new renderer.
+        if kind == "image":
+            ran = renderer.apply(picture, settings, attachments=names).timings
+            grid = ask_for(picture, {}, settings, attachments=names)
+        else:
+            moved = scene.with_camera(vkbloom.Camera(position=(0, 0, -10 - next(UNSEEN) / 1e4)))
+            shading: Any = kind
+            ran = renderer.render(
+                moved, settings, (70, 45), shading=shading, attachments=names
+            ).timings
+            grid = ask_for(moved, {}, settings, attachments=names, size=(70, 45), shading=kind)
+        layout = lay_out(grid, renderer)
+        assert PassCounter(grid, layout, renderer).alone(()) == len(ran)
+
+
+def ask_for(source: Any, axes: Any, settings: Settings | None = None, **more: Any) -> Grid:
+    defaults: dict[str, Any] = {
+        "size": None,
+        "shading": "forward",
+        "time": 0.0,
+        "attachments": ("final",),
+        "reduce": None,
+    }
+    return ask(source, settings, axes, **{**defaults, **more})
+
+
+class TestDataset:
+    def test_coordinates_say_what_they_are(self, renderer: Renderer, image: Any) -> None:
+        axes: dict[str, Any] = {
+            "threshold": [None, 0.5],
+            "tonemap": ["none", "agx"],
+            "bloom_size": [None, (8, 4)],
+            "blur_scale": np.array([1, 2], np.float32),
+            "loops": [1, 2],
+            "direct": [False, True],
+            "weights": [(0.5, 0.25), (1.0,)],
+        }
+        dataset = renderer.grid(image, None, axes)
+        assert np.isnan(dataset["threshold"].values[0])
+        assert list(dataset["tonemap"].values) == ["none", "agx"]
+        assert list(dataset["bloom_size"].values) == ["none", "[8, 4]"]
+        assert list(dataset["weights"].values) == ["[0.5, 0.25]", "[1.0]"]
+        assert dataset["loops"].dtype.kind == "i"
+        assert dataset["direct"].dtype == bool
+        assert dataset["blur_scale"].attrs["units"] == "texel"
+        assert "texels" in dataset["blur_scale"].attrs["description"]
+        assert dataset["bloom_size"].attrs["units"] == "pixel"
+        assert list(dataset["channel"].values) == ["r", "g", "b"]
+        assert dataset["final"].attrs["units"] == "1"
+
+    def test_attributes_hold_the_rest(self, renderer: Renderer, image: Any) -> None:
+        dataset = renderer.grid(image, Separable(intensity=0.3), {"blur_scale": [1.0]})
+        settings = json.loads(dataset.attrs["settings"])
+        assert settings["intensity"] == 0.3
+        assert settings["method"] == "separable"
+        assert "blur_scale" not in settings
+        assert dataset.attrs["adapter"] == renderer.info.name
+        assert dataset.attrs["version"] == vkbloom.__version__
+        assert json.loads(dataset.attrs["axes"]) == ["blur_scale"]
+
+    def test_xarray_selects(self, renderer: Renderer, image: Any) -> None:
+        dataset = renderer.grid(
+            image, None, {"blur_scale": [0.5, 1.1, 2.0], "tonemap": ["none", "aces"]}
+        )
+        chosen = dataset["final"].sel(blur_scale=1.0, method="nearest").sel(tonemap="aces")
+        expected = renderer.apply(image, Separable(blur_scale=1.1, tonemap="aces"))["final"]
+        np.testing.assert_array_equal(chosen.values, expected)
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("arguments", "kind", "message"),
+        [
+            ({"axes": {"blur_sale": [1]}}, ValueError, "'blur_sale' is not a field"),
+            ({"axes": {"time": [0]}}, ValueError, "'time' is not a field"),
+            ({"axes": {"blur_scale": 1.0}}, TypeError, "blur_scale needs a sequence"),
+            ({"axes": {"tonemap": "aces"}}, TypeError, "tonemap needs a sequence"),
+            ({"axes": {"blur_scale": []}}, ValueError, "blur_scale has no values"),
+            ({"axes": {"blur_scale": [1, 17]}}, ValueError, "blur_scale: 17.* out of range"),
+            ({"axes": {"loops": [1.5]}}, ValueError, "whole number"),
+            ({"axes": ["blur_scale"]}, TypeError, "a mapping"),
+            ({"attachments": ["glow_depth"]}, ValueError, "no 'glow_depth' here"),
+            ({"attachments": ()}, ValueError, "nothing is asked for"),
+            ({"size": (3, 3)}, ValueError, "size: only scenes"),
+            ({"shading": "deferred"}, ValueError, "shading: only scenes"),
+            ({"time": 0.5}, ValueError, "time: only scenes"),
+            ({"reduce": {"final": len}}, ValueError, "cannot name a variable"),
+            ({"reduce": {"m": 3}}, TypeError, "must be callable"),
+            # A name of its own: a function's has its address, and xdist compares the names.
+            pytest.param(
+                {"reduce": {"m": lambda frames: "x"}},
+                ValueError,
+                "numbers are needed",
+                id="no number",
+            ),
+            ({"progress": 1}, TypeError, "progress"),
+        ],
+        ids=str,
+    )
+    def test_arguments(
+        self, renderer: Renderer, image: Any, arguments: Any, kind: type[Exception], message: str
+    ) -> None:
+        with pytest.raises(kind, match=message):
+            renderer.grid(image, None, **arguments)
+
+    @pytest.mark.parametrize("source", [None, "a.png", [], [np.zeros(3)], 3], ids=str)
+    def test_sources(self, renderer: Renderer, source: Any) -> None:
+        with pytest.raises((TypeError, ValueError), match=r"source|image"):
+            renderer.grid(source)
+
+    @pytest.fixture
+    def nothing_renders(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        for name in ("apply", "apply_many"):
+            monkeypatch.setattr(Renderer, name, None)
+
+    @pytest.mark.parametrize(
+        ("settings", "axes", "names", "told"),
+        [
+            (
+                Separable(),
+                {"exposure": [0, 1], "bloom_scale": [1, 0.5]},
+                ["glow"],
+                r"along bloom_scale, glow .*\(23, 37, 4\).*bloom_scale=1.*\(11, 18, 4\).*=0.5",
+            ),
+            (Separable(), {"bloom_size": [(4, 4), (8, 8)]}, "all", r"bloom_size, .*\(4, 4, 4\)"),
+            (Pyramid(), {"levels": [3, 2]}, "all", "down_2 .*not there at levels=2"),
+            (Separable(), {"format": ["rgba8unorm", None]}, ["bloom"], "uint8.*float32"),
+            # At either corner the other axis has no effect.
+            (
+                Separable(bloom_scale=0.5),
+                {"bloom_size": [(18, 11), None], "bloom_scale": [0.5, 0.25]},
+                ["glow"],
+                "bloom_scale",
+            ),
+        ],
+        ids=str,
+    )
+    def test_shapes_that_vary_before_anything_is_rendered(
+        self,
+        renderer: Renderer,
+        nothing_renders: None,
+        *,
+        settings: Settings,
+        axes: Any,
+        names: Any,
+        told: str,
+    ) -> None:
+        picture = noise(23, 37, 3, dtype="float32")
+        with pytest.raises(ValueError, match=told):
+            renderer.grid(picture, settings, axes, attachments=names)
+
+    def test_images_of_two_sizes(self, renderer: Renderer) -> None:
+        images = [noise(4, 5, 3, dtype="uint8"), noise(4, 6, 3, dtype="uint8")]
+        with pytest.raises(ValueError, match=r"along image, final .*\(4, 5, 3\).*\(4, 6, 3\)"):
+            renderer.grid(images)
+
+    def test_a_reduction_that_changes_its_shape_names_the_point(
+        self, renderer: Renderer, image: Any
+    ) -> None:
+        def growing(frames: Frames) -> Any:
+            return np.zeros(1 + int(frames.settings.exposure))
+
+        with pytest.raises(ValueError, match=r"n: \(2,\) float64 at exposure=1"):
+            renderer.grid(image, None, {"exposure": [0, 1]}, reduce={"n": growing})
+
+    def test_an_error_on_the_way_leaves_the_renderer_usable(
+        self, renderer: Renderer, image: Any
+    ) -> None:
+        def failing(frames: Frames) -> float:
+            if frames.settings.exposure:
+                raise ZeroDivisionError
+            return 0.0
+
+        with pytest.raises(ZeroDivisionError):
+            renderer.grid(image, None, {"exposure": [0, 1, 2]}, reduce={"n": failing})
+        assert renderer.apply(image)["final"].shape == image.shape
+
+
+class TestReduce:
+    def test_next_to_and_instead_of_framebuffers(self, renderer: Renderer, image: Any) -> None:
+        seen: list[list[str]] = []
+
+        def spread(frames: Frames) -> Any:
+            seen.append(list(frames))
+            return frames["bloom"].std(axis=(0, 1))[:3]
+
+        axes = {"blur_scale": [1.0, 2.0]}
+        beside = renderer.grid(image, None, axes, reduce={"spread": spread})
+        alone = renderer.grid(image, None, axes, attachments=(), reduce={"spread": spread})
+        assert set(beside) == {"final", "spread"}
+        assert set(alone) == {"spread"}
+        assert alone["spread"].dims == ("blur_scale", "spread_dim_0")
+        expected = renderer.apply(image, Separable(blur_scale=2.0))["bloom"].std(axis=(0, 1))[:3]
+        np.testing.assert_allclose(alone["spread"].values[1], expected)
+        # Without a word about what it needs it gets all.
+        assert "glow" in seen[0]
+
+    def test_points_to_compare_with(self, renderer: Renderer) -> None:
+        images = [noise(12, 16, 3, dtype="uint8", seed=seed) for seed in range(2)]
+        axes = {"exposure": [0.0, 0.5], "blur_scale": [0.5, 1.0, 4.0]}
+        same = reductions.PSNR(against={"blur_scale": 1.0})
+        fixed = reductions.PSNR(against={"image": 0, "exposure": 0.0, "blur_scale": 4.0})
+        dataset = renderer.grid(
+            images, None, axes, attachments=(), reduce={"same": same, "fixed": fixed}
+        )
+        for place in np.ndindex(2, 2, 3):
+            exposure, scale = axes["exposure"][place[1]], axes["blur_scale"][place[2]]
+            frames = renderer.apply(
+                images[place[0]], Separable(exposure=exposure, blur_scale=scale)
+            )
+            at_own = renderer.apply(images[place[0]], Separable(exposure=exposure))["final"]
+            at_fixed = renderer.apply(images[0], Separable(blur_scale=4.0))["final"]
+            assert dataset["same"].values[place] == reductions.PSNR(against=at_own)(frames)
+            assert dataset["fixed"].values[place] == reductions.PSNR(against=at_fixed)(frames)
+        assert np.isinf(dataset["same"].values[:, :, 1]).all()
+
+    def test_few_frames_to_compare_with_are_held(self, renderer: Renderer, image: Any) -> None:
+        reduce = {"p": reductions.PSNR(against={"blur_scale": 1.0})}
+        grid = ask_for(image, {"exposure": [0, 1, 2], "blur_scale": [1, 2]}, reduce=reduce)
+        layout = lay_out(grid, renderer)
+        filler = Filler(grid, layout, renderer)
+        for block in blocks(grid.shape, (1, 2), layout.ranking):
+            arrays = {
+                name: np.empty((*block.shape, *variable.shape), variable.dtype)
+                for name, variable in layout.variables.items()
+            }
+            filler.fill(block, arrays)
+            assert len(filler._held) == 1
+
+    @pytest.mark.parametrize(
+        ("against", "told"),
+        [({"blur_scale": 3.0}, "3.0 is not a value of the grid"), ({"knee": 0}, "not an axis")],
+    )
+    def test_points_that_are_not_there(
+        self, renderer: Renderer, image: Any, against: Any, told: str
+    ) -> None:
+        with pytest.raises(ValueError, match=told):
+            renderer.grid(
+                image, None, {"blur_scale": [1.0]}, reduce={"s": reductions.SSIM(against=against)}
+            )
+
+
+class TestExtras:
+    @pytest.mark.parametrize("missing", ["xarray", "zarr", "dask.array"])
+    def test_what_is_missing_is_named(
+        self, image: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str
+    ) -> None:
+        monkeypatch.setitem(sys.modules, missing, None)
+        with pytest.raises(ModuleNotFoundError, match=rf"{missing}: pip install vkbloom\[grid\]"):
+            vkbloom.grid_to_zarr(image, None, {"exposure": [0]}, tmp_path / "a.zarr")
+        assert not (tmp_path / "a.zarr").exists()
+
+    def test_importing_the_package_needs_none(self) -> None:
+        code = (
+            "import sys; sys.modules.update(dict.fromkeys(['xarray', 'zarr', 'dask', 'distributed',"
+            " 'matplotlib', 'tqdm'])); import vkbloom"
+        )
+        subprocess.run([sys.executable, "-c", code], check=True)
+
+    def test_grids_are_imported_late(self) -> None:
+        code = (
+            "import sys, vkbloom\n"
+            "assert not any(name.startswith('vkbloom.grid') for name in sys.modules)\n"
+            "assert all(hasattr(vkbloom, name) for name in vkbloom.__all__)\n"
+            "from vkbloom import reductions"
+        )
+        subprocess.run([sys.executable, "-c", code], check=True)
+        with pytest.raises(AttributeError, match="no attribute 'grids'"):
+            vkbloom.grids  # noqa: B018
+
+
+class TestProgress:
+    def test_silent_without_a_terminal(
+        self, renderer: Renderer, image: Any, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        renderer.grid(image, None, {"exposure": [0, 1]}, progress=True)
+        assert capfd.readouterr() == ("", "")
+
+    def test_a_terminal_sees_passes(
+        self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.setattr("vkbloom.grid.progress._is_watched", lambda: True)
+        with Progress(4, 1, shown=True) as shown:
+            shown.add(Tally(3, ran=5, alone=12))
+        told = capsys.readouterr().err
+        assert "4/4" in told
+        assert "passes run 5, saved 7" in told

@@ -1,0 +1,211 @@
+"""Grids over the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.framebuffers import noise
+from vkbloom import Frames, Separable, check_grid, grid_to_zarr, reductions
+from vkbloom.grid import cluster
+
+distributed = pytest.importorskip("distributed")
+xr = pytest.importorskip("xarray")
+
+AXES: dict[str, Any] = {
+    "exposure": np.linspace(-1, 1, 8),
+    "blur_scale": np.linspace(0.5, 2, 6),
+    "threshold": [None, 0.2],
+}
+REDUCE = {"mean": reductions.Mean(), "psnr": reductions.PSNR(against={"blur_scale": 0.5})}
+
+# Of sockets and event loops that Dask leaves to the garbage collector.
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+def source() -> Any:
+    return noise(14, 18, 3, dtype="float32")
+
+
+def make(store: Path, client: Any = None, **changes: Any) -> Any:
+    arguments: dict[str, Any] = {
+        "chunks": {"exposure": 8},
+        "reduce": REDUCE,
+        "progress": False,
+        **changes,
+    }
+    return grid_to_zarr(source(), Separable(), AXES, store, client=client, **arguments)
+
+
+def contents(store: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(store)): path.read_bytes()
+        for path in store.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    with (
+        distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=50,
+            # By default all clusters of a user share one.
+            local_directory=str(tmp_path_factory.mktemp("workers")),
+        ) as local,
+        distributed.Client(local) as opened,
+    ):
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    store = tmp_path_factory.mktemp("grid") / "whole.zarr"
+    make(store)
+    return store
+
+
+def slow_mean(frames: Frames) -> float:
+    time.sleep(0.02)
+    return float(frames["final"].mean())
+
+
+slow_mean.attachments = ("final",)  # type: ignore[attr-defined]
+
+
+def test_workers_write_what_one_process_writes(
+    client: Any, tmp_path: Path, undisturbed: Path
+) -> None:
+    made = make(tmp_path / "a.zarr", client)
+    assert contents(tmp_path / "a.zarr") == contents(undisturbed)
+    assert made["done"].values.all()
+    # What the workers ran, counted here: the two first points of the workers at least.
+    assert made.attrs["passes_run"] > 0
+    assert made.attrs["passes_saved"] > 0
+
+
+def test_renderers_are_kept_between_runs_and_closed_at_the_end(client: Any, tmp_path: Path) -> None:
+    def held() -> int:
+        return len(cluster._held)
+
+    seen: list[int] = []
+    mark = threading.Event()
+
+    def watch() -> None:
+        while not mark.is_set():
+            seen.extend(client.run(held).values())
+            time.sleep(0.05)
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    make(tmp_path / "a.zarr", client, reduce={"mean": slow_mean}, attachments=())
+    mark.set()
+    watcher.join()
+    assert max(seen) == 1
+    assert list(client.run(held).values()) == [0, 0]
+
+
+def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "_RUN_POINTS", 1)
+    most = 0
+    submit = client.submit
+
+    def counting(function: Any, *rest: Any, **more: Any) -> Any:
+        nonlocal most
+        made = submit(function, *rest, **more)
+        pending = client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks))
+        most = max(most, pending)
+        return made
+
+    monkeypatch.setattr(client, "submit", counting)
+    made = make(tmp_path / "a.zarr", client)
+    assert made["done"].values.all()
+    # Two for each worker, one on its way out, the grid itself, and the layout's two.
+    assert most <= 2 * 2 + 4
+
+
+def test_a_worker_that_is_killed(client: Any, tmp_path: Path, undisturbed: Path) -> None:
+    killed = threading.Event()
+
+    def kill() -> None:
+        while not any((tmp_path / "a.zarr" / "mean").glob("c.*")):
+            time.sleep(0.02)
+        first = min(client.run(os.getpid).values())
+        os.kill(first, signal.SIGKILL)
+        killed.set()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    plain: dict[str, Any] = {"reduce": {"mean": slow_mean}, "attachments": ("final",)}
+    made = make(tmp_path / "a.zarr", client, **plain)
+    killer.join()
+    assert killed.is_set()
+    assert made["done"].values.all()
+    np.testing.assert_array_equal(made["final"].values, xr.open_zarr(undisturbed)["final"].values)
+    assert check_grid(tmp_path / "a.zarr").complete
+    client.wait_for_workers(2, timeout=120)
+
+
+class Failing:
+    """Fails at one point, until a file is there."""
+
+    attachments = ("final",)
+
+    def __init__(self, file: Path, *, mends: bool) -> None:
+        self.file, self.mends = file, mends
+
+    def __call__(self, frames: Frames) -> float:
+        if frames.settings.exposure == 1.0 and not self.file.exists():
+            if self.mends:
+                self.file.touch()
+            raise ZeroDivisionError("this point")
+        return 1.0
+
+
+def test_failed_runs_are_tried_again(client: Any, tmp_path: Path) -> None:
+    reduce = {"n": Failing(tmp_path / "tried", mends=True)}
+    made = make(tmp_path / "a.zarr", client, reduce=reduce, attachments=())
+    assert made["done"].values.all()
+
+
+def test_what_fails_every_time_keeps_what_is_done(client: Any, tmp_path: Path) -> None:
+    reduce = {"n": Failing(tmp_path / "mended", mends=False)}
+    changes: dict[str, Any] = {"reduce": reduce, "attachments": (), "chunks": {"blur_scale": 6}}
+    with pytest.raises(ZeroDivisionError, match="this point"):
+        make(tmp_path / "a.zarr", client, **changes)
+    report = check_grid(tmp_path / "a.zarr")
+    assert 0 < report.done < report.points
+    assert not report.problems
+    (tmp_path / "mended").touch()
+    assert make(tmp_path / "a.zarr", client, **changes)["done"].values.all()
+
+
+def test_a_worker_without_the_adapter(
+    client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(vkbloom.AdapterNotFoundError):
+        make(tmp_path / "a.zarr", client, adapter="no such")
+    assert not (tmp_path / "a.zarr").exists()
+
+
+def test_other_clients_and_stores(client: Any) -> None:
+    zarr = pytest.importorskip("zarr")
+    with pytest.raises(TypeError, match="client"):
+        make(Path("a.zarr"), 3)
+    with pytest.raises(ValueError, match="in memory"):
+        make(zarr.storage.MemoryStore(), client)

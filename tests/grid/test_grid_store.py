@@ -1,0 +1,683 @@
+"""Grids on disk: complete, resumable, refused where they differ, mended where they are damaged."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.framebuffers import noise
+from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, reductions
+from vkbloom.grid.filling import Filler
+from vkbloom.grid.identity import differences
+from vkbloom.grid.store import GridStore
+
+xr = pytest.importorskip("xarray")
+zarr = pytest.importorskip("zarr")
+google_crc32c = pytest.importorskip("google_crc32c")
+zstd = pytest.importorskip("numcodecs.zstd")
+
+AXES: dict[str, list[Any]] = {
+    "exposure": [0.0, 1.0, 2.0],
+    "threshold": [None, 0.5],
+    "blur_scale": [0.5, 1.0, 1.5, 2.0],
+}
+CHUNKS = {"exposure": 3, "blur_scale": 2}
+REDUCE = {"mean": reductions.Mean(), "energy": reductions.EncircledEnergy(radii=(2, 8))}
+POINTS = 3 * 2 * 4
+
+
+def source() -> Any:
+    return noise(16, 21, 3, dtype="float32")
+
+
+def make(store: Any, **changes: Any) -> Any:
+    arguments: dict[str, Any] = {
+        "chunks": CHUNKS,
+        "reduce": REDUCE,
+        "attachments": ("final", "bloom"),
+        **changes,
+    }
+    settings = arguments.pop("settings", None)
+    axes = arguments.pop("axes", AXES)
+    return grid_to_zarr(arguments.pop("source", source()), settings, axes, store, **arguments)
+
+
+def contents(store: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(store)): path.read_bytes()
+        for path in store.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    store = tmp_path_factory.mktemp("grid") / "whole.zarr"
+    make(store, validation=True)
+    return store
+
+
+@pytest.fixture
+def copy(undisturbed: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(undisturbed, tmp_path / "copy.zarr"))
+
+
+class TestWhole:
+    def test_holds_what_a_grid_in_memory_holds(self, undisturbed: Path, renderer: Renderer) -> None:
+        expected = renderer.grid(
+            source(), None, AXES, attachments=("final", "bloom"), reduce=REDUCE
+        )
+        found = xr.open_zarr(undisturbed)
+        assert set(found) == {*expected, "done"}
+        for name in expected:
+            assert found[name].dims == expected[name].dims
+            assert found[name].dtype == expected[name].dtype
+            assert found[name].attrs.items() >= expected[name].attrs.items()
+            np.testing.assert_array_equal(found[name].values, expected[name].values)
+        for name in expected.coords:
+            np.testing.assert_array_equal(found[name].values, expected[name].values)
+            assert found[name].attrs == expected[name].attrs
+        assert found["done"].values.all()
+
+    def test_xarray_reads_it_lazily(self, undisturbed: Path, renderer: Renderer) -> None:
+        final = xr.open_zarr(undisturbed)["final"]
+        assert final.chunks[0] == (3,)
+        chosen = final.sel(blur_scale=1.1, method="nearest").isel(exposure=2, threshold=1)
+        assert chosen.chunks is not None
+        expected = renderer.apply(source(), Separable(exposure=2, threshold=0.5))["final"]
+        np.testing.assert_array_equal(chosen.compute().values, expected)
+
+    def test_is_reported_complete(self, undisturbed: Path) -> None:
+        report = check_grid(undisturbed)
+        assert report.complete
+        assert str(report) == f"{POINTS} of {POINTS} points are done"
+
+    @pytest.mark.parametrize("url", ["file://{}/a.zarr", "memory://{}/a.zarr"])
+    def test_in_the_store_of_an_url(self, tmp_path: Path, undisturbed: Path, url: str) -> None:
+        store = url.format(tmp_path)
+        make(store)
+        assert check_grid(store).complete
+        xr.testing.assert_identical(xr.open_zarr(store), xr.open_zarr(undisturbed))
+        if store.startswith("file:"):
+            assert contents(tmp_path / "a.zarr") == contents(undisturbed)
+
+    def test_counts_are_of_this_call(self, copy: Path) -> None:
+        mended: list[str] = []
+        again = make(copy, on_mended=mended.append)
+        assert again.attrs["passes_run"] == 0
+        assert "vkbloom_grid" not in again.attrs
+        assert mended == []
+
+    def test_black_pictures_are_stored_too(self, tmp_path: Path) -> None:
+        black = np.zeros((4, 4, 3), np.uint8)
+        make(tmp_path / "a.zarr", source=black, reduce=None, attachments="final")
+        assert check_grid(tmp_path / "a.zarr").complete
+
+    def test_scenes_lists_and_one_point(self, tmp_path: Path, scene: vkbloom.Scene) -> None:
+        plain: dict[str, Any] = {"chunks": None, "reduce": None, "attachments": "final"}
+        lone = make(tmp_path / "a.zarr", source=scene, axes={}, size=(20, 10), **plain)
+        assert lone["final"].shape == (10, 20, 4)
+        assert bool(lone["done"])
+        moving = make(
+            tmp_path / "b.zarr", source=scene, axes={"time": [0, 0.5]}, size=(20, 10), **plain
+        )
+        np.testing.assert_array_equal(moving["final"][0].values, lone["final"].values)
+        images = {"x": source(), "y": source()[::-1]}
+        listed = make(
+            tmp_path / "c.zarr", source=images, axes={"radius": [1]}, settings=Pyramid(), **plain
+        )
+        assert list(listed["image"].values) == ["x", "y"]
+        assert check_grid(tmp_path / "c.zarr").complete
+
+    def test_default_chunks_hold_about_a_megabyte(self, tmp_path: Path) -> None:
+        axes = {"intensity": np.linspace(0, 1, 40), "blur_scale": np.linspace(1, 2, 3)}
+        picture = noise(128, 96, 3, dtype="uint8")
+        made = make(
+            tmp_path / "a.zarr",
+            source=picture,
+            axes=axes,
+            chunks=None,
+            reduce=None,
+            attachments="final",
+        )
+        # 36 KiB a point: 28 of them, along the axis that is visited fastest.
+        assert made["final"].chunks[:2] == ((28, 12), (1, 1, 1))
+
+    @pytest.mark.parametrize(
+        ("chunks", "told"),
+        [({"knee": 1}, "not an axis"), ({"exposure": 0}, "at least 1"), ([1], "by axis")],
+    )
+    def test_wrong_chunks(self, tmp_path: Path, chunks: Any, told: str) -> None:
+        with pytest.raises((TypeError, ValueError), match=told):
+            make(tmp_path / "a.zarr", chunks=chunks)
+
+
+class _Stop(Exception):
+    """The end of a process, as far as a test can have it within its own."""
+
+
+@pytest.fixture
+def stop_after(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, bool], None]:
+    """Make the writing of blocks fail after some."""
+
+    def arrange(count: int, commits: bool) -> None:
+        written: list[int] = []
+        write = GridStore.writer.fget  # type: ignore[attr-defined]
+
+        class Stopping:
+            def __init__(self, inner: Any) -> None:
+                self.inner = inner
+
+            def write(self, block: Any, arrays: Any) -> None:
+                if len(written) == count:
+                    raise _Stop
+                written.append(1)
+                self.inner.write(block, arrays)
+
+            def flush(self, blocks: Any) -> None:
+                if not commits:
+                    raise OSError(errno.EIO, "the disk is gone")
+                self.inner.flush(blocks)
+
+        monkeypatch.setattr(GridStore, "writer", property(lambda self: Stopping(write(self))))
+
+    return arrange
+
+
+class TestResumed:
+    @pytest.mark.parametrize("commits", [True, False])
+    def test_only_what_is_missing_is_rendered(
+        self,
+        tmp_path: Path,
+        undisturbed: Path,
+        stop_after: Any,
+        commits: bool,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        store = tmp_path / "a.zarr"
+        stop_after(3, commits)
+        with pytest.raises(_Stop):
+            make(store)
+        # It opens while it is not complete.
+        part = xr.open_zarr(store)
+        assert int(part["done"].sum()) == (3 * 6 if commits else 0)
+        whole = xr.open_zarr(undisturbed)
+        for name in ("final", "mean"):
+            there = part[name].where(part["done"]).dropna("exposure", how="all")
+            xr.testing.assert_equal(
+                there, whole[name].where(part["done"]).dropna("exposure", how="all")
+            )
+        monkeypatch.undo()
+        filled: list[int] = []
+        fill = Filler.fill
+
+        def counting(self: Filler, block: Any, *rest: Any) -> Any:
+            filled.append(block.count)
+            return fill(self, block, *rest)
+
+        monkeypatch.setattr(Filler, "fill", counting)
+        made = make(store)
+        # Blocks that are whole count, marked or not.
+        assert sum(filled) == POINTS - 3 * 6
+        assert made["done"].values.all()
+        assert contents(store) == contents(undisturbed)
+
+    def test_a_process_that_is_killed(self, tmp_path: Path) -> None:
+        script = Path(__file__).with_name("grid_to_kill.py")
+        whole, store = tmp_path / "whole.zarr", tmp_path / "killed.zarr"
+        for seconds in (0.0, 0.2):
+            process = subprocess.Popen([sys.executable, str(script), str(store)])
+            try:
+                # From the first chunk on, at different places.
+                while not any((store / "final").glob("c.*")) and process.poll() is None:
+                    time.sleep(0.01)
+                time.sleep(seconds)
+            finally:
+                process.kill()
+                process.wait()
+            if (store / "zarr.json").exists():
+                assert int(xr.open_zarr(store)["done"].sum()) < 1000
+        subprocess.run([sys.executable, str(script), str(store)], check=True)
+        subprocess.run([sys.executable, str(script), str(whole)], check=True)
+        assert contents(store) == contents(whole)
+
+    def test_resume_can_be_declined(self, copy: Path) -> None:
+        before = contents(copy)
+        with pytest.raises(FileExistsError, match="there is a grid already"):
+            make(copy, resume=False)
+        assert contents(copy) == before
+
+    def test_marks_can_be_trusted(self, copy: Path) -> None:
+        (copy / "mean" / "c.0.0.0").write_bytes(b"")
+        make(copy, verify=False)
+        assert (copy / "mean" / "c.0.0.0").read_bytes() == b""
+
+    def test_chunks_are_those_of_the_store(self, copy: Path, undisturbed: Path) -> None:
+        make(copy, chunks=None)
+        assert contents(copy) == contents(undisturbed)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("changes", "told"),
+        [
+            ({"settings": Separable(intensity=0.5)}, r"settings.intensity: 1.0 in .* 0.5 asked"),
+            (
+                {"settings": Pyramid(), "axes": {"exposure": AXES["exposure"]}, "chunks": None},
+                r"settings.method: \"separable\"",
+            ),
+            ({"axes": {**AXES, "exposure": [0.0, 1.0, 2.5]}}, r"axes.exposure: \[0.0, 1.0, 2.0\]"),
+            ({"axes": dict(reversed(AXES.items()))}, "order of axes"),
+            ({"axes": {**AXES, "knee": [0.0]}}, "axes.knee: not in the store"),
+            ({"source": noise(16, 21, 3, dtype="float32", seed=9)}, "source.images"),
+            ({"attachments": "final"}, "variables.bloom: .* not asked for"),
+            ({"reduce": {**REDUCE, "mean": reductions.Mean(attachment="glow")}}, "reduce.mean"),
+            ({"chunks": {}}, r"chunk: \[3, 1, 2\] in the store, \[1, 1, 1\] asked for"),
+        ],
+        ids=str,
+    )
+    def test_other_grids(self, copy: Path, changes: Any, told: str) -> None:
+        before = contents(copy)
+        with pytest.raises(ValueError, match=f"another grid is there; .*{told}"):
+            make(copy, **changes)
+        assert contents(copy) == before
+
+    def test_another_version(self, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(vkbloom, "__version__", "9.9")
+        with pytest.raises(ValueError, match=r'version: "0.1.0" in the store, "9.9" asked for'):
+            make(copy)
+
+    def test_another_format(self, copy: Path) -> None:
+        root = json.loads((copy / "zarr.json").read_text())
+        root["attributes"]["vkbloom_grid"]["format"] = 99
+        (copy / "zarr.json").write_text(json.dumps(root))
+        for call in (make, check_grid):
+            with pytest.raises(ValueError, match="its format is 99"):
+                call(copy)
+        root["attributes"]["vkbloom_grid"]["format"] = "x" * 100_000
+        (copy / "zarr.json").write_text(json.dumps(root))
+        for call in (make, check_grid):
+            with pytest.raises(ValueError, match=r'its format is "x+ \.\.\. x+", 1 is known'):
+                call(copy)
+
+    def test_something_else(self, tmp_path: Path) -> None:
+        (tmp_path / "a").mkdir()
+        (tmp_path / "a" / "letter.txt").write_text("dear")
+        zarr.open_group(tmp_path / "b", mode="w")
+        for name in ("a", "b"):
+            before = contents(tmp_path / name)
+            for call in (make, check_grid):
+                with pytest.raises(ValueError, match="there is no grid in it"):
+                    call(tmp_path / name)
+            assert contents(tmp_path / name) == before
+
+    def test_nothing(self, tmp_path: Path) -> None:
+        with pytest.raises(FileNotFoundError):
+            check_grid(tmp_path / "a.zarr")
+
+    def test_a_store_of_another_kind(self) -> None:
+        with pytest.raises(TypeError, match="store"):
+            make(3)
+
+    def test_a_reference_frame_is_part_of_the_grid(self, tmp_path: Path) -> None:
+        one = {"reduce": {"p": reductions.PSNR(against=source())}, "attachments": ()}
+        make(tmp_path / "a.zarr", **one)
+        make(tmp_path / "a.zarr", **one)
+        other = {"reduce": {"p": reductions.PSNR(against=source() + 1)}, "attachments": ()}
+        with pytest.raises(ValueError, match=r"reduce.p"):
+            make(tmp_path / "a.zarr", **other)
+
+
+def damage_truncated(store: Path) -> None:
+    path = store / "final" / "c.0.1.1.0.0.0"
+    path.write_bytes(path.read_bytes()[:-7])
+
+
+def damage_flipped(store: Path) -> None:
+    path = store / "final" / "c.0.1.1.0.0.0"
+    content = bytearray(path.read_bytes())
+    # Among the values, where nothing but the checksum can tell.
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def damage_missing(store: Path) -> None:
+    (store / "mean" / "c.0.1.1").unlink()
+
+
+def damage_metadata(store: Path) -> None:
+    (store / "bloom" / "zarr.json").unlink()
+
+
+def damage_half_metadata(store: Path) -> None:
+    path = store / "final" / "zarr.json"
+    path.write_bytes(path.read_bytes()[:100])
+
+
+def damage_root(store: Path) -> None:
+    (store / "zarr.json").unlink()
+
+
+def damage_half_root(store: Path) -> None:
+    (store / "zarr.json").write_text('{"attr')
+
+
+def damage_marks(store: Path) -> None:
+    (store / "done" / "c.0.0.0").write_bytes(b"x")
+
+
+def damage_coordinate(store: Path) -> None:
+    (store / "exposure" / "c.0").unlink()
+
+
+NAMED = r"exposure=0\.\.2, threshold=0.5, blur_scale=1.5\.\.2"
+
+
+class TestDamaged:
+    @pytest.mark.parametrize(
+        ("damage", "told"),
+        [
+            (damage_truncated, f"final/c.0.1.1.0.0.0 is damaged .*, of {NAMED}"),
+            (damage_flipped, f"final/c.0.1.1.0.0.0 is damaged .*, of {NAMED}"),
+            (damage_missing, f"mean/c.0.1.1 is missing, of {NAMED}"),
+            (damage_metadata, "bloom/zarr.json is missing, of all points"),
+            (damage_half_metadata, "final/zarr.json is damaged, of all points"),
+            (damage_root, "zarr.json is missing: it says what the grid is"),
+            (damage_half_root, "zarr.json is damaged: it says what the grid is"),
+            (damage_marks, "the marks in done are damaged .*, of all points"),
+            (damage_coordinate, "the coordinate exposure is missing, of all points"),
+        ],
+    )
+    def test_is_reported_and_mended(
+        self, copy: Path, undisturbed: Path, damage: Callable[[Path], None], told: str
+    ) -> None:
+        damage(copy)
+        before = contents(copy)
+        report = check_grid(copy)
+        assert not report.complete
+        assert len(report.problems) == 1
+        assert re.fullmatch(told, report.problems[0])
+        assert contents(copy) == before
+        mended: list[str] = []
+        make(copy, on_mended=mended.append)
+        assert mended
+        assert contents(copy) == contents(undisturbed)
+        assert check_grid(copy).complete
+
+    def test_leftovers_of_a_killed_writer_go(self, copy: Path, undisturbed: Path) -> None:
+        (copy / "final" / "c.0.0.0.0.0.5c5c.partial").write_bytes(b"half")
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
+
+def with_sum(content: bytes) -> bytes:
+    summed: int = google_crc32c.value(content)
+    return content + summed.to_bytes(4, "little")
+
+
+def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    metadata = json.loads(path.read_text())
+    change(metadata)
+    path.write_text(json.dumps(metadata))
+
+
+CHUNK_OF_FINAL = "final/c.0.1.1.0.0.0"
+#: Frames of Zstandard that say or hold more than their chunks: 64 GiB said in 19 bytes; 256 MiB in
+#: 8 KB, in one frame that says so, and in one that does not.
+SAYS_TOO_MUCH = b"\x28\xb5\x2f\xfd\xe0" + (1 << 36).to_bytes(8, "little") + b"\x19\0\0abc"
+ONES = ((1 << 17 << 3) | 2).to_bytes(3, "little") + b"\1"
+HOLDS_TOO_MUCH = bytes.fromhex("28b52ffda0") + (1 << 28).to_bytes(4, "little") + ONES * 2048
+STREAMS_TOO_MUCH = bytes.fromhex("28b52ffd0058") + ONES * 2048
+LAST = b"\1\0\0"
+
+
+class TestHostile:
+    """Stores that fuzzing found, or would."""
+
+    @pytest.mark.parametrize(
+        "frame",
+        [SAYS_TOO_MUCH, HOLDS_TOO_MUCH + LAST, STREAMS_TOO_MUCH + LAST],
+        ids=["says", "holds", "streams"],
+    )
+    @pytest.mark.parametrize("key", [CHUNK_OF_FINAL, "done/c.0.0.0", "channel/c.0", "exposure/c.0"])
+    def test_a_chunk_takes_no_more_memory_than_its_array_needs(
+        self, copy: Path, undisturbed: Path, key: str, frame: bytes
+    ) -> None:
+        has_sum = key.startswith(("final", "done"))
+        (copy / key).write_bytes(with_sum(frame) if has_sum else frame)
+        tracemalloc.start()
+        try:
+            (problem,) = check_grid(copy).problems
+            make(copy)
+            _, most = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        assert "damaged" in problem
+        assert most < 64 << 20
+        assert contents(copy) == contents(undisturbed)
+
+    def test_texts_that_are_said_to_be_many(self, copy: Path, undisturbed: Path) -> None:
+        content = bytes(zstd.Zstd().encode((1 << 28).to_bytes(4, "little") + bytes(16)))
+        (copy / "channel" / "c.0").write_bytes(content)
+        (problem,) = check_grid(copy).problems
+        assert problem == (
+            "the coordinate channel is damaged (it does not hold 3 values), of all points"
+        )
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
+    def test_memory_that_is_short_is_no_damage(
+        self, copy: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def fails(*_: object) -> None:
+            raise MemoryError
+
+        before = contents(copy)
+        monkeypatch.setattr(vkbloom.grid.store, "check_summed", fails)
+        with pytest.raises(MemoryError):
+            make(copy)
+        assert contents(copy) == before
+
+    def test_a_chunk_that_holds_too_little(self, copy: Path, undisturbed: Path) -> None:
+        content = bytes(zstd.Zstd().encode(bytes(100)))
+        (copy / CHUNK_OF_FINAL).write_bytes(with_sum(content))
+        (problem,) = check_grid(copy).problems
+        assert f"{CHUNK_OF_FINAL} is damaged (it " in problem
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
+    @pytest.mark.parametrize(
+        "chunk",
+        [[0, 1, 1], [-1, 1, 1], [10**9, 10**9, 10**9], [1.0, 1, 1], [True, 1, 1], "abc", 3, [[]]],
+        ids=str,
+    )
+    def test_a_block_that_is_none(self, copy: Path, chunk: Any) -> None:
+        rewritten(
+            copy / "zarr.json",
+            lambda root: root["attributes"]["vkbloom_grid"].update(chunk=chunk),
+        )
+        before = contents(copy)
+        assert "it says what the grid is" in check_grid(copy).problems[0]
+        with pytest.raises(ValueError, match="another grid is there; chunk: "):
+            make(copy, chunks=None)
+        assert contents(copy) == before
+
+    def test_a_block_that_is_not_the_arrays(self, copy: Path) -> None:
+        # Taken over, all that is there would be rendered again.
+        rewritten(
+            copy / "zarr.json",
+            lambda root: root["attributes"]["vkbloom_grid"].update(chunk=[1, 1, 1]),
+        )
+        before = contents(copy)
+        with pytest.raises(ValueError, match=r"another grid is there, and its zarr.json is"):
+            make(copy, chunks=None)
+        assert contents(copy) == before
+
+    @pytest.mark.parametrize("identity", [3, [], "x", None], ids=str)
+    @pytest.mark.parametrize("place", ["vkbloom_grid", "attributes"])
+    def test_metadata_of_other_types(self, copy: Path, place: str, identity: Any) -> None:
+        rewritten(
+            copy / "zarr.json",
+            lambda root: (root if place in root else root["attributes"]).update({place: identity}),
+        )
+        before = contents(copy)
+        for call in (make, check_grid):
+            with pytest.raises(ValueError, match="there is no grid in it"):
+                call(copy)
+        assert contents(copy) == before
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"axes": {}},
+            {"axes": {**AXES, "exposure": 3}},
+            {"order of axes": ["../../a", "b", "c"]},
+            {"order of axes": 3},
+            {"variables": {"../final": {"shape": [], "dtype": "float32"}}},
+            {"variables": {"final": {"shape": [10**30], "dtype": "float32"}}},
+            {"variables": {"final": {"shape": [1.5], "dtype": "float32"}}},
+            {"variables": {"final": {"shape": [], "dtype": "object"}}},
+            {"variables": {"final": 3}},
+            {"variables": []},
+        ],
+        ids=str,
+    )
+    def test_an_identity_that_is_none(self, copy: Path, change: dict[str, Any]) -> None:
+        rewritten(
+            copy / "zarr.json", lambda root: root["attributes"]["vkbloom_grid"].update(change)
+        )
+        before = contents(copy)
+        report = check_grid(copy)
+        assert (report.points, report.done, report.complete) == (0, 0, False)
+        assert report.problems == ("zarr.json is damaged: it says what the grid is",)
+        with pytest.raises(ValueError, match="another grid is there"):
+            make(copy)
+        assert contents(copy) == before
+
+    def test_values_of_any_depth_are_told(self) -> None:
+        deep: list[Any] = []
+        for _ in range(100_000):
+            deep = [deep]
+        told = ["a: lists in lists in the store, 1 asked for"]
+        assert differences({"a": deep}, {"a": 1}) == told
+
+    def test_more_points_than_memory(self, copy: Path) -> None:
+        axes = {name: list(range(10_000)) for name in AXES}
+        rewritten(
+            copy / "zarr.json", lambda root: root["attributes"]["vkbloom_grid"].update(axes=axes)
+        )
+        with pytest.raises(ValueError, match="1000000000000 points are over the most"):
+            check_grid(copy)
+
+    @pytest.mark.parametrize("name", ["final", "done", "channel"])
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"shape": [10**9]},
+            {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [10**9]}}},
+            {"codecs": [{"name": "bytes"}]},
+            {"data_type": "int8"},
+            {"zarr_format": 3.0},
+            {"attributes": 3},
+            {"attributes": {"grid": {}}},
+            {"attributes": {"grid": [[]]}},
+            {"dimension_names": [3]},
+        ],
+        ids=str,
+    )
+    def test_an_arrays_metadata(
+        self, copy: Path, undisturbed: Path, name: str, change: dict[str, Any]
+    ) -> None:
+        rewritten(copy / name / "zarr.json", lambda metadata: metadata.update(change))
+        tracemalloc.start()
+        try:
+            report = check_grid(copy)
+            make(copy)
+            _, most = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        # Names and attributes decide nothing of what is read.
+        is_harmless = set(change) <= {"attributes", "dimension_names"}
+        assert report.complete is not bool(report.problems)
+        assert is_harmless or f"{name}/zarr.json is damaged, of all points" in report.problems
+        assert most < 64 << 20
+        assert contents(copy) == contents(undisturbed)
+
+    @pytest.mark.parametrize("key", ["zarr.json", "final/zarr.json", "mean/zarr.json"])
+    def test_lists_in_lists_without_an_end(self, copy: Path, undisturbed: Path, key: str) -> None:
+        (copy / key).write_text('{"attributes": ' + "[" * 100_000)
+        (problem,) = check_grid(copy).problems
+        assert problem.startswith(f"{key} is damaged")
+        make(copy)
+        assert contents(copy) == contents(undisturbed)
+
+
+class _Full(zarr.storage.LocalStore):  # type: ignore[misc, name-defined]
+    """A disk with room for some more keys."""
+
+    room = 0
+
+    async def set(self, key: str, value: Any) -> None:
+        if type(self).room <= 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), key)
+        type(self).room -= 1
+        await super().set(key, value)
+
+
+@pytest.mark.parametrize("room", [3, 20, 30, 33])
+def test_a_full_disk_keeps_what_is_done(tmp_path: Path, undisturbed: Path, room: int) -> None:
+    _Full.room = room
+    with pytest.raises(OSError, match="No space left"):
+        make(_Full(tmp_path / "a.zarr"))
+    assert not list((tmp_path / "a.zarr").rglob("*.partial"))
+    make(tmp_path / "a.zarr")
+    assert contents(tmp_path / "a.zarr") == contents(undisturbed)
+
+
+def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
+    # Files may not grow beyond a limit, which stops a write in its middle as a full disk does.
+    code = (
+        "import resource, signal, sys\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))\n"
+        "import numpy as np, vkbloom\n"
+        "image = np.random.default_rng(1).integers(0, 256, (256, 256, 3), dtype=np.uint8)\n"
+        "vkbloom.grid_to_zarr(image, None, {'intensity': [0, 1]}, sys.argv[1],\n"
+        "                     chunks={'intensity': 2})\n"
+    )
+    store = tmp_path / "a.zarr"
+    ended = subprocess.run(
+        [sys.executable, "-c", code, str(store)], capture_output=True, text=True, check=False
+    )
+    assert f"OSError: [Errno 27] File too large: '{store}/" in ended.stderr
+    assert not list(store.rglob("*.partial"))
+    assert check_grid(store).done == 0
+    assert not check_grid(store).problems
+
+
+def test_custom_reductions_are_known_by_name(tmp_path: Path) -> None:
+    make(tmp_path / "a.zarr", reduce={"n": count_frames}, attachments=())
+    with pytest.raises(ValueError, match="count_frames"):
+        make(tmp_path / "a.zarr", reduce={"n": count_other}, attachments=())
+
+
+def count_frames(frames: Frames) -> int:
+    return len(frames)
+
+
+def count_other(frames: Frames) -> int:
+    return len(frames)

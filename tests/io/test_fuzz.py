@@ -1,0 +1,55 @@
+"""Readers of outside data under changed files: a short run of each target, and what was found."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vkbloom.scene import skybox
+
+RUN = Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "run.py"
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address space of Linux")
+
+
+@LINUX
+@pytest.mark.skipif("VKBLOOM_SANITIZED" in os.environ, reason="a sanitizer needs the address space")
+@pytest.mark.parametrize(
+    "target",
+    [
+        "gltf",
+        "ktx",
+        "faces",
+        "equirectangular",
+        "pipelines",
+        "zarr",
+        "images",
+        "toml",
+        "yaml",
+    ],
+)
+def test_a_short_run(target: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, str(RUN), target, "--plain", "--seconds", "2"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr[-4000:]
+    assert "nothing found" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+# What was found
+
+
+def test_a_small_file_that_promises_many_pixels(tmp_path: Path) -> None:
+    # 8192 x 8192 pixels of three floats are 768 MiB; of more, OpenImageIO itself warns.
+    path = tmp_path / "panorama.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 8192\n")
+    with pytest.raises(ValueError, match=r"panorama\.hdr: .*cannot hold 8192 x 8192 pixels"):
+        skybox.from_equirectangular(path)

@@ -1,0 +1,678 @@
+"""Image files: what is read of them, and what is written back."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vkbloom.io import safe_writing
+from vkbloom.io.image_reading import decode, load
+from vkbloom.io.image_writing import check_writable, save
+from vkbloom.io.images import Colour, Picture, Window
+from vkbloom.io.srgb import decode_srgb, encode_srgb
+
+oiio = pytest.importorskip("OpenImageIO")
+
+DTYPES = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
+
+
+def noise(*shape: int, numbers: str, seed: int = 3) -> NDArray[Any]:
+    """Return values that each type holds; floats also under 0 and far above 1."""
+    generator = np.random.default_rng(seed)
+    dtype = np.dtype(DTYPES[numbers])
+    if dtype.kind == "u":
+        return generator.integers(0, np.iinfo(dtype).max + 1, shape, dtype=dtype)
+    return (generator.standard_normal(shape) * 20).astype(dtype)
+
+
+def store(path: Path, pixels: NDArray[Any], numbers: str, **changes: Any) -> Path:
+    """Write a file without the package's own code; `changes` are fields or attributes."""
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, numbers)
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    for name, value in changes.items():
+        if hasattr(spec, name):
+            setattr(spec, name, value)
+        else:
+            spec.attribute(name.replace("__", ":"), value)
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer.open(str(path), spec), writer.geterror()
+    assert writer.write_image(pixels), writer.geterror()
+    assert writer.close(), writer.geterror()
+    # TIFF leaves a message about a directory that it left out.
+    writer.geterror()
+    return path
+
+
+def reread(path: Path) -> tuple[Any, NDArray[Any]]:
+    """Read a file without the package's own code."""
+    plain = oiio.ImageSpec()
+    plain.attribute("oiio:UnassociatedAlpha", 1)
+    reader = oiio.ImageInput.open(str(path), plain)
+    assert reader is not None, oiio.geterror()
+    spec = reader.spec()
+    pixels = reader.read_image(0, 0, 0, spec.nchannels, spec.format)
+    reader.close()
+    return spec, pixels
+
+
+def picture(pixels: NDArray[Any], numbers: str, **changes: Any) -> Picture:
+    made = Picture.of_values(pixels, numbers)
+    return dataclasses.replace(made, **{"encoding": "linear", **changes})
+
+
+def only_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+class TestCurve:
+    # From the definition in IEC 61966-2-1, worked out with 30 digits.
+    POINTS = (
+        (0.0, 0.0),
+        (0.04045, 0.0031308049535603713),
+        (0.5, 0.21404114048223255),
+        (0.735356983052449, 0.5),
+        (1.0, 1.0),
+    )
+
+    @pytest.mark.parametrize(("encoded", "linear"), POINTS)
+    def test_known_points(self, encoded: float, linear: float) -> None:
+        # Of the two pieces, which do not quite meet, and of a standard of four digits.
+        assert decode_srgb(np.array([encoded]))[0] == pytest.approx(linear, abs=2e-8)
+        assert encode_srgb(np.array([linear]))[0] == pytest.approx(encoded, abs=2e-7)
+
+    @pytest.mark.parametrize("dtype", ["float16", "float32", "float64"])
+    def test_keeps_shape_and_dtype_and_goes_on_outside(self, dtype: str) -> None:
+        values = np.array([[-1.0, 0.25, 9.0]], dtype)
+        for curve in (decode_srgb, encode_srgb):
+            assert curve(values).dtype == dtype
+            assert (np.diff(curve(values)) > 0).all()
+        assert decode_srgb(values)[0, 0] < 0
+
+    def test_nan_stays(self) -> None:
+        assert np.isnan(encode_srgb(np.array([np.nan], np.float32))).all()
+
+
+class TestLoad:
+    @pytest.mark.parametrize(
+        ("name", "numbers", "channels"),
+        [
+            *((f"a.{suffix}", "uint8", 3) for suffix in ("png", "tif", "bmp", "tga", "ppm")),
+            *((f"a.{suffix}", "uint8", 4) for suffix in ("png", "tif", "tga")),
+            *((f"a.{suffix}", "uint8", 1) for suffix in ("png", "tif", "pgm")),
+            *((f"a.{suffix}", "uint16", 4) for suffix in ("png", "tif")),
+            *(("a.exr", numbers, 4) for numbers in ("half", "float")),
+            ("a.exr", "float", 1),
+            ("a.tif", "float", 3),
+        ],
+    )
+    def test_values_are_those_stored(
+        self, tmp_path: Path, name: str, numbers: str, channels: int
+    ) -> None:
+        pixels = noise(5, 7, channels, numbers=numbers)
+        stored = load(store(tmp_path / name, pixels, numbers))
+        assert stored.pixels.dtype == pixels.dtype
+        assert stored.pixels.flags.c_contiguous
+        assert np.array_equal(stored.pixels, pixels)
+        assert stored.numbers == (numbers,) * channels
+        assert stored.display == (0, 0, 7, 5)
+
+    def test_radiance(self, tmp_path: Path) -> None:
+        pixels = np.abs(noise(5, 7, 3, numbers="float"))
+        stored = load(store(tmp_path / "a.hdr", pixels, "float"))
+        # Three mantissas of 8 bits share the largest one's exponent.
+        assert np.abs(stored.pixels - pixels).max() <= pixels.max() / 128
+        assert stored.numbers == ("float",) * 3
+
+    def test_doubles_become_floats(self, tmp_path: Path) -> None:
+        pixels = noise(2, 3, 3, numbers="float")
+        stored = load(store(tmp_path / "a.tif", pixels.astype(np.float64), "double"))
+        assert stored.pixels.dtype == np.float32
+        assert np.array_equal(stored.pixels, pixels)
+
+    def test_colours_under_alpha_0_stay(self, tmp_path: Path) -> None:
+        pixels = noise(2, 2, 4, numbers="uint8")
+        pixels[0, :, 3] = 0
+        assert np.array_equal(load(store(tmp_path / "a.png", pixels, "uint8")).pixels, pixels)
+
+    @pytest.mark.parametrize(("name", "associated"), [("a.exr", True), ("a.png", False)])
+    def test_knows_what_alpha_does(self, tmp_path: Path, name: str, associated: bool) -> None:
+        numbers = "half" if name == "a.exr" else "uint8"
+        path = store(tmp_path / name, noise(2, 2, 4, numbers=numbers), numbers)
+        assert load(path).associated is associated
+
+    # (data window, display window) as x, y, width, height.
+    @pytest.mark.parametrize(
+        ("data", "display", "origin", "size"),
+        [
+            ((2, 1, 3, 2), (0, 0, 8, 6), (0, 0), (8, 6)),
+            ((-2, -1, 12, 8), (0, 0, 8, 6), (-2, -1), (12, 8)),
+            ((6, 4, 4, 4), (0, 0, 8, 6), (0, 0), (10, 8)),
+            ((10, 20, 4, 3), (10, 20, 4, 3), (10, 20), (4, 3)),
+            ((20, 0, 2, 2), (0, 0, 4, 4), (0, 0), (22, 4)),
+        ],
+    )
+    def test_windows(
+        self,
+        tmp_path: Path,
+        data: Window,
+        display: Window,
+        origin: tuple[int, int],
+        size: tuple[int, int],
+    ) -> None:
+        x, y, width, height = data
+        pixels = noise(height, width, 3, numbers="half")
+        fields = dict(zip(("full_x", "full_y", "full_width", "full_height"), display, strict=True))
+        stored = load(store(tmp_path / "a.exr", pixels, "half", x=x, y=y, **fields))
+        assert (stored.origin, stored.display) == (origin, display)
+        assert stored.pixels.shape == (*size[::-1], 3)
+        row, column = y - origin[1], x - origin[0]
+        inside = stored.pixels[row : row + height, column : column + width]
+        assert np.array_equal(inside, pixels)
+        assert np.count_nonzero(stored.pixels) == np.count_nonzero(pixels)
+
+    @pytest.mark.parametrize("orientation", range(1, 9))
+    def test_is_upright(self, tmp_path: Path, orientation: int) -> None:
+        path = store(
+            tmp_path / "a.tif", noise(3, 5, 3, numbers="uint8"), "uint8", Orientation=orientation
+        )
+        expected = oiio.ImageBufAlgo.reorient(oiio.ImageBuf(str(path))).get_pixels(oiio.UINT8)
+        stored = load(path)
+        assert np.array_equal(stored.pixels, expected)
+        assert stored.display == (0, 0, expected.shape[1], expected.shape[0])
+
+    def test_parts(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        parts = [noise(2, 3, 3, numbers="half", seed=seed) for seed in range(3)]
+        specs = [oiio.ImageSpec(3, 2, 3, "half") for _ in parts]
+        for index, spec in enumerate(specs):
+            spec.attribute("oiio:subimagename", f"part {index}")
+        writer = oiio.ImageOutput.create(str(path))
+        assert writer.open(str(path), specs)
+        for index, part in enumerate(parts):
+            assert not index or writer.open(str(path), specs[index], "AppendSubimage")
+            assert writer.write_image(part)
+        assert writer.close()
+        assert np.array_equal(load(path).pixels, parts[0])
+        assert np.array_equal(load(path, 2).pixels, parts[2])
+        assert load(path).parts == load(path, 2).parts == ("part 0", "part 1", "part 2")
+        for wrong in (3, -1):
+            with pytest.raises(ValueError, match=f"a.exr: there is no part {wrong}, only 0 to 2"):
+                load(path, wrong)
+
+    @pytest.mark.parametrize("name", ["no.png", "no.exr", "no/a.png"])
+    def test_missing_files(self, tmp_path: Path, name: str) -> None:
+        with pytest.raises(FileNotFoundError) as caught:
+            load(tmp_path / name)
+        assert caught.value.filename == str(tmp_path / name)
+
+    def test_folders(self, tmp_path: Path) -> None:
+        with pytest.raises(IsADirectoryError):
+            load(tmp_path)
+
+    @pytest.mark.parametrize("content", [b"", b"hello\n", b"\x89PNG\r\n\x1a\n", bytes(300)])
+    @pytest.mark.parametrize("suffix", ["png", "exr", "jpg", "unknown"])
+    def test_no_images(self, tmp_path: Path, content: bytes, suffix: str) -> None:
+        path = tmp_path / f"a.{suffix}"
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match=f"a.{suffix}: "):
+            load(path)
+
+    @pytest.mark.parametrize(
+        "suffix", ["png", "jpg", "exr", "hdr", "tif", "bmp", "tga", "webp", "gif"]
+    )
+    def test_files_that_end_early(self, tmp_path: Path, suffix: str) -> None:
+        numbers = {"exr": "half", "hdr": "float"}.get(suffix, "uint8")
+        pixels = np.abs(noise(60, 80, 3, numbers=numbers))
+        path = store(tmp_path / f"a.{suffix}", pixels, numbers)
+        load(path)
+        content = path.read_bytes()
+        path.write_bytes(content[: len(content) * 2 // 3])
+        with pytest.raises(ValueError, match=f"a.{suffix}: "):
+            load(path)
+
+    def test_a_size_that_cannot_be_true(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        for width, height in ((100_000, 1), (20_000, 20_000)):
+            fields = {"full_width": width, "full_height": height}
+            store(path, noise(1, 2, 3, numbers="half"), "half", **fields)
+            with pytest.raises(ValueError, match=f"a.exr: {width} x {height} pixels are too many"):
+                load(path)
+
+    def test_numbers_of_other_types(self, tmp_path: Path) -> None:
+        path = store(tmp_path / "a.tif", np.zeros((2, 2, 3), np.int16), "int16")
+        with pytest.raises(ValueError, match=r"a\.tif: holds numbers of int16"):
+            load(path)
+
+    @pytest.mark.parametrize("folder", ["", "caf\udce9/"], ids=["file", "folder"])
+    def test_names_that_are_not_utf8(self, tmp_path: Path, folder: str) -> None:
+        path = store(tmp_path / "a.png", noise(2, 3, 3, numbers="uint8"), "uint8")
+        other = tmp_path / f"{folder}b\udce9.png"
+        other.parent.mkdir(exist_ok=True)
+        other.write_bytes(path.read_bytes())
+        for call in (lambda: load(other), lambda: save(decode(load(path)), other)):
+            with pytest.raises(ValueError, match=r"b\\udce9\.png': names .* must be UTF-8"):
+                call()
+        assert other.read_bytes() == path.read_bytes()
+
+    def test_damage_whose_message_is_no_text(self, tmp_path: Path) -> None:
+        path = store(tmp_path / "a.exr", noise(4, 4, 3, numbers="half"), "half")
+        # OpenEXR's message holds the type of the attribute.
+        content = path.read_bytes()
+        assert content.count(b"compression\0compression\0") == 1
+        path.write_bytes(
+            content.replace(b"compression\0compression\0", b"compression\0c\xe9mpression\0")
+        )
+        with pytest.raises(ValueError, match=r"a\.exr: .*c\ufffdmpression"):
+            load(path)
+
+    def test_deep_images(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        spec = oiio.ImageSpec(2, 2, 1, "float")
+        spec.channelnames = ("Z",)
+        spec.deep = True
+        writer = oiio.ImageOutput.create(str(path))
+        assert writer.open(str(path), spec)
+        deep = oiio.DeepData()
+        deep.init(spec)
+        assert writer.write_deep_image(deep)
+        assert writer.close()
+        with pytest.raises(ValueError, match=r"a\.exr: a flat image is needed"):
+            load(path)
+
+    def test_openimageio_missing(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+        with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[images\]"):
+            load("a.png")
+
+
+class TestDecode:
+    @pytest.mark.parametrize("numbers", ["uint8", "uint16"])
+    def test_integers_are_srgb(self, tmp_path: Path, numbers: str) -> None:
+        pixels = noise(4, 6, 4, numbers=numbers)
+        made = decode(load(store(tmp_path / "a.png", pixels, numbers)))
+        plain = pixels / np.iinfo(pixels.dtype).max
+        assert made.pixels.dtype == np.float32
+        assert made.encoding == "linear"
+        assert np.allclose(made.pixels[:, :, :3], decode_srgb(plain[:, :, :3]), rtol=1e-6, atol=0)
+        assert np.allclose(made.pixels[:, :, 3], plain[:, :, 3], rtol=1e-6, atol=0)
+        assert made.notes == ()
+
+    def test_integers_can_be_linear(self, tmp_path: Path) -> None:
+        pixels = noise(4, 6, 3, numbers="uint8")
+        made = decode(load(store(tmp_path / "a.png", pixels, "uint8")), "linear")
+        assert np.allclose(made.pixels, pixels / 255, rtol=1e-6, atol=0)
+
+    def test_integers_that_the_file_calls_linear(self, tmp_path: Path) -> None:
+        pixels = noise(4, 6, 3, numbers="uint8")
+        linear = {"oiio__ColorSpace": "lin_rec709_scene"}
+        stored = load(store(tmp_path / "a.png", pixels, "uint8", **linear))
+        assert np.allclose(decode(stored).pixels, pixels / 255, rtol=1e-6, atol=0)
+        forced = decode(stored, "srgb").pixels
+        assert np.allclose(forced, decode_srgb(pixels / 255), rtol=1e-6, atol=0)
+
+    def test_other_colour_spaces_are_noted(self, tmp_path: Path) -> None:
+        space = {"oiio__ColorSpace": "g22_rec709_scene"}
+        path = store(tmp_path / "a.png", noise(4, 6, 3, numbers="uint8"), "uint8", **space)
+        (note,) = decode(load(path)).notes
+        assert note == "the file says g22_rec709_scene of its colours; taken as srgb"
+
+    @pytest.mark.parametrize("numbers", ["half", "float"])
+    def test_floats_are_linear_and_stay(self, tmp_path: Path, numbers: str) -> None:
+        pixels = noise(4, 6, 4, numbers=numbers)
+        made = decode(load(store(tmp_path / "a.exr", pixels, numbers)))
+        assert made.pixels.dtype == pixels.dtype
+        assert np.array_equal(made.pixels, pixels)
+
+    @pytest.mark.parametrize("numbers", ["half", "float"])
+    def test_floats_can_be_srgb(self, tmp_path: Path, numbers: str) -> None:
+        pixels = np.abs(noise(4, 6, 4, numbers=numbers))
+        made = decode(load(store(tmp_path / "a.exr", pixels, numbers)), "srgb")
+        expected = decode_srgb(pixels[:, :, :3].astype(np.float64))
+        step = np.finfo(pixels.dtype).eps
+        assert made.pixels.dtype == pixels.dtype
+        # The power multiplies the rounding of its argument by 2.4, and adds its own.
+        assert np.allclose(made.pixels[:, :, :3], expected, rtol=8 * step, atol=1e-7)
+        assert np.array_equal(made.pixels[:, :, 3], pixels[:, :, 3])
+
+    def test_raw_values_stay(self, tmp_path: Path) -> None:
+        pixels = noise(4, 6, 4, numbers="uint8")
+        made = decode(load(store(tmp_path / "a.png", pixels, "uint8")), raw=True)
+        assert np.array_equal(made.pixels, pixels)
+        assert made.pixels.dtype == np.uint8
+        assert made.encoding is None
+
+    def test_raw_has_conditions(self, tmp_path: Path) -> None:
+        wide = load(store(tmp_path / "a.png", noise(2, 2, 3, numbers="uint16"), "uint16"))
+        with pytest.raises(ValueError, match="raw: 8-bit integers are needed, not uint16"):
+            decode(wide, raw=True)
+        with pytest.raises(ValueError, match="colour: 'linear' has no meaning for raw"):
+            decode(wide, "linear", raw=True)
+
+    @pytest.mark.parametrize("names", [("Y",), ("Z",), ("Y", "A"), ("left.Y", "left.A")])
+    def test_grey_becomes_rgb(self, tmp_path: Path, names: tuple[str, ...]) -> None:
+        pixels = noise(3, 4, len(names), numbers="half")
+        made = decode(load(store(tmp_path / "a.exr", pixels, "half", channelnames=names)))
+        assert made.grey
+        assert made.pixels.shape == (3, 4, 2 + len(names))
+        assert made.pixels.flags.c_contiguous
+        for channel in range(3):
+            assert np.array_equal(made.pixels[:, :, channel], pixels[:, :, 0])
+        assert np.array_equal(made.values, pixels)
+
+    def test_channels_by_name(self, tmp_path: Path) -> None:
+        # As OpenEXR sorts them: A, B, G, R, Z, light.R. Half stays half beside the floats.
+        names = ("A", "B", "G", "R", "Z", "light.R")
+        pixels = noise(3, 4, 6, numbers="half")
+        kinds = tuple(oiio.TypeDesc(kind) for kind in ("half",) * 4 + ("float",) * 2)
+        fields = {"channelnames": names, "channelformats": kinds, "alpha_channel": 0}
+        made = decode(load(store(tmp_path / "a.exr", pixels.astype(np.float32), "float", **fields)))
+        assert made.pixels.dtype == np.float16
+        assert np.array_equal(made.pixels, pixels[:, :, [3, 2, 1, 0]])
+        (note,) = made.notes
+        assert set(note.removeprefix("left out the channels ").split(", ")) == {"Z", "light.R"}
+
+    def test_one_layers_name_before_all(self, tmp_path: Path) -> None:
+        pixels = noise(3, 4, 3, numbers="half")
+        names = ("light.R", "light.G", "light.B")
+        made = decode(load(store(tmp_path / "a.exr", pixels, "half", channelnames=names)))
+        assert np.array_equal(made.pixels, pixels)
+
+    @pytest.mark.parametrize("names", [("X", "Y", "Z"), ("U", "V"), ("R", "G")])
+    def test_other_channels_are_refused(self, tmp_path: Path, names: tuple[str, ...]) -> None:
+        pixels = noise(3, 4, len(names), numbers="half")
+        path = store(tmp_path / "a.exr", pixels, "half", channelnames=names)
+        with pytest.raises(ValueError, match=f"the channels are {', '.join(names)}; R, G, B"):
+            decode(load(path))
+
+
+class TestSave:
+    @pytest.mark.parametrize("name", ["b.png", "b.tif"])
+    @pytest.mark.parametrize("numbers", ["uint8", "uint16"])
+    def test_every_integer_comes_back(self, tmp_path: Path, name: str, numbers: str) -> None:
+        side = 16 if numbers == "uint8" else 256
+        levels = np.arange(side * side, dtype=DTYPES[numbers]).reshape(side, side, 1)
+        pixels = np.repeat(levels, 3, axis=2)
+        made = decode(load(store(tmp_path / "a.png", pixels, numbers)))
+        assert save(made, tmp_path / name) == ()
+        spec, written = reread(tmp_path / name)
+        assert str(spec.format) == numbers
+        assert spec["oiio:ColorSpace"] == "srgb_rec709_scene"
+        assert np.array_equal(written, pixels)
+
+    @pytest.mark.parametrize("numbers", ["half", "float"])
+    @pytest.mark.parametrize("channels", [3, 4])
+    def test_floats_are_written_as_they_are(
+        self, tmp_path: Path, numbers: str, channels: int
+    ) -> None:
+        pixels = noise(5, 7, channels, numbers=numbers)
+        pixels[0, :3, 0] = (np.nan, np.inf, -np.inf)
+        pixels[:, :, 3:] = 1
+        assert save(picture(pixels, numbers), tmp_path / "b.exr") == ()
+        spec, written = reread(tmp_path / "b.exr")
+        assert str(spec.format) == numbers
+        assert np.array_equal(written, pixels, equal_nan=True)
+
+    # The numbers that a picture came with, a file, and the numbers and channels in it.
+    @pytest.mark.parametrize(
+        ("numbers", "name", "stored_as", "channels"),
+        [
+            ("half", "b.tif", "float", 4),
+            ("half", "b.png", "uint8", 4),
+            ("half", "b.hdr", "float", 3),
+            ("half", "b.jpg", "uint8", 3),
+            ("float", "b.png", "uint8", 4),
+            ("float", "b.tga", "uint8", 4),
+            ("float", "b.pfm", "float", 3),
+            ("float", "b.jp2", "uint8", 4),
+            ("uint16", "b.exr", "float", 4),
+            ("uint16", "b.jpg", "uint8", 3),
+            ("uint16", "b.tif", "uint16", 4),
+            ("uint8", "b.exr", "float", 4),
+            ("uint8", "b.hdr", "float", 3),
+            ("uint8", "b.tif", "uint8", 4),
+        ],
+    )
+    def test_numbers_follow_the_file_read_and_the_format(
+        self, tmp_path: Path, numbers: str, name: str, stored_as: str, channels: int
+    ) -> None:
+        dtype = np.float16 if numbers == "half" else np.float32
+        # Large enough for formats that halve a picture five times.
+        pixels = np.random.default_rng(0).random((64, 64, 4)).astype(dtype)
+        pixels[:, :, 3] = 1
+        assert save(picture(pixels, numbers), tmp_path / name) == ()
+        spec, written = reread(tmp_path / name)
+        assert (str(spec.format), spec.nchannels) == (stored_as, channels)
+        if stored_as.startswith("uint"):
+            assert abs(written[..., :3].mean() / np.iinfo(stored_as).max - 0.68) < 0.02
+        else:
+            assert abs(written[..., :3].mean() - 0.5) < 0.02
+
+    @pytest.mark.parametrize(
+        ("name", "colour", "expected"),
+        [
+            ("b.png", None, 188),
+            ("b.png", "srgb", 188),
+            ("b.png", "linear", 128),
+            ("b.exr", None, 0.5),
+            ("b.exr", "linear", 0.5),
+            ("b.exr", "srgb", 0.735357),
+            ("b.hdr", None, 0.5),
+        ],
+    )
+    def test_colours(
+        self, tmp_path: Path, name: str, colour: Colour | None, expected: float
+    ) -> None:
+        pixels = np.full((4, 4, 3), 0.5, np.float32)
+        save(picture(pixels, "float"), tmp_path / name, colour)
+        _, written = reread(tmp_path / name)
+        assert np.allclose(written, expected, rtol=1e-6, atol=0)
+        # And it says so: reading gives the light again.
+        again = decode(load(tmp_path / name), None if name == "b.png" else colour)
+        assert np.allclose(again.pixels, 0.5, atol=1 / 255)
+
+    def test_alpha_is_not_encoded(self, tmp_path: Path) -> None:
+        pixels = np.full((4, 4, 4), 0.5, np.float32)
+        save(picture(pixels, "uint8"), tmp_path / "b.png")
+        assert reread(tmp_path / "b.png")[1][0, 0].tolist() == [188, 188, 188, 128]
+
+    @pytest.mark.parametrize("encoding", ["srgb", "gamma22", None])
+    def test_encoded_values_are_left_alone(self, tmp_path: Path, encoding: Any) -> None:
+        pixels = np.full((4, 4, 3), 0.5, np.float32)
+        made = picture(pixels, "uint8", encoding=encoding)
+        save(made, tmp_path / "b.png")
+        save(made, tmp_path / "b.exr")
+        assert (reread(tmp_path / "b.png")[1] == 128).all()
+        assert (reread(tmp_path / "b.exr")[1] == 0.5).all()
+        with pytest.raises(
+            ValueError, match=f"colour: 'srgb' needs a linear picture, not {encoding}"
+        ):
+            save(made, tmp_path / "b.png", "srgb")
+
+    def test_integers_clip(self, tmp_path: Path) -> None:
+        row = np.array([-5, -0.0, 1, 1.001, 1e30, np.nan, np.inf, -np.inf], np.float32)
+        pixels = np.repeat(row[None, :, None], 3, axis=2)
+        (note,) = save(picture(pixels, "float"), tmp_path / "b.png")
+        assert note.endswith("b.png holds integers: NaN is written as 0, infinity as 1")
+        levels = reread(tmp_path / "b.png")[1][0, :, 0].tolist()
+        assert levels == [0, 0, 255, 255, 255, 0, 255, 0]
+
+    @pytest.mark.parametrize(
+        ("numbers", "name", "channels"),
+        [("uint8", "b.png", 1), ("half", "b.exr", 1), ("uint8", "b.jpg", 1), ("float", "b.hdr", 3)],
+    )
+    def test_grey_stays_where_it_can(
+        self, tmp_path: Path, numbers: str, name: str, channels: int
+    ) -> None:
+        dtype = np.float16 if numbers == "half" else np.float32
+        pixels = np.full((8, 8, 3), 0.5, dtype)
+        assert save(picture(pixels, numbers, grey=True), tmp_path / name) == ()
+        spec, _ = reread(tmp_path / name)
+        assert spec.nchannels == channels
+        if channels == 1:
+            assert spec.channelnames == ("Y",)
+
+    def test_grey_with_alpha(self, tmp_path: Path) -> None:
+        pixels = noise(4, 6, 2, numbers="uint8")
+        made = decode(load(store(tmp_path / "a.png", pixels, "uint8", channelnames=("Y", "A"))))
+        assert save(made, tmp_path / "b.png") == ()
+        spec, written = reread(tmp_path / "b.png")
+        assert spec.channelnames == ("Y", "A")
+        assert np.array_equal(written, pixels)
+
+    def test_lost_alpha_is_noted(self, tmp_path: Path) -> None:
+        pixels = np.full((8, 8, 4), 0.5, np.float32)
+        for name in ("b.jpg", "b.hdr"):
+            (note,) = save(picture(pixels, "float"), tmp_path / name)
+            assert note.endswith(f"{name} has no place for the alpha, which is not 1 everywhere")
+        pixels[:, :, 3] = 1
+        assert save(picture(pixels, "float"), tmp_path / "b.hdr") == ()
+
+    def test_alpha_that_is_read_otherwise_is_noted(self, tmp_path: Path) -> None:
+        pixels = np.full((4, 4, 4), 0.5, np.float16)
+        plain = decode(load(store(tmp_path / "a.png", (pixels * 255).astype("uint8"), "uint8")))
+        multiplied = decode(load(store(tmp_path / "a.exr", pixels, "half")))
+        (note,) = save(plain, tmp_path / "b.exr")
+        assert note.endswith("take the colours as multiplied by alpha")
+        assert save(plain, tmp_path / "b.tif") == save(plain, tmp_path / "b.png") == ()
+        assert not load(tmp_path / "b.tif").associated
+        assert save(multiplied, tmp_path / "b.exr") == save(multiplied, tmp_path / "b.tif") == ()
+        assert load(tmp_path / "b.tif").associated
+        assert np.array_equal(load(tmp_path / "b.tif").pixels, pixels)
+
+    @pytest.mark.parametrize("name", ["b.exr", "b.png"])
+    def test_windows(self, tmp_path: Path, name: str) -> None:
+        pixels = np.random.default_rng(0).random((6, 8, 3)).astype(np.float16)
+        window = {"full_x": 12, "full_y": 21, "full_width": 4, "full_height": 3}
+        path = store(tmp_path / "a.exr", pixels, "half", x=10, y=20, **window)
+        save(decode(load(path)), tmp_path / name)
+        spec, written = reread(tmp_path / name)
+        if name == "b.exr":
+            assert (spec.x, spec.y) == (10, 20)
+            assert {field: getattr(spec, field) for field in window} == window
+            assert np.array_equal(written, pixels)
+        else:
+            assert written.shape == (3, 4, 3)
+            inside = encode_srgb(pixels[1:4, 2:6].astype(np.float32)) * 255
+            assert np.abs(written - inside).max() <= 0.501
+
+    def test_colour_attributes_are_kept(self, tmp_path: Path) -> None:
+        chromaticities = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.322, 0.338)
+        spec = oiio.ImageSpec(2, 2, 3, "half")
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), chromaticities)
+        spec.attribute("PixelAspectRatio", 2.0)
+        writer = oiio.ImageOutput.create(str(tmp_path / "a.exr"))
+        assert writer.open(str(tmp_path / "a.exr"), spec)
+        assert writer.write_image(noise(2, 2, 3, numbers="half"))
+        assert writer.close()
+        save(decode(load(tmp_path / "a.exr")), tmp_path / "b.exr")
+        kept, _ = reread(tmp_path / "b.exr")
+        assert np.allclose(kept["chromaticities"], chromaticities)
+        assert kept["PixelAspectRatio"] == 2.0
+
+    @pytest.mark.parametrize(
+        ("read_as", "written_as", "is_kept"),
+        [(None, None, True), ("linear", None, False), (None, "linear", False)],
+    )
+    def test_profiles_of_encoded_colours_are_kept(
+        self, tmp_path: Path, read_as: Any, written_as: Any, is_kept: bool
+    ) -> None:
+        # Any JPEG XL has one.
+        store(tmp_path / "a.jxl", noise(64, 64, 3, numbers="uint8"), "uint8")
+        save(decode(load(tmp_path / "a.jxl"), read_as), tmp_path / "b.png", written_as)
+        kept, _ = reread(tmp_path / "b.png")
+        original, _ = reread(tmp_path / "a.jxl")
+        profile = kept.getattribute("ICCProfile")
+        assert (profile is not None) is is_kept
+        if is_kept:
+            assert np.array_equal(profile, original.getattribute("ICCProfile"))
+
+    def test_attributes_are_added(self, tmp_path: Path) -> None:
+        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        save(made, tmp_path / "b.png", attributes={"Software": "vkbloom 9", "vkbloom:x": "y"})
+        spec, _ = reread(tmp_path / "b.png")
+        assert (spec["Software"], spec["vkbloom:x"]) == ("vkbloom 9", "y")
+
+    @pytest.mark.parametrize("name", ["b.unknown", "b", "b.null", "b.term", "b.heic"])
+    def test_extensions_that_cannot_be_written(self, tmp_path: Path, name: str) -> None:
+        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        for write in (lambda: save(made, tmp_path / name), lambda: check_writable(name)):
+            with pytest.raises(ValueError, match="no image format for the extension"):
+                write()
+        assert only_in(tmp_path) == []
+        check_writable("b.PNG")
+
+    def test_pictures_that_no_format_holds(self, tmp_path: Path) -> None:
+        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        # Of depth only.
+        with pytest.raises(ValueError, match=r"b\.zfile: zfile cannot hold such a picture"):
+            save(made, tmp_path / "b.zfile")
+        assert only_in(tmp_path) == []
+
+    def test_folders_that_are_not_there(self, tmp_path: Path) -> None:
+        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        with pytest.raises(FileNotFoundError) as caught:
+            save(made, tmp_path / "no" / "b.png")
+        assert caught.value.filename == str(tmp_path / "no" / "b.png")
+
+    @pytest.mark.parametrize("name", ["b.png", "b.exr"])
+    def test_what_is_there_stays_until_all_is_written(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        target = tmp_path / name
+        target.write_bytes(b"before")
+        seen: list[Iterable[str]] = []
+
+        def is_readable(oiio: Any, file: Path) -> bool:
+            seen.append(only_in(tmp_path))
+            assert load(file).pixels.shape == (2, 2, 3)
+            assert target.read_bytes() == b"before"
+            return False
+
+        monkeypatch.setattr(safe_writing, "_is_readable", is_readable)
+        with pytest.raises(OSError, match="is the disk full") as caught:
+            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
+        assert (caught.value.errno, caught.value.filename) == (errno.EIO, str(target))
+        assert len(seen) == 1
+        assert target.read_bytes() == b"before"
+        assert only_in(tmp_path) == [name]
+
+    def test_readers_keep_what_they_opened(self, tmp_path: Path) -> None:
+        # A file that is renamed into place leaves the old one to those who are reading it.
+        target = tmp_path / "b.png"
+        target.write_bytes(b"before")
+        with target.open("rb") as opened:
+            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
+            assert opened.read() == b"before"
+        assert load(target).pixels.shape == (2, 2, 3)
+
+    def test_a_folder_in_its_place(self, tmp_path: Path) -> None:
+        (tmp_path / "b.png").mkdir()
+        with pytest.raises(OSError, match=r"b\.png") as caught:
+            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), tmp_path / "b.png")
+        assert caught.value.filename == str(tmp_path / "b.png")
+        assert only_in(tmp_path) == ["b.png"]
+
+    def test_openimageio_missing(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+        with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[images\]"):
+            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), "b.png")
+
+
+def test_real_files_come_back(shared_data: Path, tmp_path: Path) -> None:
+    for name in ("BrightRings.exr", "Desk.exr"):
+        made = decode(load(shared_data / "hdr" / name))
+        assert made.pixels.dtype == np.float16
+        save(made, tmp_path / name)
+        assert np.array_equal(load(tmp_path / name).pixels, load(shared_data / "hdr" / name).pixels)
+    for path in (shared_data / "seed_frames").glob("*.png"):
+        save(decode(load(path)), tmp_path / path.name)
+        assert np.array_equal(load(tmp_path / path.name).pixels, load(path).pixels)

@@ -1,0 +1,408 @@
+"""Every method, format and size of `apply` against `vkbloom.reference`, and on flat images."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.tolerance import (
+    FORMATS,
+    assert_close,
+    assert_matches_reference,
+    real,
+    tolerance,
+)
+from vkbloom import (
+    DualKawase,
+    Pyramid,
+    Renderer,
+    Separable,
+    Settings,
+    gaussian_weights,
+    presets,
+    reference,
+)
+
+Image = NDArray[Any]
+
+DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
+
+# No level of an 8-bit image has this luminance: a sum of whole multiples of 1e-4 / 255 never
+# meets it, so that rounding cannot lift a pixel over it.
+HARD_THRESHOLD = 0.30001
+
+METHODS: dict[str, Settings] = {
+    "tutorial": Separable(),
+    "outline": Separable(first_tap=0, texel="x", blur_strength=0.5),
+    "fractional": Separable(blur_scale=1.7),
+    "still": Separable(blur_scale=0.0),
+    "deferred": Separable(weights=DEFERRED, loops=3, blur_scale=1.1),
+    "layers": Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25)), blur_strength=0.5),
+    "loops-layers": Separable(layers=((1.0, 0.5), (2.5, 0.5)), loops=2, blur_strength=0.75),
+    "one-weight": Separable(weights=(0.75,)),
+    "longest": Separable(weights=gaussian_weights(20, 64), blur_strength=1.0),
+    "direct": Separable(direct=True),
+    "direct-loops-layers": Separable(
+        direct=True, loops=2, layers=((1.0, 0.5), (1.5, 0.5)), blur_strength=0.75, texel="x"
+    ),
+    "half-size": Separable(bloom_scale=0.5),
+    "double-size": Separable(bloom_scale=2.0, blur_scale=1.3),
+    "fixed-size": Separable(bloom_size=(31, 23), blur_scale=0.7),
+    "direct-half-size": Separable(bloom_scale=0.5, direct=True, weights=gaussian_weights(1.5)),
+    "hard-threshold": Separable(threshold=HARD_THRESHOLD),
+    "knee": Separable(threshold=0.3, knee=0.5, bloom_scale=0.5, intensity=0.5),
+    "pyramid": Pyramid(),
+    "pyramid-one-level": Pyramid(levels=1),
+    "pyramid-radius": Pyramid(levels=4, radius=1.6),
+    "pyramid-firefly": Pyramid(firefly_filter=True, threshold=0.2, knee=1.0),
+    "pyramid-sixteen": Pyramid(levels=16, bloom_scale=0.5),
+    "dual-kawase": DualKawase(),
+    "dual-kawase-offset": DualKawase(levels=2, offset=2.3, threshold=HARD_THRESHOLD),
+    "dual-kawase-deep": DualKawase(levels=7, bloom_size=(64, 48), intensity=0.3),
+}
+DTYPES = ("uint8", "float16", "float32")
+SIZES = ((1, 1), (1, 7), (7, 1), (13, 17), (97, 61), (333, 517))
+
+
+def picture(width: int, height: int, channels: int, dtype: str, seed: int = 0) -> Image:
+    """Mostly dark noise: most of what 8 bits hold of its bloom stays under 1."""
+    values = np.random.default_rng(seed).random((height, width, channels)) ** 2
+    if dtype == "uint8":
+        return np.rint(255 * values).astype(np.uint8)
+    # Beyond what 8 bits hold, and below 0.
+    return (8 * values - 0.5).astype(dtype)
+
+
+def flat(value: Any, dtype: str, size: tuple[int, int] = (37, 22)) -> Image:
+    width, height = size
+    return np.full((height, width, 3), value, dtype)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", METHODS)
+def test_reference(renderer: Renderer, method: str, dtype: str, size: tuple[int, int]) -> None:
+    width, height = size
+    # Three and four channels by turns.
+    image = picture(width, height, 3 + width % 4 // 2, dtype)
+    settings = METHODS[method]
+    assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
+@pytest.mark.parametrize(
+    ("method", "dtype"),
+    [
+        ("tutorial", "uint8"),
+        ("half-size", "float16"),
+        ("direct", "float32"),
+        ("pyramid", "uint8"),
+        ("pyramid-firefly", "float32"),
+        ("dual-kawase", "float16"),
+    ],
+)
+def test_reference_at_1920_1080(renderer: Renderer, method: str, dtype: str) -> None:
+    image = picture(1920, 1080, 3, dtype)
+    settings = METHODS[method]
+    assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
+@pytest.mark.parametrize("format", FORMATS.values())
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize(
+    "method", ["tutorial", "loops-layers", "knee", "direct", "pyramid-firefly", "dual-kawase"]
+)
+def test_format_of_the_bloom_buffers(
+    renderer: Renderer, method: str, dtype: str, format: Any
+) -> None:
+    image = picture(45, 30, 4, dtype)
+    settings = METHODS[method].replace(format=format)
+    assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", ["tutorial", "pyramid", "dual-kawase"])
+def test_names_shapes_and_dtypes(
+    renderer: Renderer, method: str, dtype: str, channels: int
+) -> None:
+    image = picture(40, 24, channels, dtype)
+    frames = renderer.apply(image, METHODS[method])
+    blurs = {
+        "tutorial": {"blur_vertical": (24, 40)},
+        # The level of 1 x 1, after 2 x 1, is not part of the chain.
+        "pyramid": {
+            "down_0": (12, 20),
+            "down_1": (6, 10),
+            "down_2": (3, 5),
+            "down_3": (1, 2),
+            "up_2": (3, 5),
+            "up_1": (6, 10),
+            "up_0": (12, 20),
+        },
+        "dual-kawase": {
+            "down_0": (12, 20),
+            "down_1": (6, 10),
+            "down_2": (3, 5),
+            "down_3": (1, 2),
+            "up_2": (3, 5),
+            "up_1": (6, 10),
+            "up_0": (12, 20),
+        },
+    }[method]
+    shapes = {"glow": (24, 40), **blurs, "bloom": (24, 40)}
+    assert {name: array.shape for name, array in frames.items()} == {
+        **{name: (*shape, 4) for name, shape in shapes.items()},
+        "final": (24, 40, channels),
+    }
+    assert list(frames) == [*shapes, "final"]
+    assert {array.dtype.name for array in frames.values()} == {dtype}
+
+
+def test_direct_has_no_vertical_blur(renderer: Renderer) -> None:
+    frames = renderer.apply(picture(9, 5, 3, "uint8"), Separable(direct=True))
+    assert list(frames) == ["glow", "bloom", "final"]
+
+
+def test_no_settings_are_the_tutorials(renderer: Renderer) -> None:
+    image = picture(300, 20, 3, "uint8")
+    frames = renderer.apply(image)
+    assert frames.settings == Separable()
+    # An image keeps its own size where a forward scene would have 256 x 256.
+    assert frames["blur_vertical"].shape == (20, 300, 4)
+    assert_matches_reference(frames, image, Separable())
+
+
+@pytest.mark.parametrize("name", presets)
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_presets(renderer: Renderer, name: str, dtype: str) -> None:
+    image = picture(61, 43, 3, dtype)
+    assert_matches_reference(renderer.apply(image, presets[name]), image, presets[name])
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", METHODS)
+def test_flat_image_gets_the_gain(renderer: Renderer, method: str, dtype: str) -> None:
+    settings = METHODS[method].replace(threshold=None)
+    gain = reference.gain(settings)
+    # As bright as a stage of 8 bits lets it be.
+    value: Any = int(255 * 0.95 / max(gain, 1.0)) if dtype == "uint8" else 3.0
+    image = flat(value, dtype)
+    bloom = renderer.apply(image, settings, attachments="bloom")["bloom"][..., :3]
+    expected = np.full(bloom.shape, gain * float(real(image)[0, 0, 0]))
+    assert_close("bloom", bloom, expected, tolerance(dtype, expected, stages_of_8_bits=2))
+
+
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+@pytest.mark.parametrize("knee", [0.0, 0.25, 1.0])
+@pytest.mark.parametrize("threshold", [0.0, 0.5, 0.9, 1.5])
+@pytest.mark.parametrize("method", ["fractional", "pyramid", "dual-kawase"])
+def test_gain_passes_the_threshold(
+    renderer: Renderer, method: str, threshold: float, knee: float, dtype: str
+) -> None:
+    settings = METHODS[method].replace(threshold=threshold, knee=knee)
+    bloom = renderer.apply(flat(1, dtype), settings, attachments="bloom")["bloom"][..., :3]
+    expected = np.full(bloom.shape, reference.gain(settings))
+    assert_close("bloom", bloom, expected, tolerance(dtype, expected))
+
+
+def test_white_is_not_above_a_threshold_of_one(renderer: Renderer) -> None:
+    for dtype, white in {"uint8": 255, "float16": 1, "float32": 1}.items():
+        glow = renderer.apply(flat(white, dtype), Separable(threshold=1.0))["glow"]
+        assert not glow[..., :3].any(), dtype
+
+
+# --- Composite, exposure, tone map, encoding ---
+
+COMPOSITES = ("add", "mix", "screen")
+TONEMAPS = ("none", "reinhard", "aces", "exponential", "khronos_neutral", "agx")
+ENCODINGS = ("none", "gamma22", "srgb")
+
+
+def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> None:
+    """Compare final with what the reference makes of the renderer's own bloom."""
+    frames = renderer.apply(image, settings, attachments=("bloom", "final"))
+    expected = reference.composite(image, frames["bloom"], settings)
+    limit = tolerance(image.dtype, expected)
+    assert_close("final", frames["final"], expected, limit)
+
+
+# Away from black, where the encodings are so steep that half a level of bloom, which may or may
+# not be rounded before the composite, is several levels of final.
+def bright(dtype: str) -> Image:
+    values = 0.1 + 0.8 * np.random.default_rng(3).random((14, 19, 4))
+    return np.rint(255 * values).astype(np.uint8) if dtype == "uint8" else values.astype(dtype)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("composite", COMPOSITES)
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_composite_tonemap_and_encoding(
+    renderer: Renderer, dtype: str, composite: Any, tonemap: Any, encoding: Any
+) -> None:
+    settings = Separable(
+        composite=composite, tonemap=tonemap, encoding=encoding, intensity=0.3, exposure=0.5
+    )
+    assert_composite(renderer, bright(dtype), settings)
+
+
+@pytest.mark.parametrize("composite", COMPOSITES)
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_composite_beyond_white_and_black(renderer: Renderer, dtype: str, composite: Any) -> None:
+    image = picture(14, 19, 4, dtype)
+    assert image.min() < -0.4
+    assert image.max() > 6
+    assert_composite(renderer, image, Separable(composite=composite, intensity=0.7))
+
+
+@pytest.mark.parametrize("exposure", [-32.0, -3.5, 0.0, 1.0, 8.0, 32.0])
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_exposure(renderer: Renderer, dtype: str, tonemap: Any, exposure: float) -> None:
+    settings = Separable(tonemap=tonemap, exposure=exposure, intensity=0.5)
+    assert_composite(renderer, bright(dtype), settings)
+
+
+@pytest.mark.parametrize("intensity", [0.0, 0.04, 1.0, 1000.0])
+@pytest.mark.parametrize("composite", COMPOSITES)
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_intensity(renderer: Renderer, dtype: str, composite: Any, intensity: float) -> None:
+    settings = Separable(composite=composite, intensity=intensity, blur_strength=0.5)
+    assert_composite(renderer, bright(dtype), settings)
+    image = bright(dtype)
+    final = renderer.apply(image, settings, attachments="final")["final"]
+    if intensity == 0:
+        # Nothing of the bloom comes in; screen costs a rounding, 1 - (1 - s).
+        limit = 0.0 if composite != "screen" else tolerance(dtype, real(image)) / 2
+        assert_close("final", final, real(image), limit)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_negative_colours(renderer: Renderer, dtype: str, tonemap: Any, encoding: Any) -> None:
+    # Not around -1, where Reinhard's curve has its pole.
+    values = np.concatenate([np.linspace(-3, -1.3, 40), np.linspace(-0.7, 0.7, 40)])
+    image = np.random.default_rng(5).permuted(np.tile(values, (3, 3, 1)), axis=-1)
+    image = image.swapaxes(0, 2).astype(dtype)
+    settings = Separable(bloom=False, tonemap=tonemap, encoding=encoding)
+    assert_composite_without_bloom(renderer, image, settings)
+
+
+def colours(value: float, dtype: str) -> Image:
+    """Bright grey, primaries and mixed colours."""
+    rows = [(1, 1, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0.5, 0.25), (0.1, 1, 0.01)]
+    return (value * np.array([rows], np.float64)).astype(dtype)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize(
+    ("dtype", "value"),
+    [
+        ("float16", 1000.0),
+        ("float16", 65504.0),
+        ("float32", 65504.0),
+        ("float32", 1e12),
+        ("float32", 1e25),
+        ("float32", float(np.finfo(np.float32).max)),
+    ],
+)
+def test_huge_colours(
+    renderer: Renderer, dtype: str, value: float, tonemap: Any, encoding: Any
+) -> None:
+    image = colours(value, dtype)
+    settings = Separable(bloom=False, tonemap=tonemap, encoding=encoding)
+    assert_composite_without_bloom(renderer, image, settings)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("value", [-1000.0, -65504.0, -1e12, -1e25, -float(np.finfo("f4").max)])
+def test_huge_negative_colours(
+    renderer: Renderer, value: float, tonemap: Any, encoding: Any
+) -> None:
+    image = colours(value, "float32")
+    settings = Separable(bloom=False, tonemap=tonemap, encoding=encoding)
+    assert_composite_without_bloom(renderer, image, settings)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
+def test_dark_colours(renderer: Renderer, composite: Any, tonemap: Any, encoding: Any) -> None:
+    # An encoding spreads the dark, and with it what a difference of two ones has lost there.
+    values = np.geomspace(1e-9, 1e-3, 3 * 120).reshape(1, 120, 3)
+    image = np.random.default_rng(3).permuted(values, axis=1).astype(np.float32)
+    settings = Separable(
+        intensity=0.5, composite=composite, tonemap=tonemap, encoding=encoding, blur_strength=0.3
+    )
+    assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
+@pytest.mark.parametrize("tonemap", TONEMAPS)
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_huge_exposure(renderer: Renderer, dtype: str, tonemap: Any) -> None:
+    image = colours(float(np.finfo(dtype).max), dtype)
+    settings = Separable(bloom=False, tonemap=tonemap, exposure=32.0)
+    assert_composite_without_bloom(renderer, image, settings)
+
+
+def assert_composite_without_bloom(renderer: Renderer, image: Image, settings: Settings) -> None:
+    frames = renderer.apply(image, settings)
+    largest = float(np.finfo(image.dtype).max)
+    # The reference has no end in float32; the device's numbers do.
+    expected = np.clip(reference.composite(image, None, settings), -largest, largest)
+    assert_close("final", frames["final"], expected, tolerance(image.dtype, expected))
+
+
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+@pytest.mark.parametrize("method", METHODS)
+def test_largest_numbers_do_not_overflow(renderer: Renderer, method: str, dtype: str) -> None:
+    largest = np.finfo(dtype).max
+    for sign in (1, -1):
+        frames = renderer.apply(flat(sign * largest, dtype), METHODS[method])
+        for name, array in frames.items():
+            assert np.isfinite(array).all(), name
+    if dtype == "float16":
+        assert_matches_reference(
+            renderer.apply(flat(largest, dtype), METHODS[method]),
+            flat(largest, dtype),
+            METHODS[method],
+        )
+
+
+def test_a_grey_level_that_is_the_threshold_stays_out(renderer: Renderer) -> None:
+    levels = np.arange(256, dtype=np.uint8)
+    ramp = np.repeat(levels[None, :, None], 3, axis=2)
+    for level in range(256):
+        settings = Separable(threshold=level / 255)
+        glow = renderer.apply(ramp, settings, attachments="glow")["glow"][0, :, 0]
+        np.testing.assert_array_equal(glow, np.where(levels > level, levels, 0), str(level))
+
+
+@pytest.mark.parametrize("scale", [0.37, 1.0, 2.5])
+def test_a_flat_grey_that_is_the_threshold_stays_out_at_every_size(
+    renderer: Renderer, scale: float
+) -> None:
+    for level in (51, 102, 153, 204, 255):
+        flat = np.full((9, 13, 3), level, np.uint8)
+        settings = Separable(threshold=level / 255, bloom_scale=scale)
+        assert not renderer.apply(flat, settings, attachments="glow")["glow"][..., :3].any()
+        settings = Separable(threshold=(level - 1) / 255, bloom_scale=scale)
+        glow = renderer.apply(flat, settings, attachments="glow")["glow"]
+        np.testing.assert_array_equal(glow[..., :3], level)
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+@pytest.mark.parametrize("scale", [0.37, 0.5, 1.5])
+def test_flat_floats_of_the_threshold_stay_out_at_every_size(
+    renderer: Renderer, scale: float, dtype: type[np.floating[Any]]
+) -> None:
+    for value in (0.1, 0.3, 0.7, 1.0, 1.1, 3.0):
+        flat = np.full((37, 41, 3), value, dtype)
+        settings = Separable(threshold=float(dtype(value)), bloom_scale=scale)
+        assert not renderer.apply(flat, settings, attachments="glow")["glow"][..., :3].any()

@@ -1,0 +1,657 @@
+"""What `apply` takes: dtypes, strides, sizes, NaN and infinity, repeats, `out`; and what not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.tolerance import assert_close, assert_matches_reference, tolerance
+from vkbloom import (
+    DualKawase,
+    Frames,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    reference,
+)
+
+Image = NDArray[Any]
+
+METHODS: dict[str, Settings] = {
+    "separable": Separable(),
+    "direct": Separable(direct=True),
+    "half-size": Separable(bloom_scale=0.5),
+    "pyramid": Pyramid(),
+    "firefly": Pyramid(firefly_filter=True),
+    "dual-kawase": DualKawase(),
+}
+DTYPES = ("uint8", "float16", "float32")
+OFF = Separable(bloom=False)
+
+
+def picture(height: int, width: int, channels: int, dtype: str, seed: int = 0) -> Image:
+    values = np.random.default_rng(seed).random((height, width, channels))
+    return np.rint(255 * values).astype(dtype) if dtype == "uint8" else values.astype(dtype)
+
+
+def assert_same(frames: Frames, others: Frames) -> None:
+    assert list(frames) == list(others)
+    for name, array in frames.items():
+        assert_array_equal(array, others[name], err_msg=name)
+
+
+# --- Strides ---
+
+
+def _unaligned(image: Image) -> Image:
+    """Return the image as a field of packed records, which begins at odd addresses."""
+    pixel = np.dtype((image.dtype, image.shape[2:]))
+    records = np.zeros(image.shape[:2], np.dtype([("id", np.uint8), ("colour", pixel)]))
+    records["colour"] = image
+    return records["colour"]
+
+
+def _read_only(image: Image) -> Image:
+    view = image.view()
+    view.flags.writeable = False
+    return view
+
+
+VIEWS: dict[str, Callable[[Image], Image]] = {
+    "transposed": lambda image: image.transpose(1, 0, 2),
+    "upside-down": lambda image: image[::-1],
+    "reversed": lambda image: image[::-1, ::-1],
+    "channels-reversed": lambda image: image[..., ::-1],
+    "every-second": lambda image: image[1::2, ::2],
+    "every-third-reversed": lambda image: image[::-3, ::-3, ::-1],
+    "part": lambda image: image[3:11, 2:14],
+    "first-three-channels": lambda image: image[..., :3],
+    "last-three-channels": lambda image: image[..., 1:],
+    "fortran": np.asfortranarray,
+    "channels-first": lambda image: np.ascontiguousarray(image.transpose(2, 0, 1)).transpose(
+        1, 2, 0
+    ),
+    "one-row-repeated": lambda image: np.broadcast_to(image[5], (9, *image.shape[1:])),
+    "one-pixel-repeated": lambda image: np.broadcast_to(image[5, 6], (6, 8, image.shape[2])),
+    "grey-repeated": lambda image: np.broadcast_to(image[..., :1], (*image.shape[:2], 3)),
+    "read-only": _read_only,
+    "unaligned": _unaligned,
+    "big-endian": lambda image: image.astype(image.dtype.newbyteorder(">")),
+    "big-endian-reversed": lambda image: image.astype(image.dtype.newbyteorder(">"))[:, ::-1],
+}
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("view", VIEWS)
+def test_any_strides(renderer: Renderer, view: str, dtype: str) -> None:
+    image = VIEWS[view](picture(15, 22, 4, dtype))
+    before = image.copy()
+    plain = np.array(image, dtype=dtype, order="C")
+    frames = renderer.apply(image)
+    # The device sees no difference between a view and a copy, to the byte.
+    repeated = renderer.apply(plain)
+    assert repeated.timings == {}
+    assert_same(frames, repeated)
+    assert_matches_reference(frames, plain, Separable())
+    assert_array_equal(image, before)
+
+
+def test_subclasses_and_memory_maps(renderer: Renderer, tmp_path: Any) -> None:
+    image = picture(6, 5, 3, "float32")
+    mapped = np.memmap(tmp_path / "image.raw", np.float32, "w+", shape=image.shape)
+    mapped[:] = image
+    frames = renderer.apply(mapped)
+    assert_same(frames, renderer.apply(image))
+    assert {type(array) for array in frames.values()} == {np.ndarray}
+
+
+# --- Repeated images ---
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("channels", [3, 4])
+def test_same_image_again_runs_no_pass(renderer: Renderer, dtype: str, channels: int) -> None:
+    image = picture(20, 31, channels, dtype, seed=1)
+    first = renderer.apply(image, Pyramid())
+    assert first.timings
+    again = renderer.apply(image.copy(), Pyramid())
+    assert again.timings == {}
+    assert_same(first, again)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("channels", [3, 4])
+def test_image_changed_in_place(renderer: Renderer, dtype: str, channels: int) -> None:
+    image = picture(20, 31, channels, dtype, seed=2)
+    renderer.apply(image, Pyramid())
+    # One component of one pixel, the last that a copy reaches.
+    image[-1, -1, -1] = 77 if dtype == "uint8" else 7.5
+    frames = renderer.apply(image, Pyramid())
+    assert "composite" in frames.timings or "final" in frames.timings
+    assert_matches_reference(frames, image, Pyramid())
+
+
+def test_images_of_all_kinds_by_turns(renderer: Renderer) -> None:
+    """What is left of one image must not show in the next one."""
+    images = [
+        picture(12, 18, 3, "float32"),
+        picture(12, 18, 4, "float32"),
+        picture(18, 12, 3, "float32"),
+        # As many bytes as the one before.
+        picture(18, 24, 3, "float16"),
+        picture(18, 24, 4, "uint8"),
+        picture(1, 1, 3, "uint8"),
+        picture(12, 18, 3, "float32", seed=1),
+    ]
+    for image in [*images, *images[::-1], *images[::2], *images[::3]]:
+        for settings in (Separable(), DualKawase(levels=2)):
+            assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
+def test_only_what_a_setting_changes_runs_again(renderer: Renderer) -> None:
+    image = picture(20, 31, 3, "float32", seed=3)
+    whole = set(renderer.apply(image, Separable()).timings)
+    last = set(renderer.apply(image, Separable(exposure=1.0)).timings)
+    assert len(last) == 1
+    blurs = set(renderer.apply(image, Separable(blur_scale=2.0)).timings)
+    assert last < blurs < whole
+    assert not any("glow" in name for name in blurs)
+    assert any("glow" in name for name in whole)
+
+
+def test_what_is_not_wanted_does_not_run(renderer: Renderer) -> None:
+    image = picture(20, 31, 3, "float32", seed=4)
+    frames = renderer.apply(image, attachments=("glow",))
+    assert list(frames) == ["glow"]
+    assert len(frames.timings) == 1
+    # The rest is made when it is asked for.
+    whole = renderer.apply(image)
+    assert_matches_reference(whole, image, Separable())
+    assert "glow" not in whole.timings
+
+
+# --- NaN and infinity ---
+
+
+def with_specials(dtype: str, channels: int, size: tuple[int, int] = (23, 17)) -> Image:
+    width, height = size
+    image = picture(height, width, channels, dtype, seed=5)
+    image[0, 0, 0] = np.nan
+    image[-1, -1] = -np.inf
+    image[5, 5] = np.inf
+    image[5, 6] = np.nan
+    image[9, 3, 2] = np.inf
+    image[9, 4, 1] = -np.inf
+    return image
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+@pytest.mark.parametrize("method", METHODS)
+def test_nan_and_infinity_are_not_spread(
+    renderer: Renderer, method: str, dtype: str, channels: int
+) -> None:
+    settings = METHODS[method]
+    image = with_specials(dtype, channels)
+    zeros = np.where(np.isfinite(image), image, np.zeros((), dtype))
+    frames = renderer.apply(image, settings)
+    clean = renderer.apply(zeros, settings)
+    for name in list(frames)[:-1]:
+        assert_array_equal(frames[name], clean[name], err_msg=name)
+    finite = np.isfinite(image)
+    assert_array_equal(frames["final"][~finite], image[~finite])
+    assert_array_equal(frames["final"][finite], clean["final"][finite])
+    assert frames.info["nan"] == np.isnan(image).sum()
+    assert frames.info["inf"] == np.isinf(image).sum()
+    assert (clean.info["nan"], clean.info["inf"]) == (0, 0)
+
+
+@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb"])
+@pytest.mark.parametrize(
+    "tonemap", ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
+)
+@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_nan_and_infinity_stay_in_final(
+    renderer: Renderer, dtype: str, composite: Any, tonemap: Any, encoding: Any
+) -> None:
+    image = with_specials(dtype, 3)
+    settings = Separable(
+        composite=composite, tonemap=tonemap, encoding=encoding, exposure=1.0, intensity=0.5
+    )
+    frames = renderer.apply(image, settings, attachments=("bloom", "final"))
+    special = ~np.isfinite(image)
+    assert_array_equal(frames["final"][special], image[special])
+    # The pixel's other channels, too: to the curves that mix them, these count as 0.
+    expected = reference.composite(image, frames["bloom"], settings)
+    assert_close("final", frames["final"], expected, tolerance(dtype, expected))
+
+
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_special_counts_follow_the_image(renderer: Renderer, dtype: str) -> None:
+    special = with_specials(dtype, 3)
+    counts = (int(np.isnan(special).sum()), int(np.isinf(special).sum()))
+    plain = picture(17, 23, 3, dtype)
+    for image, expected in [(special, counts), (special, counts), (plain, (0, 0))] * 2:
+        info = renderer.apply(image).info
+        assert (info["nan"], info["inf"]) == expected
+    image = picture(17, 23, 3, "uint8")
+    assert renderer.apply(image).info["nan"] == renderer.apply(image).info["inf"] == 0
+
+
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_image_of_nothing_but_nan(renderer: Renderer, dtype: str) -> None:
+    image = np.full((9, 8, 4), np.nan, dtype)
+    frames = renderer.apply(image, Pyramid(firefly_filter=True, threshold=0.5))
+    assert not frames["bloom"][..., :3].any()
+    assert np.isnan(frames["final"]).all()
+    assert frames.info["nan"] == image.size
+
+
+@pytest.mark.parametrize("threshold", [0.0, 0.5])
+@pytest.mark.parametrize("knee", [0.0, 0.5])
+def test_infinity_does_not_pass_the_threshold(
+    renderer: Renderer, threshold: float, knee: float
+) -> None:
+    image = np.zeros((3, 3, 3), np.float32)
+    image[1, 1] = (np.inf, 0.0, 0.0)
+    settings = Separable(threshold=threshold, knee=knee)
+    glow = renderer.apply(image, settings, attachments="glow")["glow"]
+    assert not glow[..., :3].any()
+
+
+# --- Identity and alpha ---
+
+
+def test_no_bloom_is_the_identity_of_8_bits(renderer: Renderer) -> None:
+    levels = np.arange(256, dtype=np.uint8)
+    image = np.stack([levels, levels[::-1], np.roll(levels, 7), np.roll(levels, 99)], axis=-1)
+    frames = renderer.apply(image[np.newaxis], OFF)
+    assert list(frames) == ["final"]
+    assert_array_equal(frames["final"], image[np.newaxis])
+
+
+def test_no_bloom_is_the_identity_of_every_half_float(renderer: Renderer) -> None:
+    bits = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    image = np.stack([bits, bits[::-1], bits.T, bits], axis=-1).view(np.float16)
+    final = renderer.apply(image, OFF)["final"]
+    number = ~np.isnan(image)
+    assert_array_equal(final.view(np.uint16)[number], image.view(np.uint16)[number])
+    # Devices may change which NaN it is, not that it is one.
+    assert np.isnan(final[~number]).all()
+
+
+def test_no_bloom_is_the_identity_of_floats(renderer: Renderer) -> None:
+    bits = np.random.default_rng(6).integers(0, 2**32, (256, 256, 4), dtype=np.uint32)
+    # Vulkan lets devices take numbers below the smallest normal one for 0.
+    bits[(bits & 0x7F800000) == 0] = 0
+    image = bits.view(np.float32)
+    final = renderer.apply(image, OFF)["final"]
+    number = ~np.isnan(image)
+    assert_array_equal(final.view(np.uint32)[number], bits[number])
+    assert np.isnan(final[~number]).all()
+
+
+@pytest.mark.parametrize("tonemap", ["none", "agx"])
+@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", METHODS)
+def test_alpha_is_untouched(
+    renderer: Renderer, method: str, dtype: str, composite: Any, tonemap: Any
+) -> None:
+    image = picture(14, 15, 4, dtype, seed=7)
+    if dtype != "uint8":
+        # Beyond 0..1, too.
+        image[..., 3] = 4 * image[..., 3] - 2
+    settings = METHODS[method].replace(
+        composite=composite, tonemap=tonemap, encoding="srgb", exposure=1.0
+    )
+    frames = renderer.apply(image, settings)
+    assert_array_equal(frames["final"][..., 3], image[..., 3])
+    # The colour does not depend on it.
+    opaque = renderer.apply(np.ascontiguousarray(image[..., :3]), settings)
+    assert_array_equal(frames["final"][..., :3], opaque["final"])
+    assert_array_equal(frames["bloom"], opaque["bloom"])
+
+
+# --- Attachments and out ---
+
+
+def test_attachments_come_in_the_order_of_the_data_flow(renderer: Renderer) -> None:
+    image = picture(9, 12, 3, "uint8", seed=8)
+    whole = renderer.apply(image)
+    frames = renderer.apply(image, attachments=["final", "glow", "final"])
+    assert list(frames) == ["glow", "final"]
+    for name, array in frames.items():
+        assert_array_equal(array, whole[name])
+    assert list(renderer.apply(image, attachments="bloom")) == ["bloom"]
+    assert list(renderer.apply(image, attachments=())) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        (Separable(), "down_0"),
+        (Separable(direct=True), "blur_vertical"),
+        (OFF, "bloom"),
+        (Pyramid(), "blur_vertical"),
+        (Separable(), "scene"),
+        (Separable(), "image"),
+    ],
+)
+def test_unknown_attachment(renderer: Renderer, settings: Settings, name: str) -> None:
+    with pytest.raises(ValueError, match=rf"attachments: there is no '{name}'.*final"):
+        renderer.apply(picture(4, 4, 3, "uint8"), settings, attachments=(name,))
+
+
+def test_attachments_of_the_wrong_type(renderer: Renderer) -> None:
+    wrong: Any = (1,)
+    with pytest.raises(TypeError, match="attachments"):
+        renderer.apply(picture(4, 4, 3, "uint8"), attachments=wrong)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_out_is_filled_in_place(renderer: Renderer, dtype: str) -> None:
+    image = picture(9, 12, 3, dtype, seed=9)
+    out = {"bloom": np.zeros((9, 12, 4), dtype), "final": np.zeros((9, 12, 3), dtype)}
+    frames = renderer.apply(image, out=out)
+    assert list(frames) == ["glow", "blur_vertical", "bloom", "final"]
+    for name, array in out.items():
+        assert frames[name] is array
+    assert_matches_reference(frames, image, Separable())
+    assert_same(frames, renderer.apply(image))
+
+
+def test_out_of_a_repeated_image_is_filled(renderer: Renderer) -> None:
+    image = picture(9, 12, 3, "uint8", seed=10)
+    expected = renderer.apply(image)["final"]
+    out = {"final": np.zeros_like(image)}
+    frames = renderer.apply(image, out=out)
+    assert frames.timings == {}
+    assert_array_equal(out["final"], expected)
+
+
+def test_out_can_be_the_image_itself(renderer: Renderer) -> None:
+    image = picture(9, 12, 3, "float32", seed=11)
+    expected = renderer.apply(image.copy())["final"]
+    renderer.apply(image, out={"final": image})
+    assert_array_equal(image, expected)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        pytest.param(np.zeros((9, 12, 4), np.uint8), id="channels"),
+        pytest.param(np.zeros((12, 9, 3), np.uint8), id="shape"),
+        pytest.param(np.zeros((9, 12), np.uint8), id="dimensions"),
+        pytest.param(np.zeros((9, 12, 3), np.float32), id="dtype"),
+        pytest.param(np.zeros((9, 12, 3), np.int8), id="signed"),
+        pytest.param(np.zeros((12, 9, 3), np.uint8).transpose(1, 0, 2), id="transposed"),
+        pytest.param(np.zeros((9, 24, 3), np.uint8)[:, ::2], id="strided"),
+        pytest.param(np.broadcast_to(np.uint8(0), (9, 12, 3)), id="broadcast"),
+        pytest.param(_read_only(np.zeros((9, 12, 3), np.uint8)), id="read-only"),
+    ],
+)
+def test_out_that_does_not_fit(renderer: Renderer, array: Image) -> None:
+    image = picture(9, 12, 3, "uint8")
+    before = array.copy()
+    with pytest.raises(ValueError, match="out: final"):
+        renderer.apply(image, out={"final": array})
+    assert_array_equal(array, before)
+    assert_matches_reference(renderer.apply(image), image, Separable())
+
+
+def test_out_of_the_other_byte_order(renderer: Renderer) -> None:
+    out = {"final": np.zeros((9, 12, 3), np.dtype(np.float32).newbyteorder())}
+    with pytest.raises(ValueError, match="out: final"):
+        renderer.apply(picture(9, 12, 3, "float32"), out=out)
+
+
+def test_out_that_is_no_array(renderer: Renderer) -> None:
+    wrong: Any = {"final": bytearray(9 * 12 * 3)}
+    with pytest.raises(TypeError, match="out: final"):
+        renderer.apply(picture(9, 12, 3, "uint8"), out=wrong)
+
+
+def test_out_that_shares_memory(renderer: Renderer) -> None:
+    image = picture(9, 12, 3, "uint8")
+    whole = np.zeros((18, 12, 4), np.uint8)
+    with pytest.raises(ValueError, match=r"^out: glow and bloom must not share memory"):
+        renderer.apply(image, out={"glow": whole[:9], "bloom": whole[4:13]})
+    expected = renderer.apply(image)
+    renderer.apply(image, out={"glow": whole[:9], "bloom": whole[9:]})
+    assert_array_equal(whole[:9], expected["glow"])
+    assert_array_equal(whole[9:], expected["bloom"])
+
+
+def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
+    image = picture(9, 12, 3, "uint8", seed=12)
+    first = renderer.apply(image)
+    kept = {name: array.copy() for name, array in first.items()}
+    second = renderer.apply(image)
+    for array in second.values():
+        array[:] = 1
+    renderer.apply(picture(9, 12, 3, "uint8", seed=13))
+    for name, array in first.items():
+        assert_array_equal(array, kept[name], err_msg=name)
+
+
+def test_framebuffers_outlive_the_renderer() -> None:
+    image = picture(9, 12, 3, "float16", seed=14)
+    with Renderer() as renderer:
+        frames = renderer.apply(image)
+    assert_matches_reference(frames, image, Separable())
+
+
+# --- Many settings ---
+
+
+def test_apply_many(renderer: Renderer) -> None:
+    image = picture(20, 30, 3, "float32", seed=15)
+    sequence: list[Settings] = [
+        *METHODS.values(),
+        *(Separable(blur_strength=strength) for strength in (0.5, 1.0, 2.0)),
+        OFF,
+        *METHODS.values(),
+    ]
+    count = 0
+    for settings, frames in zip(sequence, renderer.apply_many(image, sequence), strict=True):
+        assert frames.settings == settings
+        assert_matches_reference(frames, image, settings)
+        count += 1
+    assert count == len(sequence)
+
+
+def test_apply_many_is_lazy_and_runs_what_changed(renderer: Renderer) -> None:
+    image = picture(20, 30, 3, "float32", seed=16)
+    asked = []
+
+    def exposures() -> Any:
+        for exposure in (0.0, 1.0, 2.0):
+            asked.append(exposure)
+            yield Separable(exposure=exposure, tonemap="aces")
+
+    frames = renderer.apply_many(image, exposures(), attachments=("final",))
+    assert asked == []
+    first = next(frames)
+    assert asked == [0.0]
+    assert list(first) == ["final"]
+    # The second makes the bloom that all have, which one pass stood for in the first.
+    assert [len(rest.timings) for rest in frames] == [4, 1]
+
+
+def test_apply_many_stops_at_a_wrong_one(renderer: Renderer) -> None:
+    wrong: Any = [Separable(), "separable"]
+    frames = renderer.apply_many(picture(4, 4, 3, "uint8"), wrong)
+    next(frames)
+    with pytest.raises(TypeError, match="settings"):
+        next(frames)
+
+
+def test_render_many(renderer: Renderer, scene: Scene) -> None:
+    sequence = [Separable(), Separable(blur_strength=0.5), Separable(bloom=False)]
+    for settings, frames in zip(
+        sequence,
+        renderer.render_many(scene, sequence, (64, 36), time=0.25),
+        strict=True,
+    ):
+        assert frames.settings == settings
+        assert_same(frames, renderer.render(scene, settings, (64, 36), time=0.25))
+    names = [
+        list(frames)
+        for frames in renderer.render_many(
+            scene, sequence[:2], (64, 36), attachments=("bloom", "final")
+        )
+    ]
+    assert names == [["bloom", "final"]] * 2
+
+
+def test_render_many_runs_what_changed(renderer: Renderer, scene: Scene) -> None:
+    sequence = [Separable(blur_strength=strength) for strength in (1.0, 2.0, 3.0)]
+    # At a time of its own: what an earlier test drew would not be drawn again.
+    frames = list(renderer.render_many(scene, sequence, (64, 36), time=0.4321))
+    for later in frames[1:]:
+        assert later.timings
+        assert "glow" not in later.timings
+        assert "glow" in frames[0].timings
+
+
+# --- Wrong arguments ---
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        pytest.param([[[0, 0, 0]]], id="list"),
+        pytest.param(None, id="none"),
+        pytest.param(b"\0\0\0", id="bytes"),
+        pytest.param("image.png", id="path"),
+        pytest.param(np.zeros((4, 4, 3)), id="float64"),
+        pytest.param(np.zeros((4, 4, 3), np.int8), id="int8"),
+        pytest.param(np.zeros((4, 4, 3), np.uint16), id="uint16"),
+        pytest.param(np.zeros((4, 4, 3), np.bool_), id="bool"),
+        pytest.param(np.zeros((4, 4, 3), np.complex64), id="complex"),
+        pytest.param(np.zeros((4, 4, 3), object), id="object"),
+        pytest.param(np.zeros((4, 4), [("r", "f4"), ("g", "f4"), ("b", "f4")]), id="record"),
+    ],
+)
+def test_image_of_the_wrong_type(renderer: Renderer, image: Any) -> None:
+    with pytest.raises(TypeError, match="image"):
+        renderer.apply(image)
+
+
+def test_dtype_error_names_what_is_taken(renderer: Renderer) -> None:
+    with pytest.raises(TypeError, match=r"float64.*uint8, float16, float32"):
+        renderer.apply(np.zeros((4, 4, 3)))
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        (),
+        (3,),
+        (4, 4),
+        (4, 4, 1),
+        (4, 4, 2),
+        (4, 4, 5),
+        (1, 4, 4, 3),
+        (0, 4, 3),
+        (4, 0, 3),
+        (4, 4, 0),
+        (0, 0, 4),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_image_of_the_wrong_shape(renderer: Renderer, dtype: str, shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="image"):
+        renderer.apply(np.zeros(shape, dtype))
+    image = picture(4, 4, 3, dtype)
+    assert_matches_reference(renderer.apply(image), image, Separable())
+
+
+def test_masked_images(renderer: Renderer) -> None:
+    """What lies under a mask is not to be seen."""
+    image = picture(6, 5, 3, "float32")
+    masked = np.ma.masked_greater(image, float(np.median(image)))
+    with pytest.raises(ValueError, match=r"^image: some of it is masked"):
+        renderer.apply(masked)
+    assert_same(renderer.apply(masked.filled(0)), renderer.apply(np.where(masked.mask, 0, image)))
+    assert_same(renderer.apply(np.ma.masked_invalid(image)), renderer.apply(image))
+
+
+def largest_side(renderer: Renderer) -> int:
+    """Return the limit that the error of a far too large image names."""
+    with pytest.raises(ValueError, match=r"40000000 x 1 is out of .* range, 1 to") as caught:
+        renderer.apply(np.broadcast_to(np.uint8(0), (1, 40_000_000, 3)))
+    return int(str(caught.value).split("1 to ")[1].split()[0])
+
+
+def test_too_large(renderer: Renderer) -> None:
+    limit = largest_side(renderer)
+    # What every Vulkan 1.0 device can do at least.
+    assert limit >= 4096
+    pixel = np.broadcast_to(np.uint8(9), (1, 1, 3))
+    for shape in ((1, limit + 1, 3), (limit + 1, 1, 3), (limit + 1, limit + 1, 3)):
+        with pytest.raises(ValueError, match=rf"1 to {limit}"):
+            renderer.apply(np.broadcast_to(pixel, shape))
+    with pytest.raises(ValueError, match=rf"1 to {limit}"):
+        renderer.apply(pixel, Separable(bloom_size=(1, limit + 1)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_largest_side(renderer: Renderer, method: str) -> None:
+    image = picture(2, largest_side(renderer), 3, "float32", seed=17)
+    for view in (image, image.transpose(1, 0, 2)):
+        frames = renderer.apply(view, METHODS[method])
+        assert_matches_reference(frames, view, METHODS[method])
+
+
+@pytest.mark.parametrize("side", [1919, 4095, None])
+@pytest.mark.parametrize("method", METHODS)
+def test_long_odd_side(renderer: Renderer, method: str, side: int | None) -> None:
+    """The sizes of two levels have no whole ratio: positions need more bits than a float has."""
+    side = side or largest_side(renderer) - 1
+    image = picture(3, side, 3, "float32", seed=19)
+    for view in (image, image.transpose(1, 0, 2)):
+        frames = renderer.apply(view, METHODS[method])
+        assert_matches_reference(frames, view, METHODS[method])
+
+
+@pytest.mark.parametrize("settings", ["separable", {}, Separable, 1.5], ids=str)
+def test_settings_of_the_wrong_type(renderer: Renderer, settings: Any) -> None:
+    with pytest.raises(TypeError, match="settings"):
+        renderer.apply(picture(4, 4, 3, "uint8"), settings)
+
+
+def test_closed_renderer() -> None:
+    image = picture(4, 4, 3, "uint8")
+    renderer = vkbloom.Renderer()
+    frames = renderer.apply_many(image, [Separable(), Separable()])
+    next(frames)
+    renderer.close()
+    renderer.close()
+    with pytest.raises(ValueError, match="closed"):
+        renderer.apply(image)
+    with pytest.raises(ValueError, match="closed"):
+        next(frames)
+
+
+def test_a_failed_call_leaves_what_was_there(renderer: Renderer) -> None:
+    image = picture(8, 8, 3, "uint8", seed=18)
+    renderer.apply(image)
+    with pytest.raises(ValueError, match="attachments"):
+        renderer.apply(255 - image, attachments=("nothing",))
+    with pytest.raises(ValueError, match="out"):
+        renderer.apply(255 - image, out={"final": np.zeros((8, 8, 4), np.uint8)})
+    again = renderer.apply(image)
+    assert again.timings == {}
+    assert_matches_reference(again, image, Separable())

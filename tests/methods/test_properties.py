@@ -1,0 +1,585 @@
+"""Laws that bloom keeps whatever the picture, tried on pictures that hypothesis draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
+
+from tests.tolerance import tolerance
+from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference
+
+Image = NDArray[Any]
+Array = NDArray[np.float64]
+
+LINEAR: dict[str, Settings] = {
+    "separable": Separable(),
+    "fractional": Separable(blur_scale=1.7, loops=2, blur_strength=1.0),
+    "layers": Separable(layers=((1.0, 1.0), (2.5, 0.5))),
+    "outline": Separable(first_tap=0, texel="x"),
+    "direct": Separable(direct=True, blur_scale=1.3),
+    "half-size": Separable(bloom_scale=0.5),
+    "pyramid": Pyramid(),
+    "pyramid-radius": Pyramid(levels=3, radius=1.7),
+    "dual-kawase": DualKawase(),
+    "dual-kawase-offset": DualKawase(levels=2, offset=1.7),
+}
+# The two directions get the same treatment. (Of a smaller bloom buffer, the last horizontal blur
+# is evaluated between its texels and the vertical one is not; texel="x" stretches one of them.)
+SYMMETRIC: dict[str, Settings] = {
+    "separable": Separable(blur_scale=1.3),
+    "layers": LINEAR["layers"],
+    "direct": LINEAR["direct"],
+    "direct-half-size": Separable(direct=True, bloom_scale=0.5),
+    "pyramid": Pyramid(threshold=0.3, knee=0.5),
+    "firefly": Pyramid(firefly_filter=True, bloom_scale=0.7),
+    "dual-kawase": DualKawase(offset=1.4),
+}
+ALL: dict[str, Settings] = {
+    **LINEAR,
+    "knee": Separable(threshold=0.4, knee=0.5),
+    "firefly": Pyramid(firefly_filter=True, threshold=0.2, knee=1.0),
+}
+FLOATS = ("float16", "float32")
+
+few = hypothesis.settings(max_examples=12, deadline=None)
+
+
+def bloom_of(renderer: Renderer, image: Image, settings: Settings) -> Array:
+    frames = renderer.apply(image, settings, attachments="bloom")
+    bloom: Array = frames["bloom"][..., :3].astype(np.float64)
+    return bloom
+
+
+def noise(height: int, width: int, seed: int) -> Image:
+    """Multiples of 1/256 from 1/4 to 1: sums of two are exact in all floats."""
+    levels = np.random.default_rng(seed).integers(64, 257, (height, width, 3))
+    return (levels / 256).astype(np.float32)
+
+
+sides = st.integers(1, 24)
+seeds = st.integers(0, 2**32 - 1)
+pictures = st.builds(noise, sides, sides, seeds)
+
+
+@st.composite
+def pairs(draw: st.DrawFn) -> tuple[Image, Image]:
+    """Two pictures of one size."""
+    height, width, seed = draw(sides), draw(sides), draw(seeds)
+    return noise(height, width, seed), noise(height, width, seed ^ 1)
+
+
+def in_dtype(image: Image, dtype: str) -> Image:
+    """Return what `noise` made, nothing of which is lost in another float."""
+    return (image * 255).astype(dtype) if dtype == "uint8" else image.astype(dtype)
+
+
+# --- Linearity ---
+
+
+@pytest.mark.parametrize("dtype", FLOATS)
+@pytest.mark.parametrize("method", LINEAR)
+@few
+@hypothesis.given(pair=pairs())
+def test_superposition(
+    renderer: Renderer, method: str, dtype: str, pair: tuple[Image, Image]
+) -> None:
+    settings = LINEAR[method]
+    a, b = (in_dtype(image, dtype) for image in pair)
+    parts = bloom_of(renderer, a, settings) + bloom_of(renderer, b, settings)
+    whole = bloom_of(renderer, a + b, settings)
+    # The whole and the parts are each rounded.
+    assert_allclose(whole, parts, rtol=0, atol=2 * tolerance(dtype, whole))
+
+
+@pytest.mark.parametrize("dtype", FLOATS)
+@pytest.mark.parametrize("method", LINEAR)
+@few
+@hypothesis.given(picture=pictures, power=st.integers(-3, 10))
+def test_homogeneity(
+    renderer: Renderer, method: str, dtype: str, picture: Image, power: int
+) -> None:
+    image = in_dtype(picture, dtype)
+    factor = np.asarray(2.0**power, dtype)
+    # A power of two moves the exponent alone, so that every rounding stays what it was.
+    assert_array_equal(
+        bloom_of(renderer, image * factor, LINEAR[method]),
+        bloom_of(renderer, image, LINEAR[method]) * float(factor),
+    )
+
+
+@few
+@hypothesis.given(image=pictures, power=st.integers(-2, 8))
+def test_threshold_scales_with_the_picture(renderer: Renderer, image: Image, power: int) -> None:
+    factor = 2.0**power
+    assert_array_equal(
+        bloom_of(renderer, image * np.float32(factor), Separable(threshold=0.5 * factor)),
+        bloom_of(renderer, image, Separable(threshold=0.5)) * factor,
+    )
+
+
+@few
+@hypothesis.given(image=pictures, channel=st.integers(0, 2))
+def test_channels_do_not_mix(renderer: Renderer, image: Image, channel: int) -> None:
+    alone = np.zeros_like(image)
+    alone[..., channel] = image[..., channel]
+    for settings in LINEAR.values():
+        whole = bloom_of(renderer, image, settings)
+        part = bloom_of(renderer, alone, settings)
+        assert_array_equal(part[..., channel], whole[..., channel])
+        assert not np.delete(part, channel, axis=-1).any()
+
+
+# --- Symmetry ---
+
+
+@pytest.mark.parametrize("method", SYMMETRIC)
+@few
+@hypothesis.given(image=pictures)
+def test_transposition(renderer: Renderer, method: str, image: Image) -> None:
+    bloom = bloom_of(renderer, image, SYMMETRIC[method])
+    turned = bloom_of(renderer, image.swapaxes(0, 1), SYMMETRIC[method])
+    assert_allclose(turned.swapaxes(0, 1), bloom, rtol=0, atol=1e-5 * bloom.max())
+
+
+@pytest.mark.parametrize("method", ALL)
+@few
+@hypothesis.given(image=pictures)
+def test_mirroring(renderer: Renderer, method: str, image: Image) -> None:
+    bloom = bloom_of(renderer, image, ALL[method])
+    for axis in (0, 1):
+        mirrored = bloom_of(renderer, np.flip(image, axis), ALL[method])
+        assert_allclose(np.flip(mirrored, axis), bloom, rtol=0, atol=1e-5 * bloom.max())
+
+
+# --- Place and energy ---
+
+
+def centroid(bloom: Array) -> Array:
+    """Return (y, x) in pixels."""
+    weights = bloom.sum(axis=-1)
+    y, x = np.indices(weights.shape)
+    place: Array = np.array([(weights * y).sum(), (weights * x).sum()]) / weights.sum()
+    return place
+
+
+def spread(bloom: Array) -> float:
+    """Return the variance around the centroid, of y and x together, in square pixels."""
+    weights = bloom.sum(axis=-1)
+    y, x = np.indices(weights.shape)
+    centre_y, centre_x = centroid(bloom)
+    squares = (y - centre_y) ** 2 + (x - centre_x) ** 2
+    return float((weights * squares).sum() / weights.sum())
+
+
+def point(size: tuple[int, int], place: tuple[int, int], side: int = 1) -> Image:
+    width, height = size
+    x, y = place
+    image = np.zeros((height, width, 3), np.float32)
+    image[y : y + side, x : x + side] = 1
+    return image
+
+
+def blob(size: tuple[int, int], place: tuple[float, float], sigma: float) -> Image:
+    width, height = size
+    y, x = np.indices((height, width))
+    squares = (x - place[0]) ** 2 + (y - place[1]) ** 2
+    values = np.exp(-squares / (2 * sigma**2)).astype(np.float32)
+    return np.repeat(values[..., np.newaxis], 3, axis=-1)
+
+
+# Kernels that are the same at every pixel.
+UNIFORM = ("separable", "fractional", "layers", "direct")
+
+
+@pytest.mark.parametrize("method", UNIFORM)
+@few
+@hypothesis.given(
+    size=st.tuples(st.integers(79, 82), st.integers(79, 82)),
+    place=st.tuples(st.integers(38, 42), st.integers(38, 42)),
+)
+def test_point_stays_in_place_and_keeps_its_energy(
+    renderer: Renderer, method: str, size: tuple[int, int], place: tuple[int, int]
+) -> None:
+    settings = LINEAR[method]
+    bloom = bloom_of(renderer, point(size, place), settings)
+    assert_allclose(centroid(bloom), place[::-1], rtol=0, atol=1e-4)
+    assert_allclose(bloom.sum(axis=(0, 1)), reference.gain(settings), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("settings", "side"),
+    [
+        pytest.param(Pyramid(levels=3), 1, id="pyramid"),
+        pytest.param(Pyramid(levels=2, radius=1.5), 1, id="pyramid-radius"),
+        # Its way down is a mean of 2 x 2, so that a point goes to the centre of its square.
+        pytest.param(DualKawase(levels=2), 4, id="dual-kawase-2"),
+        pytest.param(DualKawase(levels=3), 8, id="dual-kawase-3"),
+    ],
+)
+@few
+@hypothesis.given(
+    cells=st.tuples(st.integers(16, 19), st.integers(16, 19)),
+    place=st.tuples(st.integers(56, 79), st.integers(56, 79)),
+)
+def test_point_in_a_chain_of_whole_halves(
+    renderer: Renderer,
+    settings: Settings,
+    side: int,
+    cells: tuple[int, int],
+    place: tuple[int, int],
+) -> None:
+    size = (8 * cells[0], 8 * cells[1])
+    x, y = (offset // side * side for offset in place)
+    bloom = bloom_of(renderer, point(size, (x, y), side), settings)
+    middle = (side - 1) / 2
+    assert_allclose(centroid(bloom), (y + middle, x + middle), rtol=0, atol=2e-3)
+    assert_allclose(bloom.sum(axis=(0, 1)), side**2, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param(Separable(bloom_scale=0.5), id="separable-half-size"),
+        pytest.param(Pyramid(levels=2), id="pyramid"),
+        pytest.param(Pyramid(levels=2, radius=1.5), id="pyramid-radius"),
+        pytest.param(DualKawase(levels=2), id="dual-kawase"),
+        pytest.param(DualKawase(levels=2, offset=1.5), id="dual-kawase-offset"),
+    ],
+)
+@few
+@hypothesis.given(
+    size=st.tuples(st.integers(96, 103), st.integers(96, 103)),
+    place=st.tuples(st.floats(44, 56), st.floats(44, 56)),
+)
+def test_blob_stays_in_place_and_keeps_its_energy(
+    renderer: Renderer,
+    settings: Settings,
+    size: tuple[int, int],
+    place: tuple[float, float],
+) -> None:
+    image = blob(size, place, sigma=6.0)
+    bloom = bloom_of(renderer, image, settings)
+    # Of an odd side the floored half leaves a strip out, a little less or more of which is read
+    # here and there: the formulas themselves move this blob by up to 0.03 pixels and make up to
+    # 0.7 % more of it.
+    assert_allclose(centroid(bloom), place[::-1], rtol=0, atol=0.05)
+    energy = bloom.sum(axis=(0, 1)) / image.sum(axis=(0, 1), dtype=np.float64)
+    assert_allclose(energy, reference.gain(settings), rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param(Separable(), id="separable"),
+        pytest.param(Separable(blur_scale=1.7), id="fractional"),
+        pytest.param(Separable(direct=True), id="direct"),
+        pytest.param(Separable(bloom_scale=0.5), id="half-size"),
+        pytest.param(Pyramid(levels=3), id="pyramid"),
+        pytest.param(Pyramid(levels=2, radius=2.3), id="pyramid-radius"),
+        pytest.param(DualKawase(levels=3), id="dual-kawase"),
+        pytest.param(DualKawase(levels=2, offset=1.7), id="dual-kawase-offset"),
+    ],
+)
+@few
+@hypothesis.given(
+    size=st.tuples(st.integers(140, 147), st.integers(140, 147)),
+    slope=st.tuples(st.integers(-4, 4), st.integers(-4, 4)),
+)
+def test_ramp_stays_in_place(
+    renderer: Renderer, settings: Settings, size: tuple[int, int], slope: tuple[int, int]
+) -> None:
+    """A shift by any part of a pixel lifts or lowers a ramp."""
+    width, height = size
+    y, x = np.indices((height, width))
+    ramp = 600.0 + slope[0] * (x - width / 2) + slope[1] * (y - height / 2)
+    image = np.repeat(ramp[..., np.newaxis], 3, axis=-1).astype(np.float32)
+    bloom = bloom_of(renderer, image, settings) / reference.gain(settings)
+    # Away from the edges, where there is no ramp. 5e-3 is a shift by a 200th of a pixel.
+    inner = (slice(60, -60), slice(60, -60))
+    assert_allclose(bloom[inner], image[inner], rtol=0, atol=5e-3)
+
+
+# --- Bounds ---
+
+
+@pytest.mark.parametrize("dtype", ["uint8", *FLOATS])
+@pytest.mark.parametrize("method", LINEAR)
+@few
+@hypothesis.given(picture=pictures)
+def test_bloom_lies_between_darkest_and_brightest(
+    renderer: Renderer, method: str, dtype: str, picture: Image
+) -> None:
+    """Weights from 0 up do not ring: no value beyond those of flat images."""
+    settings = LINEAR[method]
+    image = in_dtype(picture, dtype)
+    bloom = bloom_of(renderer, image, settings)
+    gain = reference.gain(settings)
+    low, high = gain * float(image.min()), gain * float(image.max())
+    limit = 1e-4 * high
+    if dtype == "uint8":
+        low, high, limit = min(low, 255), min(high, 255), 2.5
+    elif dtype == "float16":
+        limit = tolerance(dtype, np.array(high))
+    assert bloom.min() >= low - limit
+    assert bloom.max() <= high + limit
+
+
+@pytest.mark.parametrize("dtype", ["uint8", *FLOATS])
+@pytest.mark.parametrize("method", ALL)
+@few
+@hypothesis.given(picture=pictures, seed=seeds)
+def test_nothing_is_negative(
+    renderer: Renderer, method: str, dtype: str, picture: Image, seed: int
+) -> None:
+    """Sparse bright points on black."""
+    lit = np.random.default_rng(seed).random((*picture.shape[:2], 1)) < 0.1
+    image = in_dtype(lit * picture, dtype)
+    for name, array in renderer.apply(image, ALL[method]).items():
+        assert (array >= 0).all(), name
+
+
+@pytest.mark.parametrize("method", LINEAR)
+@few
+@hypothesis.given(size=st.tuples(st.integers(8, 60), st.integers(8, 60)), part=st.floats(0.1, 0.9))
+def test_edge_stays_monotonic(
+    renderer: Renderer, method: str, size: tuple[int, int], part: float
+) -> None:
+    """No second edge, no ringing beside it."""
+    width, height = size
+    image = np.zeros((height, width, 3), np.float32)
+    image[:, int(width * part) :] = 1
+    for view, axis in ((image, 1), (image.swapaxes(0, 1), 0)):
+        bloom = bloom_of(renderer, view, LINEAR[method])
+        assert np.diff(bloom, axis=axis).min() >= -1e-5 * bloom.max()
+
+
+# --- Spread ---
+
+
+@pytest.mark.parametrize(
+    ("settings", "field", "largest"),
+    [
+        pytest.param(Separable(), "blur_scale", 8.0, id="scale"),
+        pytest.param(Separable(direct=True), "blur_scale", 4.0, id="direct-scale"),
+        pytest.param(Separable(), "blur_strength", 16.0, id="strength"),
+        pytest.param(Pyramid(levels=2), "radius", 4.0, id="radius"),
+        pytest.param(DualKawase(levels=2), "offset", 4.0, id="offset"),
+    ],
+)
+@few
+@hypothesis.given(data=st.data())
+def test_spread_grows(
+    renderer: Renderer, settings: Settings, field: str, largest: float, data: Any
+) -> None:
+    # Half a texel apart: pairs of taps that move between the same two texels of a smaller level
+    # take from one what they give the other.
+    low = data.draw(st.floats(0, largest - 0.5))
+    high = data.draw(st.floats(low + 0.5, largest))
+    # A whole cell of the smallest level, so that its place in the cell does not count.
+    image = point((128, 128), (64, 64), side=4)
+    narrow = spread(bloom_of(renderer, image, settings.replace(**{field: low})))
+    wide = spread(bloom_of(renderer, image, settings.replace(**{field: high})))
+    assert wide > narrow
+
+
+@pytest.mark.parametrize("method", [Pyramid, DualKawase])
+def test_spread_grows_with_the_levels(renderer: Renderer, method: Any) -> None:
+    image = point((256, 256), (128, 128), side=32)
+    spreads = [spread(bloom_of(renderer, image, method(levels=n))) for n in range(1, 6)]
+    assert (np.diff(spreads) > 0).all()
+
+
+# --- Separability ---
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param(Separable(), id="separable"),
+        pytest.param(Separable(blur_scale=1.7, loops=3), id="fractional-loops"),
+        pytest.param(Separable(direct=True), id="direct"),
+        pytest.param(Separable(texel="x", first_tap=0), id="outline"),
+        pytest.param(Separable(bloom_scale=0.5), id="half-size"),
+    ],
+)
+@few
+@hypothesis.given(picture=pictures)
+def test_product_of_row_and_column(renderer: Renderer, settings: Settings, picture: Image) -> None:
+    image = picture[:, :1] * picture[:1]
+    bloom = bloom_of(renderer, image, settings)[..., 0]
+    # What is a product has its margins as factors.
+    product = bloom.sum(axis=1, keepdims=True) * bloom.sum(axis=0) / bloom.sum()
+    assert_allclose(bloom, product, rtol=0, atol=1e-5 * bloom.max())
+
+
+@few
+@hypothesis.given(
+    image=pictures,
+    settings=st.builds(
+        Separable,
+        blur_scale=st.floats(0, 4),
+        blur_strength=st.floats(0, 3),
+        loops=st.integers(1, 3),
+        first_tap=st.integers(0, 1),
+        texel=st.sampled_from(("own", "x")),
+        weights=st.lists(st.floats(0.01, 0.2), min_size=1, max_size=6),
+    ),
+)
+def test_direct_is_the_same_blur(renderer: Renderer, image: Image, settings: Separable) -> None:
+    two_passes = bloom_of(renderer, image, settings)
+    one_pass = bloom_of(renderer, image, settings.replace(direct=True))
+    assert_allclose(one_pass, two_passes, rtol=0, atol=1e-5 * two_passes.max())
+
+
+# --- Fireflies ---
+
+
+@few
+@hypothesis.given(
+    size=st.tuples(st.integers(30, 40), st.integers(30, 40)),
+    place=st.tuples(st.integers(12, 18), st.integers(12, 18)),
+    brightness=st.floats(100, 60000),
+)
+def test_firefly_is_bound(
+    renderer: Renderer, size: tuple[int, int], place: tuple[int, int], brightness: float
+) -> None:
+    """One bright pixel on black lights one pixel of the first level, whatever its brightness.
+
+    A group of share s and luminance m counts s / (1 + m). Where the groups that see the pixel
+    have the share a < 1 of all, they add less than their shares, sum of s m / (1 + m) < a, and
+    the others keep 1 - a of the divisor: the value stays under a / (1 - a). The largest a below
+    1 is 3/4 (the inner group and two outer ones), so that the bound is 3. Groups that all see
+    the pixel have nothing to be weighed against; this is so in no more than one pixel of the
+    level, for its taps would have to be less than 1 texel away on both axes, and it keeps what
+    it had without the filter at most.
+    """
+    image = point(size, place) * np.float32(brightness)
+    filtered = renderer.apply(image, Pyramid(firefly_filter=True))
+    plain = renderer.apply(image, Pyramid())
+    by_size = np.sort(filtered["down_0"][..., 0], axis=None)
+    assert by_size[-2] <= 3.0
+    assert by_size[-1] <= plain["down_0"][..., 0].max() * (1 + 1e-5)
+
+
+@few
+@hypothesis.given(
+    cells=st.tuples(st.integers(15, 20), st.integers(15, 20)),
+    place=st.tuples(st.integers(12, 18), st.integers(12, 18)),
+    brightness=st.floats(1000, 60000),
+)
+def test_firefly_loses_its_energy(
+    renderer: Renderer, cells: tuple[int, int], place: tuple[int, int], brightness: float
+) -> None:
+    """Of even sides: a sixteenth of the brightness stays in one pixel, 3 in its 8 neighbours.
+
+    Without the filter a quarter of the brightness stays in the level, for it has a quarter of
+    the pixels.
+    """
+    size = (2 * cells[0], 2 * cells[1])
+    image = point(size, place) * np.float32(brightness)
+    filtered = renderer.apply(image, Pyramid(firefly_filter=True), attachments="down_0")
+    plain = renderer.apply(image, Pyramid(), attachments="down_0")
+    assert_allclose(plain["down_0"][..., 0].sum(dtype=np.float64), brightness / 4, rtol=1e-5)
+    total = filtered["down_0"][..., 0].sum(dtype=np.float64)
+    assert brightness / 16 <= total * (1 + 1e-5)
+    assert total <= brightness / 16 * (1 + 1e-5) + 8 * 3
+
+
+@few
+@hypothesis.given(height=sides, width=sides, value=st.floats(1e-6, 100))
+def test_firefly_filter_leaves_flat_images(
+    renderer: Renderer, height: int, width: int, value: float
+) -> None:
+    image = np.full((height, width, 3), value, np.float32)
+    bloom = bloom_of(renderer, image, Pyramid(firefly_filter=True))
+    assert_allclose(bloom, image, rtol=1e-5)
+
+
+# --- Thresholds ---
+
+bright_parts = st.floats(0, 1)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", *FLOATS])
+@few
+@hypothesis.given(
+    picture=pictures,
+    thresholds=st.tuples(bright_parts, bright_parts),
+    knee=st.one_of(st.just(0.0), bright_parts),
+)
+def test_higher_threshold_lets_less_through(
+    renderer: Renderer,
+    dtype: str,
+    picture: Image,
+    thresholds: tuple[float, float],
+    knee: float,
+) -> None:
+    image = in_dtype(picture, dtype)
+    low, high = sorted(thresholds)
+    names = ("glow", "bloom")
+    more = renderer.apply(image, Separable(threshold=low, knee=knee), attachments=names)
+    less = renderer.apply(image, Separable(threshold=high, knee=knee), attachments=names)
+    whole = renderer.apply(image, attachments=names)
+    for name in names:
+        # Rounding to 8 bits and to half keeps the order; only the formula's own rounding counts.
+        slack = 0 if dtype == "uint8" else 1e-5
+        for a, b in ((less, more), (more, whole)):
+            assert (a[name].astype(np.float64) <= b[name].astype(np.float64) + slack).all(), name
+
+
+@few
+@hypothesis.given(image=pictures, threshold=st.floats(0.26, 0.99))
+def test_hard_threshold_keeps_or_drops(renderer: Renderer, image: Image, threshold: float) -> None:
+    luminance = image.astype(np.float64) @ (0.2126, 0.7152, 0.0722)
+    # Which side of the threshold rounding puts a pixel on is open within a rounding of it.
+    hypothesis.assume(np.abs(luminance - threshold).min() > 1e-6)
+    settings = Separable(threshold=threshold)
+    glow = renderer.apply(image, settings, attachments="glow")["glow"][..., :3]
+    passes = (luminance > threshold)[..., np.newaxis]
+    assert_array_equal(glow, np.where(passes, image, np.float32(0)))
+
+
+@few
+@hypothesis.given(image=pictures, threshold=st.floats(0, 1), knee=st.floats(0.01, 1))
+def test_knee_keeps_the_hue(
+    renderer: Renderer, image: Image, threshold: float, knee: float
+) -> None:
+    settings = Separable(threshold=threshold, knee=knee)
+    glow = renderer.apply(image, settings, attachments="glow")["glow"][..., :3]
+    scale = glow.max(axis=-1, keepdims=True) / image.max(axis=-1, keepdims=True)
+    assert (scale <= 1 + 1e-5).all()
+    assert_allclose(glow, image * scale, rtol=0, atol=1e-6)
+
+
+# --- One picture, whatever came before it ---
+
+
+@few
+@hypothesis.given(
+    steps=st.lists(
+        st.tuples(
+            st.integers(0, 5),
+            st.sampled_from(sorted(ALL)),
+            st.sampled_from(("final", "bloom", "all")),
+        ),
+        min_size=2,
+        max_size=8,
+    )
+)
+def test_order_of_calls_does_not_matter(
+    renderer: Renderer, steps: list[tuple[int, str, Any]]
+) -> None:
+    for index, method, attachments in steps:
+        # Four sizes, two pictures of the first one, two dtypes.
+        image = in_dtype(noise(9 + index % 4, 12 - index % 4, index), FLOATS[index % 2])
+        frames = renderer.apply(image, ALL[method], attachments=attachments)
+        expected = reference.apply(image, ALL[method])
+        for name, array in frames.items():
+            limit = tolerance(array.dtype, expected[name])
+            assert_allclose(array, expected[name], rtol=0, atol=limit, err_msg=name)

@@ -1,0 +1,40 @@
+"""The code of docs/testing.md, run as it stands there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+GUIDE = Path(__file__).resolve().parents[2] / "docs" / "testing.md"
+
+
+def blocks() -> dict[str, str]:
+    """Return the Python code of the guide by the file's name in its first line."""
+    found = re.findall(r"```python\n# (\w+\.py)\n(.*?)```", GUIDE.read_text(), re.DOTALL)
+    assert len(found) == GUIDE.read_text().count("```python")
+    return dict(found)
+
+
+def test_guide(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    code = blocks()
+    for name, text in code.items():
+        (pytester.path / name).write_text(text)
+    subprocess.run([sys.executable, "dump.py"], cwd=pytester.path, check=True)
+    options = ("-p", "vkbloom", "-p", "no:cacheprovider", "-W", "error")
+    tests = sum(text.count("\ndef test_") for name, text in code.items() if name != "conftest.py")
+    first = pytester.runpytest_subprocess(*options)
+    first.assert_outcomes(passed=tests - 2, failed=2)
+    first.stdout.fnmatch_lines(["missing: bloom_references/test_saucer/test_saucer.json"])
+    pytester.runpytest_subprocess(*options, "--bloom-update").assert_outcomes(passed=tests)
+    again = pytester.runpytest_subprocess(*options, "--bloom-report=report")
+    again.assert_outcomes(passed=tests)
+    assert (pytester.path / "report" / "index.html").is_file()
+    # A file that the guide shows.
+    folder = pytester.path / "bloom_references" / "test_saucer"
+    for name in ("test_saucer.json", "test_saucer.glow.png", "test_saucer.depth.exr"):
+        assert (folder / name).is_file()

@@ -1,0 +1,509 @@
+"""The deferred system: each framebuffer from those before it, and against the forward system."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from skimage.metrics import structural_similarity
+
+from tests.scene.test_gltf import Document
+from tests.screens import DISTANCE, NOTHING, noise, screen
+from tests.tolerance import assert_close, tolerance
+from vkbloom import (
+    Camera,
+    DualKawase,
+    Frames,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    presets,
+    reference,
+)
+from vkbloom.scene import Mesh
+
+Array = NDArray[Any]
+
+SIZE = (320, 180)
+GBUFFER = ["albedo", "normal", "position", "brightness", "depth"]
+BLURRED = ["blur_vertical", "bloom"]
+LIT = ["scene", "final"]
+HALF = 2.0**-11  # half of the last bit of a half float, relative
+WHITE = np.ones((1, 1, 3))
+
+
+def deferred(
+    renderer: Renderer,
+    scene: Scene,
+    settings: Settings | None = None,
+    size: tuple[int, int] = SIZE,
+    **more: Any,
+) -> Frames:
+    return renderer.render(scene, settings, size, shading="deferred", **more)
+
+
+def rgb(image: Array) -> NDArray[np.float64]:
+    return image[..., :3].astype(np.float64)
+
+
+def lamps(scene: Scene) -> Scene:
+    """Return the scene with a body that emits, each vertex another colour, up to 5."""
+    count = len(scene.body.vertices)
+    emission = np.random.default_rng(2).random((count, 3), dtype=np.float32) * 5
+    body = dataclasses.replace(scene.body, emission=emission)
+    return dataclasses.replace(scene, body=body, glow_intensity=3.0)
+
+
+@pytest.fixture(scope="module")
+def frames(renderer: Renderer, scene: Scene) -> Frames:
+    return deferred(renderer, scene)
+
+
+# Names, shapes, formats
+
+
+@pytest.mark.parametrize(
+    ("settings", "between"),
+    [
+        (Separable(), BLURRED),
+        (presets["deferred"], BLURRED),
+        (Separable(direct=True), ["bloom"]),
+        (Pyramid(levels=2), ["down_0", "down_1", "up_0", "bloom"]),
+        (DualKawase(levels=2), ["down_0", "down_1", "up_0", "bloom"]),
+        (Separable(bloom=False), []),
+    ],
+)
+def test_names(renderer: Renderer, scene: Scene, settings: Settings, between: list[str]) -> None:
+    assert list(deferred(renderer, scene, settings)) == [*GBUFFER, *between, *LIT]
+
+
+@pytest.mark.parametrize(
+    ("format", "dtype"),
+    [
+        (None, "float16"),
+        ("rgba8unorm", "uint8"),
+        ("rgba16float", "float16"),
+        ("rgba32float", "float32"),
+    ],
+)
+def test_shapes_and_dtypes(renderer: Renderer, scene: Scene, format: Any, dtype: str) -> None:
+    settings = Separable(format=format, bloom_size=(40, 24))
+    shown = deferred(renderer, scene, settings, (64, 36))
+    assert [(name, array.shape, array.dtype.name) for name, array in shown.items()] == [
+        ("albedo", (36, 64, 4), "float16"),
+        ("normal", (36, 64, 4), "float16"),
+        ("position", (36, 64, 4), "float16"),
+        ("brightness", (36, 64, 4), "float16"),
+        ("depth", (36, 64), "float32"),
+        ("blur_vertical", (24, 40, 4), dtype),
+        ("bloom", (36, 64, 4), dtype),
+        ("scene", (36, 64, 4), "float16"),
+        ("final", (36, 64, 4), "uint8"),
+    ]
+    for name, array in shown.items():
+        if name != "depth":
+            assert (array[..., 3] == (255 if array.dtype == np.uint8 else 1)).all(), name
+
+
+def test_bloom_buffers_have_the_frames_size(renderer: Renderer, scene: Scene) -> None:
+    assert deferred(renderer, scene)["blur_vertical"].shape[1::-1] == SIZE
+    half = deferred(renderer, scene, Separable(bloom_scale=0.5))
+    assert half["blur_vertical"].shape[1::-1] == (160, 90)
+
+
+# The G-buffer
+
+
+def test_positions_are_what_depth_and_projection_say(frames: Frames) -> None:
+    camera = Camera()
+    depth = frames["depth"].astype(np.float64)
+    body = depth < 1
+    z = camera.near * camera.far / (depth * (camera.far - camera.near) - camera.far)
+    x, y = (
+        (2 * (np.arange(side) + 0.5) / side - 1) * math.tan(math.radians(camera.fov / 2))
+        for side in SIZE
+    )
+    across, down = np.meshgrid(x * SIZE[0] / SIZE[1], y)
+    expected = np.stack((-across * z, -down * z, z), axis=-1)
+    error = np.abs(rgb(frames["position"]) - expected)[body]
+    assert body.mean() > 0.1
+    # Rounded to half; depth in float32 resolves 1 / 100000 of the distance here.
+    assert (error <= HALF * np.abs(expected[body]) + 2e-4 * 13).all()
+
+
+def rotation(axis: int, angle: float) -> NDArray[np.float64]:
+    """Return the 3x3 matrix that turns by `angle` radians around x, y or z."""
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[[a, b], [a, b]] = math.cos(angle)
+    matrix[b, a] = math.sin(angle)
+    matrix[a, b] = -math.sin(angle)
+    return matrix
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.1, 0.25, 0.5, 0.8, -0.35, 1.15])
+def test_camera_and_animation_place_every_point(renderer: Renderer, turns: float) -> None:
+    # Body and glow are a triangle, in both windings, whose colours are where its points lie.
+    corners = np.eye(3, dtype=np.float32)
+    vertices = np.concatenate((corners, np.tile(corners[2], (3, 1)), corners), axis=1)
+    mesh = Mesh(vertices, np.array([0, 1, 2, 2, 1, 0], np.uint32))
+    camera = Camera(position=(0.3, 0.2, -4.0), rotation=(20.0, -40.0, 30.0), fov=60.0)
+    scene = Scene(body=mesh, glow=mesh, camera=camera)
+    seen = deferred(renderer, scene, time=turns)
+    body = seen["depth"] < 1
+    assert body.mean() > 0.005
+    points, normals = rgb(seen["albedo"])[body], rgb(seen["normal"])[body]
+    np.testing.assert_array_equal(rgb(seen["brightness"])[body], points)
+
+    # The forward system's formulas: model = translate * rotate x * rotate y, view = translate *
+    # rotate x * rotate y * rotate z.
+    angle = 2 * math.pi * turns
+    turned = rotation(0, -0.15 * math.sin(angle)) @ rotation(1, angle)
+    moved = (0.25 * math.sin(angle), -1.0, 0.25 * math.cos(angle))
+    x, y, z = (rotation(axis, math.radians(camera.rotation[axis])) for axis in range(3))
+    view = x @ y @ z
+    positions = (points @ turned.T + moved) @ view.T + camera.position
+    # Points and positions are rounded to half; positions are up to 6 away.
+    assert np.abs(rgb(seen["position"])[body] - positions).max() <= HALF * (2 + 6)
+    expected = view @ turned @ (0.0, 0.0, 1.0)
+    np.testing.assert_allclose(normals, np.tile(expected, (len(normals), 1)), atol=2 * HALF)
+
+    settings = Separable(bloom_size=SIZE, format="rgba16float")
+    forward = renderer.render(scene, settings, SIZE, time=turns)
+    for name in ("depth", "glow_depth"):
+        np.testing.assert_array_equal(forward[name], seen["depth"], err_msg=name)
+    np.testing.assert_array_equal(forward["glow"], seen["brightness"])
+
+
+def test_normals_are_those_of_the_surface(frames: Frames) -> None:
+    normal, position = rgb(frames["normal"]), rgb(frames["position"])
+    body = frames["depth"] < 1
+    lengths = np.linalg.norm(normal, axis=-1)
+    np.testing.assert_allclose(lengths[body], 1, atol=2 * HALF)
+    # What is seen faces the camera.
+    facing = (normal * position).sum(axis=-1)[body]
+    assert (facing < 0.05 * np.linalg.norm(position[body], axis=-1)).mean() > 0.99
+
+
+def test_a_body_is_drawn_as_it_is(renderer: Renderer) -> None:
+    colours = noise((8, 4))
+    wall = screen(colours, (8, 4))
+    assert wall.glow is not None
+    scene = Scene(body=wall.glow, camera=wall.camera)
+    shown = deferred(renderer, scene, None, (8, 4))
+    seen = colours.any(axis=2)
+    np.testing.assert_allclose(rgb(shown["albedo"]), colours, rtol=HALF, atol=1e-7)
+    np.testing.assert_allclose(rgb(shown["position"])[seen][:, 2], -DISTANCE, rtol=1e-3)
+    # Both windings of a square have the normal (0, 0, 1).
+    np.testing.assert_array_equal(rgb(shown["normal"])[seen], np.tile((0, 0, 1), (seen.sum(), 1)))
+    for name in ("normal", "position", "brightness"):
+        assert not rgb(shown[name])[~seen].any(), name
+
+
+def test_the_sky_is_neither_lit_nor_bright(renderer: Renderer, scene: Scene) -> None:
+    shown = deferred(renderer, Scene(body=NOTHING, skybox=scene.skybox))
+    forward = renderer.render(Scene(body=NOTHING, skybox=scene.skybox), None, SIZE)
+    assert forward["scene"][..., :3].std() > 1
+    np.testing.assert_allclose(
+        rgb(shown["albedo"]) * 255, rgb(forward["scene"]), atol=0.5 + 255 * HALF
+    )
+    np.testing.assert_array_equal(shown["scene"], shown["albedo"])
+    for name in ("normal", "position", "brightness", "bloom"):
+        assert not rgb(shown[name]).any(), name
+
+
+def test_nothing_at_all_is_black(renderer: Renderer) -> None:
+    shown = deferred(renderer, Scene(body=NOTHING))
+    for name in set(shown) - {"depth"}:
+        assert not rgb(shown[name]).any(), name
+    assert (shown["depth"] == 1).all()
+
+
+# Brightness
+
+
+def test_brightness_is_the_glow_mesh_as_the_forward_system_draws_it(
+    renderer: Renderer, scene: Scene
+) -> None:
+    settings = Separable(format="rgba16float", bloom_size=SIZE)
+    glow = renderer.render(scene, settings, SIZE, time=0.3)["glow"]
+    shown = deferred(renderer, scene, time=0.3)
+    assert rgb(glow).max() == 1
+    np.testing.assert_array_equal(shown["brightness"], glow)
+
+
+def test_brightness_is_rounded_to_the_nearest(renderer: Renderer) -> None:
+    colours = noise((16, 9))
+    shown = deferred(
+        renderer, dataclasses.replace(screen(colours, (16, 9)), glow_intensity=5), size=(16, 9)
+    )
+    np.testing.assert_allclose(rgb(shown["brightness"]), 5 * colours, rtol=1.01 * HALF, atol=1e-7)
+
+
+def test_materials_that_emit(renderer: Renderer, tmp_path: Path) -> None:
+    document = Document()
+    triangle = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [0.0, 3.0, 0.0]]
+    document.primitive(triangle, material=0)
+    document.json["extensionsUsed"] = ["KHR_materials_emissive_strength"]
+    document.json["materials"] = [
+        {
+            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]},
+            "emissiveFactor": [1.0, 0.5, 0.0],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8.0}},
+        }
+    ]
+    (tmp_path / "lamp.gltf").write_bytes(document.as_gltf())
+    camera = Camera(rotation=(0, 0, 0))
+    shown = deferred(renderer, Scene.from_gltf(tmp_path / "lamp.gltf", camera=camera))
+    body = shown["depth"] < 1
+    assert 0.01 < body.mean() < 0.9
+    np.testing.assert_array_equal(rgb(shown["brightness"]), body[..., np.newaxis] * (8.0, 4.0, 0.0))
+    np.testing.assert_array_equal(rgb(shown["albedo"]), body[..., np.newaxis] * (0.5, 0.25, 0.125))
+
+
+def test_the_glow_mesh_changes_nothing_but_the_brightness(
+    renderer: Renderer, scene: Scene, frames: Frames
+) -> None:
+    bare = deferred(renderer, dataclasses.replace(scene, glow=None))
+    for name in ("albedo", "normal", "position", "depth"):
+        np.testing.assert_array_equal(bare[name], frames[name])
+    assert not rgb(bare["brightness"]).any()
+    assert not rgb(bare["bloom"]).any()
+
+
+def test_the_body_does_not_hide_the_glow(renderer: Renderer, scene: Scene) -> None:
+    wall = screen(WHITE, SIZE)
+    assert wall.glow is not None
+    camera = Camera(position=(0, 1, -10.25), rotation=(0, 0, 0))
+    hidden, shown = (
+        deferred(renderer, Scene(body=body, glow=scene.glow, camera=camera))["brightness"]
+        for body in (wall.glow, scene.body)
+    )
+    assert rgb(hidden).any()
+    np.testing.assert_array_equal(hidden, shown)
+
+
+def test_what_the_body_emits_is_bright(renderer: Renderer) -> None:
+    colours = noise((16, 9))
+    wall = screen(colours, (16, 9))
+    assert wall.glow is not None
+    emission = np.ascontiguousarray(wall.glow.vertices[:, 6:] * np.float32(7))
+    body = dataclasses.replace(wall.glow, emission=emission)
+    shown = deferred(renderer, Scene(body=body, camera=wall.camera), None, (16, 9))
+    np.testing.assert_allclose(rgb(shown["brightness"]), 7 * colours, rtol=2 * HALF, atol=1e-6)
+    # With a glow mesh the two are added, with the bloom off the body's own light stays.
+    lit = Scene(body=body, glow=wall.glow, camera=wall.camera, glow_intensity=2)
+    both = deferred(renderer, lit, None, (16, 9))
+    np.testing.assert_allclose(rgb(both["brightness"]), 9 * colours, rtol=4 * HALF, atol=1e-6)
+    off = deferred(renderer, lit, Separable(bloom=False), (16, 9))
+    np.testing.assert_array_equal(off["brightness"], shown["brightness"])
+
+
+def test_emission_needs_the_nearest_surface(renderer: Renderer) -> None:
+    near, far = screen(WHITE, SIZE).glow, screen(WHITE, SIZE).glow
+    assert near is not None
+    assert far is not None
+    behind = far.vertices.copy()
+    behind[:, 2] -= 1.0
+    body = Mesh(
+        np.concatenate((near.vertices, behind)),
+        np.concatenate((near.indices, far.indices + np.uint32(len(near.vertices)))),
+        np.repeat(np.array([[0, 0, 0], [9, 9, 9]], np.float32), len(near.vertices), axis=0),
+    )
+    shown = deferred(renderer, Scene(body=body, camera=screen(WHITE, SIZE).camera))
+    # The wall behind is smaller on the screen than the one before it.
+    assert not rgb(shown["brightness"]).any()
+
+
+def test_emission_is_the_deferred_systems(renderer: Renderer, scene: Scene) -> None:
+    forward = renderer.render(scene, None, SIZE)
+    with_lamps = renderer.render(lamps(scene), None, SIZE)
+    for name, array in forward.items():
+        np.testing.assert_array_equal(array, with_lamps[name])
+
+
+@pytest.mark.parametrize("intensity", [7e4, 1e30, 1.7e308])
+def test_no_intensity_is_infinite(renderer: Renderer, scene: Scene, intensity: float) -> None:
+    shown = deferred(renderer, dataclasses.replace(scene, glow_intensity=intensity))
+    for name, array in shown.items():
+        assert np.isfinite(array).all(), name
+    assert shown["brightness"].max() == 65504
+
+
+def test_two_lights_are_no_infinite_one(renderer: Renderer) -> None:
+    wall = screen(WHITE, (16, 9))
+    assert wall.glow is not None
+    emission = np.full((len(wall.glow.vertices), 3), 3e38, np.float32)
+    body = dataclasses.replace(wall.glow, emission=emission)
+    scene = Scene(body=body, glow=wall.glow, camera=wall.camera, glow_intensity=1e9)
+    shown = deferred(renderer, scene, presets["deferred"], (16, 9))
+    for name, array in shown.items():
+        assert np.isfinite(array).all(), name
+    np.testing.assert_array_equal(rgb(shown["brightness"]), 65504)
+
+
+# What is made from the G-buffer
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.37, 0.81])
+def test_the_scene_is_the_references(renderer: Renderer, scene: Scene, turns: float) -> None:
+    for shown in (deferred(renderer, made, time=turns) for made in (scene, lamps(scene))):
+        gbuffer = (shown[name] for name in ("albedo", "normal", "position", "brightness"))
+        expected = reference.shade(*gbuffer)
+        error = np.abs(shown["scene"] - expected)
+        # Half of the last bit, and what the pow() of a highlight is off by on some devices.
+        assert (error <= HALF * np.abs(expected) + 1e-5).all(), error.max()
+        assert len(np.unique(np.round(expected, 2))) > 100
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Separable(),
+        presets["deferred"],
+        presets["deferred"].replace(bloom_scale=0.5),
+        Separable(threshold=1.2, bloom_size=(91, 57)),
+        Separable(threshold=1.2, knee=0.5),
+        Separable(format="rgba32float"),
+        Separable(format="rgba8unorm"),
+        Separable(direct=True, bloom_scale=0.25),
+        Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25))),
+        Pyramid(levels=5, firefly_filter=True),
+        DualKawase(threshold=0.5),
+        presets["bevy_natural"],
+        presets["unity_urp"],
+    ],
+)
+def test_bloom_and_final_are_the_references(
+    renderer: Renderer, scene: Scene, settings: Settings
+) -> None:
+    settings = settings.replace(tonemap="aces", encoding="srgb", exposure=-1.0)
+    shown = deferred(renderer, lamps(scene), settings)
+    expected = reference.apply(shown["brightness"], settings)
+    for name in set(expected) - {"glow", "final"}:
+        limit = tolerance(shown[name].dtype, expected[name], stages_of_8_bits=2)
+        assert_close(name, shown[name], expected[name], limit)
+    final = reference.composite(shown["scene"], shown["bloom"], settings, np.uint8)
+    assert np.abs(shown["final"] - np.round(255 * final)).max() <= 1
+
+
+def test_bloom_is_the_blurred_brightness(frames: Frames) -> None:
+    expected = reference.blur(frames["brightness"], Separable())
+    assert_close("bloom", frames["bloom"], expected, tolerance("float16", expected))
+
+
+@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
+@pytest.mark.parametrize(
+    "tonemap", ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
+)
+@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb"])
+def test_final_is_the_composite(
+    renderer: Renderer, scene: Scene, composite: Any, tonemap: Any, encoding: Any
+) -> None:
+    settings = Separable(
+        composite=composite, tonemap=tonemap, encoding=encoding, intensity=0.6, exposure=-0.5
+    )
+    shown = deferred(renderer, lamps(scene), settings)
+    expected = reference.composite(shown["scene"], shown["bloom"], settings, np.uint8)
+    assert np.abs(shown["final"] - np.round(255 * expected)).max() <= 1
+    assert (shown["final"][..., 3] == 255).all()
+
+
+# Against the forward system
+
+
+@pytest.mark.parametrize("size", [(320, 180), (1280, 720)])
+def test_without_bloom_both_systems_show_the_same(
+    renderer: Renderer, scene: Scene, size: tuple[int, int]
+) -> None:
+    forward = renderer.render(scene, Separable(bloom=False), size)
+    shown = deferred(renderer, scene, Separable(bloom=False), size)
+    similarity = structural_similarity(  # type: ignore[no-untyped-call]  # it has no types
+        rgb(forward["scene"]) / 255,
+        np.clip(rgb(shown["scene"]), 0, 1),
+        data_range=1,
+        channel_axis=2,
+    )
+    assert similarity >= 0.999
+    assert np.abs(rgb(forward["final"]) - rgb(shown["final"])).max() <= 1
+    np.testing.assert_array_equal(forward["depth"], shown["depth"])
+
+
+def test_a_lamp_is_one_in_both_systems(renderer: Renderer) -> None:
+    # 0.9 itself is a lamp, though the G-buffer's half floats hold 0.8999 for it.
+    colours = np.full((3, 3, 3), 0.2)
+    for channel in range(3):
+        colours[channel, :, channel] = (0.89, 0.9, 0.91)
+    wall = screen(colours, (3, 3))
+    assert wall.glow is not None
+    scene = Scene(body=wall.glow, camera=wall.camera)
+    shown = deferred(renderer, scene, None, (3, 3))
+    expected = reference.shade(*(shown[name] for name in GBUFFER[:4]))
+    np.testing.assert_allclose(rgb(shown["scene"]), expected[..., :3], rtol=HALF, atol=1e-5)
+    forward = rgb(renderer.render(scene, None, (3, 3))["scene"]) / 255
+    # Half a level, and what half floats round.
+    np.testing.assert_allclose(np.clip(rgb(shown["scene"]), 0, 1), forward, atol=1 / 255)
+
+
+# HDR
+
+
+def test_eight_times_white_is_eight_times_the_halo(renderer: Renderer) -> None:
+    point = np.zeros((9, 16, 3))
+    point[4, 8] = 1
+    settings = presets["deferred"].replace(blur_scale=4.0, tonemap="reinhard", encoding="gamma22")
+    white, bright = (
+        deferred(renderer, dataclasses.replace(screen(point, SIZE), glow_intensity=i), settings)
+        for i in (1, 8)
+    )
+    lit = rgb(white["bloom"]) > 1e-3
+    assert lit.mean() > 0.01
+    # Until the tone map in proportion, by the roundings of six passes to half.
+    np.testing.assert_allclose(rgb(bright["brightness"]), 8 * rgb(white["brightness"]))
+    np.testing.assert_allclose(rgb(bright["bloom"])[lit], 8 * rgb(white["bloom"])[lit], rtol=4e-3)
+    # After it brighter everywhere in the halo, less than in proportion, and wider.
+    before, after = (rgb(shown["final"])[lit] for shown in (white, bright))
+    assert (after > before).all()
+    assert (after < 8 * before).all()
+    width = [(rgb(shown["final"])[..., 0] > 32).any(axis=0).sum() for shown in (white, bright)]
+    assert width[1] > 1.1 * width[0]
+
+
+# The reference's light
+
+
+def test_shade_by_hand() -> None:
+    # The light straight above a point on the camera's axis, and a normal between the two: V, N and
+    # R lie so that R = V, the highlight's peak.
+    position = np.array([-5.0, -5.0, -10.0])
+    to_light, to_camera = np.array([0.0, 0.0, 1.0]), -position / math.sqrt(150)
+    half_way = (to_light + to_camera) / np.linalg.norm(to_light + to_camera)
+    n_l = float(half_way @ to_light)
+    brightness = np.array([0.5, 0.25, 0.0])
+    for colour, ambient in (([0.2, 0.4, 0.8], 0.0), ([0.2, 0.4, 0.9], 0.25)):
+        c = np.array(colour)
+        pixel = [array.reshape(1, 1, 3) for array in (c, 3 * half_way, position, brightness)]
+        expected = ambient * c + n_l * c + 0.75 + brightness
+        np.testing.assert_allclose(reference.shade(*pixel)[0, 0], [*expected, 1], rtol=1e-12)
+    # The highlight has no sign: R is the same for both.
+    turned = reference.shade(pixel[0], -pixel[1], pixel[2], pixel[3])[0, 0, :3]
+    np.testing.assert_allclose(turned, 0.25 * c + 0.75 + brightness, rtol=1e-12)
+    unlit = reference.shade(pixel[0], 0 * pixel[1], 0 * pixel[2], pixel[3])[0, 0, :3]
+    np.testing.assert_allclose(unlit, c + brightness, rtol=1e-12)
+
+
+def test_shade_takes_arrays_of_one_size() -> None:
+    one = np.zeros((2, 3, 4), np.float16)
+    with pytest.raises(ValueError, match=r"^position must have the albedo's height"):
+        reference.shade(one, one, np.zeros((3, 3, 4)), one)
+    with pytest.raises(TypeError, match=r"^normal must be"):
+        reference.shade(one, np.zeros((2, 3, 4), np.int64), one, one)
+    with pytest.raises(ValueError, match=r"^brightness must have 3 or 4 channels"):
+        reference.shade(one, one, one, np.zeros((2, 3, 2)))

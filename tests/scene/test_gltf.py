@@ -1,0 +1,756 @@
+"""Meshes from glTF: the rules of loading, damaged files, and files that point elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import json
+import math
+import struct
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from vkbloom.scene import Mesh, gltf_file
+from vkbloom.scene.gltf import load_mesh
+
+SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
+DTYPES = {FLOAT: "<f4", BYTE: "<u1", SHORT: "<u2", INT: "<u4"}
+TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+
+POSITIONS = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+NORMALS = [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
+
+
+class Document:
+    """A glTF document that grows by accessors; its one buffer is written as the test wants it."""
+
+    def __init__(self) -> None:
+        self.data = b""
+        self.json: dict[str, Any] = {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": []}],
+            "accessors": [],
+            "bufferViews": [],
+        }
+
+    def view(self, data: bytes, **more: Any) -> int:
+        self.data += bytes(-len(self.data) % 4)
+        self.json["bufferViews"].append(
+            {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data), **more}
+        )
+        self.data += data
+        return len(self.json["bufferViews"]) - 1
+
+    def accessor(self, values: Any, component: int = FLOAT, **more: Any) -> int:
+        array = np.asarray(values, DTYPES[component])
+        width = 1 if array.ndim == 1 else array.shape[1]
+        self.json["accessors"].append(
+            {
+                "bufferView": self.view(array.tobytes()),
+                "componentType": component,
+                "count": len(array),
+                "type": TYPES[width],
+                **more,
+            }
+        )
+        return len(self.json["accessors"]) - 1
+
+    def primitive(self, positions: Any = POSITIONS, **more: Any) -> dict[str, Any]:
+        primitive = {"attributes": {"POSITION": self.accessor(positions)}, **more}
+        self.json["meshes"][0]["primitives"].append(primitive)
+        return primitive
+
+    def as_gltf(self, uri: str | None = None) -> bytes:
+        uri = uri or "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
+        buffers = [{"byteLength": len(self.data), "uri": uri}]
+        return json.dumps({**self.json, "buffers": buffers}).encode()
+
+    def as_glb(self) -> bytes:
+        text = json.dumps({**self.json, "buffers": [{"byteLength": len(self.data)}]}).encode()
+        text += b" " * (-len(text) % 4)
+        data = self.data + bytes(-len(self.data) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        chunks += struct.pack("<I4s", len(data), b"BIN\0") + data
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+    def load(self, folder: Path) -> Mesh:
+        path = folder / "mesh.gltf"
+        path.write_bytes(self.as_gltf())
+        return load_mesh(path)
+
+
+def triangle() -> Document:
+    document = Document()
+    document.primitive(indices=document.accessor([0, 1, 2], SHORT))
+    return document
+
+
+def corners(mesh: Mesh) -> np.ndarray:
+    """Corner positions of each triangle, y up again: (t, 3, 3)."""
+    return mesh.vertices[mesh.indices, :3].reshape(-1, 3, 3) * (1.0, -1.0, 1.0)
+
+
+# Rules
+
+
+def nested() -> Document:
+    document = Document()
+    primitive = document.primitive(indices=document.accessor([0, 1, 2], BYTE), material=0)
+    primitive["attributes"]["NORMAL"] = document.accessor(NORMALS)
+    primitive["attributes"]["COLOR_0"] = document.accessor([[1.0, 0.5, 0.25]] * 3)
+    document.json["materials"] = [
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 1.0, 1.0]}}
+    ]
+    half = math.sqrt(0.5)
+    document.json["nodes"] = [
+        {"children": [1], "translation": [10, 20, 30], "scale": [2, 2, 2]},
+        {"mesh": 0, "rotation": [0, 0, half, half], "scale": [1, 3, 1]},
+    ]
+    return document
+
+
+# By hand: the child takes (x, y, z) to (-3y, x, z), the parent that to (10 - 6y, 20 + 2x, 30 + 2z),
+# and the loader negates y. The normal (0.6, 0.8, 0) becomes (-4.8, 1.2, 0) before it is
+# normalized: (-4, 1, 0) / sqrt(17).
+NESTED_VERTICES = [
+    [10, -22, 30, -4 / math.sqrt(17), -1 / math.sqrt(17), 0, 0.5, 0.25, 0.25],
+    [4, -20, 30, 0, 0, 1, 0.5, 0.25, 0.25],
+    [10, -20, 32, 0, -1, 0, 0.5, 0.25, 0.25],
+]
+
+
+def test_transforms_are_baked_colours_multiplied_and_y_negated(tmp_path: Path) -> None:
+    mesh = nested().load(tmp_path)
+    np.testing.assert_allclose(mesh.vertices, NESTED_VERTICES, atol=1e-6)
+    assert mesh.indices.tolist() == [0, 1, 2]
+    assert mesh.emission is None
+
+
+def test_a_matrix_is_column_major(tmp_path: Path) -> None:
+    document = nested()
+    document.json["nodes"] = [
+        {"mesh": 0, "matrix": [0, 2, 0, 0, -6, 0, 0, 0, 0, 0, 2, 0, 10, 20, 30, 1]}
+    ]
+    np.testing.assert_allclose(document.load(tmp_path).vertices, NESTED_VERTICES, atol=1e-6)
+
+
+@pytest.mark.parametrize("noise", [1e-17, 6e-8, -3e-6])
+def test_a_matrix_may_be_rounded(tmp_path: Path, noise: float) -> None:
+    # As exporters write that multiply single-precision matrices.
+    document = nested()
+    matrix = [0, 2, 0, noise, -6, 0, 0, -noise, 0, 0, 2, noise, 10, 20, 30, 1 + noise]
+    document.json["nodes"] = [{"mesh": 0, "matrix": matrix}]
+    np.testing.assert_allclose(document.load(tmp_path).vertices, NESTED_VERTICES, atol=1e-6)
+
+
+def test_colours_are_never_negative(tmp_path: Path) -> None:
+    document = triangle()
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["COLOR_0"] = document.accessor([[-1e-9, -1.0, 0.5]] * 3)
+    assert document.load(tmp_path).vertices[:, 6:].tolist() == [[0.0, 0.0, 0.5]] * 3
+
+
+@pytest.mark.parametrize("extras", [1, "by hand", [1, [2]], None, True, {"extras": [{}]}])
+def test_extras_may_be_anything_anywhere(tmp_path: Path, extras: Any) -> None:
+    document = nested()
+    file = tmp_path / "mesh.gltf"
+    file.write_bytes(document.as_gltf())
+    expected = load_mesh(file)
+    text = json.loads(document.as_gltf())
+    for path in places(text):
+        place: Any = text
+        for key in path:
+            place = place[key]
+        if isinstance(place, dict) and path[-1] != "attributes":
+            place["extras"] = extras
+    text["extras"] = extras
+    file.write_text(json.dumps(text))
+    np.testing.assert_array_equal(load_mesh(file).vertices, expected.vertices)
+
+
+def test_arrays_are_read_only_and_contiguous(tmp_path: Path) -> None:
+    mesh = triangle().load(tmp_path)
+    assert mesh.vertices.dtype == np.dtype(np.float32)
+    assert mesh.indices.dtype == np.dtype(np.uint32)
+    assert mesh.vertices.flags.c_contiguous
+    for array in (mesh.vertices, mesh.indices):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
+def test_no_material_and_no_colours_are_white(tmp_path: Path) -> None:
+    assert (triangle().load(tmp_path).vertices[:, 6:] == 1.0).all()
+
+
+def test_the_factor_is_the_colour_where_the_mesh_has_none(tmp_path: Path) -> None:
+    document = triangle()
+    document.json["meshes"][0]["primitives"][0]["material"] = 0
+    document.json["materials"] = [
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.25, 0.5, 0.75, 0.1]}}
+    ]
+    assert document.load(tmp_path).vertices[:, 6:].tolist() == [[0.25, 0.5, 0.75]] * 3
+
+
+def test_emission_is_factor_times_strength(tmp_path: Path) -> None:
+    document = triangle()
+    document.primitive(material=0)
+    document.json["extensionsUsed"] = ["KHR_materials_emissive_strength"]
+    document.json["extensionsRequired"] = ["KHR_materials_emissive_strength"]
+    document.json["materials"] = [
+        {
+            "emissiveFactor": [1.0, 0.5, 0.0],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8.0}},
+        }
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mesh = document.load(tmp_path)
+    assert mesh.emission is not None
+    assert mesh.emission.tolist() == [[0.0, 0.0, 0.0]] * 3 + [[8.0, 4.0, 0.0]] * 3
+
+
+def test_missing_normals_are_flat(tmp_path: Path) -> None:
+    # Two triangles share an edge; flat normals need corners of their own.
+    document = Document()
+    document.primitive(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        indices=document.accessor([0, 1, 2, 0, 3, 1], BYTE),
+    )
+    mesh = document.load(tmp_path)
+    # (1,0,0) x (0,1,0) = +z; (0,0,1) x (1,0,0) = +y, negated by the loader.
+    assert mesh.vertices[:, 3:6].tolist() == [[0, 0, 1]] * 3 + [[0, -1, 0]] * 3
+    assert mesh.indices.tolist() == [0, 1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize("with_normals", [False, True])
+def test_a_mirrored_node_reverses_the_winding(tmp_path: Path, with_normals: bool) -> None:
+    document = Document()
+    primitive = document.primitive([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    if with_normals:
+        primitive["attributes"]["NORMAL"] = document.accessor([[0, 0, 1]] * 3)
+    document.json["nodes"] = [{"mesh": 0, "scale": [-1, 1, 1]}]
+    mesh = document.load(tmp_path)
+    a, b, c = corners(mesh)[0]
+    # Seen from +z, where the normal points, the triangle is still counter-clockwise.
+    assert np.cross(b - a, c - a)[2] > 0
+    assert mesh.vertices[:, 3:6].tolist() == [[0, 0, 1]] * 3
+
+
+STRIP_POSITIONS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]]
+
+
+@pytest.mark.parametrize("indexed", [False, True])
+@pytest.mark.parametrize(
+    ("mode", "expected"),
+    [
+        (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]),
+        (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0]]),
+    ],
+)
+def test_strips_and_fans(
+    tmp_path: Path, mode: int, expected: list[list[int]], indexed: bool
+) -> None:
+    document = Document()
+    order = [4, 3, 2, 1, 0] if indexed else [0, 1, 2, 3, 4]
+    primitive = document.primitive([STRIP_POSITIONS[i] for i in order], mode=mode)
+    primitive["attributes"]["NORMAL"] = document.accessor([[0, 0, 1]] * 5)
+    if indexed:
+        primitive["indices"] = document.accessor(order, INT)
+    mesh = document.load(tmp_path)
+    np.testing.assert_array_equal(corners(mesh), np.array(STRIP_POSITIONS)[expected])
+
+
+@pytest.mark.parametrize("component", [BYTE, SHORT, INT])
+def test_index_types(tmp_path: Path, component: int) -> None:
+    document = Document()
+    document.primitive(indices=document.accessor([2, 1, 0], component))
+    np.testing.assert_array_equal(corners(document.load(tmp_path))[0], POSITIONS[::-1])
+
+
+@pytest.mark.parametrize(("component", "full"), [(BYTE, 255), (SHORT, 65535)])
+@pytest.mark.parametrize("width", [3, 4])
+def test_whole_number_colours(tmp_path: Path, component: int, full: int, width: int) -> None:
+    document = triangle()
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    values = [[full, 0, full // 5, full][:width]] * 3
+    attributes["COLOR_0"] = document.accessor(values, component, normalized=True)
+    colours = document.load(tmp_path).vertices[:, 6:]
+    np.testing.assert_allclose(colours, [[1.0, 0.0, 0.2]] * 3, rtol=1e-6)
+    document.json["accessors"][-1]["normalized"] = False
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*not normalized"):
+        document.load(tmp_path)
+
+
+def test_interleaved_attributes(tmp_path: Path) -> None:
+    document = Document()
+    rows = np.hstack((np.array(POSITIONS), np.array(NORMALS), np.full((3, 1), np.nan)))
+    view = document.view(rows.astype("<f4").tobytes(), byteStride=28)
+    shared = {"bufferView": view, "componentType": FLOAT, "count": 3, "type": "VEC3"}
+    document.json["accessors"] = [shared, {**shared, "byteOffset": 12}]
+    document.json["meshes"][0]["primitives"] = [{"attributes": {"POSITION": 0, "NORMAL": 1}}]
+    vertices = document.load(tmp_path).vertices[:, :6] * (1, -1, 1, 1, -1, 1)
+    np.testing.assert_allclose(vertices, np.hstack((POSITIONS, NORMALS)), atol=1e-7)
+
+
+@pytest.mark.parametrize("component", [BYTE, SHORT, INT])
+@pytest.mark.parametrize("with_base", [False, True])
+def test_sparse_accessors(tmp_path: Path, component: int, with_base: bool) -> None:
+    document = triangle()
+    accessor = document.json["accessors"][1]
+    assert accessor["type"] == "VEC3"
+    accessor["sparse"] = {
+        "count": 2,
+        "indices": {
+            "bufferView": document.view(np.array([0, 2], DTYPES[component]).tobytes()),
+            "componentType": component,
+        },
+        "values": {"bufferView": document.view(np.array([[5, 6, 7], [8, 9, 1]], "<f4").tobytes())},
+    }
+    if not with_base:
+        del accessor["bufferView"]
+    middle = POSITIONS[1] if with_base else [0, 0, 0]
+    assert corners(document.load(tmp_path))[0].tolist() == [[5, 6, 7], middle, [8, 9, 1]]
+
+
+def test_glb_and_outer_buffers_give_the_same_mesh(tmp_path: Path) -> None:
+    document = nested()
+    expected = document.load(tmp_path)
+    (tmp_path / "any.name").write_bytes(document.as_glb())
+    folder = tmp_path / "my parts"
+    folder.mkdir()
+    (folder / "a.bin").write_bytes(document.data + b"more")
+    (tmp_path / "outer.gltf").write_bytes(document.as_gltf("my%20parts/a.bin"))
+    for name in ("any.name", "outer.gltf"):
+        mesh = load_mesh(tmp_path / name)
+        np.testing.assert_array_equal(mesh.vertices, expected.vertices)
+        np.testing.assert_array_equal(mesh.indices, expected.indices)
+
+
+def test_the_default_scene_or_the_first_or_all_roots(tmp_path: Path) -> None:
+    document = triangle()
+    document.json["nodes"] = [
+        {"mesh": 0},
+        {"mesh": 0, "translation": [5, 0, 0]},
+        {"children": [3], "translation": [0, 0, 7]},
+        {"mesh": 0},
+    ]
+    document.json["scenes"] = [{"nodes": [0]}, {"nodes": [2, 1]}]
+    document.json["scene"] = 1
+    first_corners = corners(document.load(tmp_path))[:, 0].tolist()
+    assert first_corners == [[1, 0, 7], [6, 0, 0]]
+    del document.json["scene"]
+    assert corners(document.load(tmp_path))[:, 0].tolist() == [[1, 0, 0]]
+    del document.json["scenes"]
+    first_corners = corners(document.load(tmp_path))[:, 0].tolist()
+    assert first_corners == [[1, 0, 0], [6, 0, 0], [1, 0, 7]]
+
+
+def test_deep_nesting_needs_no_deep_stack(tmp_path: Path) -> None:
+    document = triangle()
+    depth = 5000
+    document.json["nodes"] = [
+        {"children": [i + 1], "translation": [0, 0, 1]} for i in range(depth)
+    ] + [{"mesh": 0}]
+    assert corners(document.load(tmp_path))[0, 0].tolist() == [1, 0, depth]
+
+
+def test_a_normal_without_length_stays_finite(tmp_path: Path) -> None:
+    document = triangle()
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["NORMAL"] = document.accessor([[0, 0, 0], [0, 0, 2], [3, 0, 0]])
+    assert document.load(tmp_path).vertices[:, 3:6].tolist() == [[0, -1, 0], [0, 0, 1], [1, 0, 0]]
+
+
+# What is left out
+
+
+def test_everything_left_out_is_named_in_one_warning(tmp_path: Path) -> None:
+    document = triangle()
+    document.primitive(mode=0)
+    document.primitive(mode=3)
+    document.primitive(material=0, targets=[{"POSITION": 0}])
+    document.json["meshes"][0]["primitives"].append({"attributes": {"NORMAL": 0}})
+    document.json["materials"] = [{"normalTexture": {"index": 0}, "alphaMode": "BLEND"}]
+    document.json["nodes"][0]["skin"] = 0
+    document.json["animations"] = [{"channels": [], "samplers": []}]
+    document.json["extensionsUsed"] = ["KHR_lights_punctual"]
+    with pytest.warns(UserWarning, match="left out") as caught:
+        mesh = document.load(tmp_path)
+    assert len(mesh.indices) == 6
+    assert len(caught) == 1
+    message = str(caught[0].message)
+    for part in (
+        "mesh.gltf",
+        "points",
+        "line strips",
+        "normal textures",
+        "'BLEND'",
+        "skins",
+        "morph targets",
+        "animations",
+        "KHR_lights_punctual",
+        "without positions",
+    ):
+        assert part in message
+
+
+def test_an_unknown_required_extension_is_refused(tmp_path: Path) -> None:
+    document = triangle()
+    document.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*KHR_draco_mesh_compression"):
+        document.load(tmp_path)
+
+
+def test_only_lines_is_no_mesh(tmp_path: Path) -> None:
+    document = Document()
+    document.primitive(mode=1)
+    with pytest.raises(ValueError, match=r"mesh\.gltf: has no triangles"):
+        document.load(tmp_path)
+
+
+def test_without_pygltflib_the_message_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pygltflib", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\["):
+        triangle().load(tmp_path)
+
+
+# Files that point elsewhere
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "../secret.bin",
+        "inner/../../secret.bin",
+        "inner/../inside.bin",
+        "..\\secret.bin",
+        "%2e%2e/secret.bin",
+        "..%2Fsecret.bin",
+        "/etc/hostname",
+        "%2Fetc%2Fhostname",
+        "\\\\server\\share\\a.bin",
+        "C:\\a.bin",
+        "C:/a.bin",
+        "file:///etc/hostname",
+        "FILE:a.bin",
+        "https://example.org/a.bin",
+        "a.bin%00",
+        "link.bin",
+        "linked/secret.bin",
+        ".",
+        "",
+    ],
+)
+def test_a_uri_does_not_leave_the_folder(tmp_path: Path, uri: str) -> None:
+    document = triangle()
+    folder = tmp_path / "model"
+    (folder / "inner").mkdir(parents=True)
+    (tmp_path / "secret.bin").write_bytes(document.data)
+    (folder / "inside.bin").write_bytes(document.data)
+    (folder / "link.bin").symlink_to(tmp_path / "secret.bin")
+    (folder / "linked").symlink_to(tmp_path)
+    text = json.loads(document.as_gltf("x"))
+    text["buffers"][0]["uri"] = uri
+    (folder / "mesh.gltf").write_text(json.dumps(text))
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*buffers\[0\]"):
+        load_mesh(folder / "mesh.gltf")
+
+
+def test_a_link_within_the_folder_is_followed(tmp_path: Path) -> None:
+    document = triangle()
+    (tmp_path / "real.bin").write_bytes(document.data)
+    (tmp_path / "link.bin").symlink_to("real.bin")
+    (tmp_path / "mesh.gltf").write_bytes(document.as_gltf("link.bin"))
+    assert len(load_mesh(tmp_path / "mesh.gltf").indices) == 3
+
+
+def test_a_link_that_loops_is_an_os_error(tmp_path: Path) -> None:
+    document = triangle()
+    (tmp_path / "loop.bin").symlink_to("loop.bin")
+    (tmp_path / "mesh.gltf").write_bytes(document.as_gltf("loop.bin"))
+    with pytest.raises(OSError, match=r"loop\.bin"):
+        load_mesh(tmp_path / "mesh.gltf")
+
+
+def test_missing_files_are_os_errors_that_name_them(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"gone\.gltf"):
+        load_mesh(tmp_path / "gone.gltf")
+    (tmp_path / "mesh.gltf").write_bytes(triangle().as_gltf("gone.bin"))
+    with pytest.raises(FileNotFoundError, match=r"mesh\.gltf.*gone\.bin"):
+        load_mesh(tmp_path / "mesh.gltf")
+
+
+# Damaged files
+
+
+def at(document: dict[str, Any], path: str, value: Any) -> None:
+    *parents, last = path.split(".")
+    place: Any = document
+    for key in parents:
+        place = place[int(key)] if isinstance(place, list) else place[key]
+    place[int(last) if isinstance(place, list) else last] = value
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("asset.version", "1.0", "glTF version"),
+        ("asset.minVersion", "2.1", "at least glTF"),
+        ("scene", 1, "index into scenes is 1"),
+        ("scenes.0.nodes", [9], "is 9"),
+        ("scenes.0.nodes", [0, 0], "twice"),
+        ("scenes.0.nodes", [1], "has a parent"),
+        ("nodes.1.children", [0], "cycle"),
+        ("nodes.1.children", [1], "child of both"),
+        ("nodes.1.mesh", 4, "index into meshes is 4"),
+        ("nodes.0.translation", [1, 2], "3 numbers"),
+        ("nodes.0.scale", [1, math.nan, 1], "out of range"),
+        ("nodes.0.scale", [1, 10**400, 1], "too large"),
+        ("nodes.1.rotation", [0, 0, 0, 0], "no length"),
+        ("nodes.0.matrix", [1.0] * 16, "both a matrix"),
+        ("nodes.0", {"matrix": [1.0] * 16}, "not affine"),
+        ("nodes.0", {"matrix": [*([0.0] * 15), 1.001]}, "not affine"),
+        ("scenes", [], "index into scenes is 0; there are none"),
+        ("nodes.0.scale", [2e38, 2e38, 2e38], "not finite"),
+        ("meshes.0.primitives", [], "no triangles"),
+        ("meshes.0.primitives.0.mode", 7, "mode is 7"),
+        ("meshes.0.primitives.0.mode", True, "whole number"),
+        ("meshes.0.primitives.0.indices", 99, "index into accessors is 99"),
+        ("meshes.0.primitives.0.indices", 1, "SCALAR"),
+        ("meshes.0.primitives.0.material", -1, "index into materials is -1"),
+        ("accessors.0.count", 2, "whole triangles"),
+        ("accessors.0.count", 4, "ends at byte 4"),
+        ("accessors.0.count", 10**12, "count is"),
+        ("accessors.0.count", 0, "count is 0"),
+        ("accessors.0.byteOffset", -1, "byteOffset is -1"),
+        ("accessors.0.componentType", 5120, "component type 5120"),
+        ("accessors.0.bufferView", None, "neither"),
+        ("accessors.1.type", "VEC2", "'VEC2'"),
+        ("accessors.2.count", 2, "2 entries for 3 vertices"),
+        ("bufferViews.1.buffer", 1, "index into buffers is 1"),
+        ("bufferViews.1.byteLength", 10**9, "byteLength is"),
+        ("bufferViews.1.byteOffset", 10**9, "byteOffset is"),
+        ("bufferViews.1.byteStride", 8, "byteStride is 8"),
+        ("bufferViews.1.byteStride", 16, "ends at byte 44"),
+        ("buffers.0.byteLength", 10**9, r"bytes of 1000000000"),
+        ("buffers.0.uri", "data:application/octet-stream;base64,AAAA", "has 3 bytes"),
+        ("buffers.0.uri", "data:application/octet-stream;base64,A*A=", "base64"),
+        ("buffers.0.uri", "data:application/octet-stream,AAAA", "not base64"),
+        ("buffers.0.uri", None, "binary chunk"),
+        ("materials.0.pbrMetallicRoughness.baseColorFactor", [1, 1, -1, 1], "out of range"),
+    ],
+)
+def test_damage_is_named(tmp_path: Path, path: str, value: Any, message: str) -> None:
+    text = json.loads(nested().as_gltf())
+    at(text, path, value)
+    file = tmp_path / "mesh.gltf"
+    file.write_text(json.dumps(text))
+    with pytest.raises(ValueError, match=rf"mesh\.gltf: .*{message}"):
+        load_mesh(file)
+
+
+@pytest.mark.parametrize("attribute", ["POSITION", "NORMAL", "COLOR_0"])
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_values_that_are_not_finite(tmp_path: Path, attribute: str, value: float) -> None:
+    document = nested()
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes[attribute] = document.accessor([[0, 0, 1], [0, value, 0], [0, 1, 0]])
+    with pytest.raises(ValueError, match=rf"mesh\.gltf: .*{attribute} holds NaN or infinity"):
+        document.load(tmp_path)
+
+
+def test_an_index_beyond_the_vertices(tmp_path: Path) -> None:
+    document = Document()
+    document.primitive(indices=document.accessor([0, 1, 3], BYTE))
+    with pytest.raises(ValueError, match=r"mesh\.gltf: .*index 3, but only 3 vertices"):
+        document.load(tmp_path)
+
+
+@pytest.mark.parametrize("places", [[2, 1], [1, 1], [1, 3]])
+def test_sparse_indices_that_do_not_ascend(tmp_path: Path, places: list[int]) -> None:
+    document = triangle()
+    document.json["accessors"][1]["sparse"] = {
+        "count": 2,
+        "indices": {"bufferView": document.view(bytes(places)), "componentType": BYTE},
+        "values": {"bufferView": document.view(bytes(24))},
+    }
+    with pytest.raises(ValueError, match=r"mesh\.gltf: .*do not ascend"):
+        document.load(tmp_path)
+
+
+def test_a_small_file_cannot_ask_for_any_amount_of_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document = triangle()
+    document.json["nodes"] = [{"mesh": 0} for _ in range(40)]
+    document.json["scenes"] = [{"nodes": list(range(40))}]
+    assert len(document.load(tmp_path).vertices) == 120
+    monkeypatch.setattr("vkbloom.scene.gltf.MAX_VERTICES", 119)
+    with pytest.raises(ValueError, match=r"mesh\.gltf: too large"):
+        document.load(tmp_path)
+    accessor = document.json["accessors"][1]
+    accessor["count"] = 3 * gltf_file.MAX_VERTICES + 1
+    with pytest.raises(ValueError, match=r"mesh\.gltf: .*count is"):
+        document.load(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"{", b"[]", b"null", b"5", b'{"asset": 3}', b"\xff\xfe", b"[" * 100000, b"glTF"],
+)
+def test_what_is_no_gltf(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "mesh.gltf"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"mesh\.gltf: "):
+        load_mesh(path)
+
+
+def load_or_refuse(path: Path, content: bytes) -> Mesh | None:
+    """Load; None if it is refused as it should be. Numeric warnings count as failures."""
+    path.write_bytes(content)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("error", RuntimeWarning)
+        try:
+            return load_mesh(path)
+        except (OSError, ValueError) as error:
+            message = str(error)
+    assert path.name in message
+    return None
+
+
+def test_a_glb_cut_anywhere_is_refused(tmp_path: Path) -> None:
+    whole = nested().as_glb()
+    path = tmp_path / "mesh.glb"
+    assert load_or_refuse(path, whole) is not None
+    for size in range(len(whole)):
+        assert load_or_refuse(path, whole[:size]) is None, size
+
+
+@pytest.mark.parametrize(("place", "message"), [(12, "chunk 0"), (8, "truncated"), (4, "version")])
+def test_a_glb_with_a_wrong_header(tmp_path: Path, place: int, message: str) -> None:
+    content = bytearray(nested().as_glb())
+    content[place : place + 4] = struct.pack("<I", 10**6)
+    path = tmp_path / "mesh.glb"
+    path.write_bytes(bytes(content))
+    with pytest.raises(ValueError, match=rf"mesh\.glb: .*{message}"):
+        load_mesh(path)
+
+
+@settings(
+    max_examples=1000,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(changes=st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1, max_size=4))
+def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[int, int]]) -> None:
+    content = bytearray(nested().as_glb())
+    for place, value in changes:
+        content[place % len(content)] = value
+    mesh = load_or_refuse(tmp_path / "mesh.glb", bytes(content))
+    if mesh is not None:
+        assert np.isfinite(mesh.vertices).all()
+
+
+ODD_VALUES: list[Any] = [
+    None, True, -1, 3, 2**31, 10**400, 0.5, math.nan, "", "VEC3",
+    [], [None], [0], ["a"], {}, {"indices": 0}, [1e300] * 3, [0.0] * 4,
+]  # fmt: skip
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """All paths into a JSON value."""
+    keys: list[Any] = []
+    if isinstance(value, dict):
+        keys = list(value)
+    elif isinstance(value, list):
+        keys = list(range(len(value)))
+    return [path] * bool(path) + [p for key in keys for p in places(value[key], (*path, key))]
+
+
+def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
+    document = nested()
+    document.json["accessors"][0]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": document.view(b"\0"), "componentType": BYTE},
+        "values": {"bufferView": document.view(b"\0")},
+    }
+    document.json["materials"][0]["extensions"] = {
+        "KHR_materials_emissive_strength": {"emissiveStrength": 2.0}
+    }
+    document.json["materials"][0]["emissiveFactor"] = [1.0, 1.0, 1.0]
+    document.json["extensionsUsed"] = ["KHR_materials_emissive_strength"]
+    document.json["nodes"].append({"matrix": np.eye(4).ravel().tolist(), "children": []})
+    original = json.loads(document.as_gltf())
+    path = tmp_path / "mesh.gltf"
+    assert load_or_refuse(path, json.dumps(original).encode()) is not None
+    refused = 0
+    for number, (*parents, last) in enumerate(places(original)):
+        # A third of the values at each place, another third at the next: all of them take long.
+        for value in ODD_VALUES[number % 3 :: 3]:
+            changed = copy.deepcopy(original)
+            place = changed
+            for key in parents:
+                place = place[key]
+            place[last] = value
+            refused += load_or_refuse(path, json.dumps(changed).encode()) is None
+    # Most of them break something; were all let through, the checks would be off.
+    assert refused > 400
+
+
+# The original meshes
+
+
+@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
+@pytest.mark.parametrize("name", ["retroufo", "retroufo_glow"])
+def test_the_original_meshes(name: str) -> None:
+    path = SEED_DATA / "retroufo" / f"{name}.gltf"
+    mesh = load_mesh(path)
+    text = json.loads(path.read_text())
+    counts = [
+        text["accessors"][primitive["indices"]]["count"]
+        for node in text["nodes"]
+        if "mesh" in node
+        for primitive in text["meshes"][node["mesh"]]["primitives"]
+    ]
+    assert len(mesh.indices) == sum(counts)
+    np.testing.assert_allclose(np.linalg.norm(mesh.vertices[:, 3:6], axis=1), 1.0, atol=1e-6)
+    factors = np.array(
+        [m["pbrMetallicRoughness"]["baseColorFactor"][:3] for m in text["materials"]], np.float32
+    )
+    used = np.unique(mesh.vertices[:, 6:], axis=0)
+    assert all((factors == colour).all(axis=1).any() for colour in used)
+
+
+@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
+def test_the_original_glow_mesh_lies_where_the_original_program_drew_it() -> None:
+    image_module = pytest.importorskip("skimage.io", reason="scikit-image is not installed")
+    drawn = image_module.imread(SEED_DATA / "seed_frames" / "glow.png")[..., :3].max(axis=2) > 0
+    case = json.loads((SEED_DATA / "seed_frames" / "case.json").read_text())
+    matrix = np.eye(4)
+    for name in ("proj", "view", "model"):
+        matrix = matrix @ np.reshape(case["matrices_column_major"][name], (4, 4)).T
+    mesh = load_mesh(SEED_DATA / "retroufo" / "retroufo_glow.gltf")
+    bright = mesh.vertices[mesh.vertices[:, 6:].max(axis=1) > 0]
+    clip = np.column_stack((bright[:, :3], np.ones(len(bright)))) @ matrix.T
+    pixels = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * drawn.shape[::-1]
+    rows, columns = np.nonzero(drawn)
+    # The light's cone leaves the picture at the bottom; at the other sides the outermost vertex
+    # lies within the outermost pixel or just beyond its centre.
+    assert abs(pixels[:, 1].min() - rows.min()) < 1.5
+    assert abs(pixels[:, 0].min() - columns.min()) < 1.5
+    assert abs(pixels[:, 0].max() - (columns.max() + 1)) < 1.5

@@ -1,0 +1,551 @@
+"""Textures from glTF: images wherever they lie, samplers, texture coordinates, damaged files."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import dataclasses
+import json
+import math
+import sys
+import warnings
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from numpy.typing import NDArray
+
+from tests.scene.test_gltf import (
+    BYTE,
+    FLOAT,
+    ODD_VALUES,
+    SHORT,
+    TYPES,
+    Document,
+    load_or_refuse,
+    places,
+)
+from tests.screens import CAMERA, panel
+from vkbloom import Renderer, Scene
+from vkbloom.io.srgb import decode_srgb
+from vkbloom.scene import Mesh, gltf_textures
+from vkbloom.scene.gltf import load_mesh
+from vkbloom.scene.textures import WHITE, Texture
+
+Array = NDArray[Any]
+HALF = 2.0**-11  # half of the last bit of a half float, relative
+
+TYPES[2] = "VEC2"
+CORNERS = [[-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]
+PLACES = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]
+FRONT = [0, 1, 2, 0, 2, 3]
+
+
+def encoded(pixels: Array, folder: Path, suffix: str = ".png", **attributes: Any) -> bytes:
+    """Return an image file of pixels (h, w, C), uint8 or uint16."""
+    path = folder / f"encoded{suffix}"
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], str(pixels.dtype))
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer is not None, oiio.geterror()
+    assert writer.open(str(path), spec), writer.geterror()
+    assert writer.write_image(np.ascontiguousarray(pixels)), writer.geterror()
+    writer.close()
+    data = path.read_bytes()
+    path.unlink()
+    return data
+
+
+def noise(width: int, height: int, channels: int = 3, dtype: str = "uint8") -> Array:
+    highest = np.iinfo(dtype).max
+    generator = np.random.default_rng((width, height, channels))
+    return generator.integers(0, highest, (height, width, channels), dtype, endpoint=True)
+
+
+def linear(pixels: Array) -> NDArray[np.float64]:
+    """Decode sRGB from its definition in IEC 61966-2-1, apart from vkbloom."""
+    encoded = pixels[..., :3] / np.iinfo(pixels.dtype).max
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
+
+def textured(image: dict[str, Any] | None = None, **texture: Any) -> Document:
+    """Return a square whose base colour has a texture; y is up in the file and down in the mesh."""
+    document = Document()
+    primitive = document.primitive(CORNERS, indices=document.accessor(FRONT, SHORT), material=0)
+    primitive["attributes"]["TEXCOORD_0"] = document.accessor(PLACES)
+    document.json["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    document.json["textures"] = [{"source": 0, **texture}]
+    document.json["images"] = [{"uri": "a.png"} if image is None else image]
+    return document
+
+
+def base(mesh: Mesh) -> Texture:
+    (surface,) = mesh.surfaces
+    return surface.base
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Callable[[Document], Mesh]:
+    """Loads a document as a file without a warning; "a.png" beside it is an image of 4 x 3."""
+
+    def load_it(document: Document) -> Mesh:
+        if not (tmp_path / "a.png").exists():
+            (tmp_path / "a.png").write_bytes(encoded(noise(4, 3), tmp_path))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return document.load(tmp_path)
+
+    return load_it
+
+
+Load = Callable[[Document], Mesh]
+
+
+# Images
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+def test_images_are_decoded_from_srgb(
+    load: Load, tmp_path: Path, channels: int, dtype: str
+) -> None:
+    pixels = noise(40, 30, channels, dtype)
+    # A file's own words on its colours do not count.
+    data = encoded(pixels, tmp_path, **{"oiio:ColorSpace": "lin_rec709_scene"})
+    (tmp_path / "a.png").write_bytes(data)
+    level = base(load(textured())).levels[0]
+    assert level.shape == (30, 40, 4)
+    colours = linear(pixels[..., :3] if channels > 2 else pixels[..., [0, 0, 0]])
+    np.testing.assert_allclose(level[..., :3], colours, rtol=1.01 * HALF, atol=1e-7)
+    assert (level[..., 3] == 1).all()
+
+
+def test_jpeg(load: Load, tmp_path: Path) -> None:
+    # Smooth, or compression would change much.
+    ramp = np.linspace(0, 255, 64).astype(np.uint8)
+    pixels = np.stack(np.broadcast_arrays(ramp, ramp[:, np.newaxis], np.uint8(100)), axis=-1)
+    data = encoded(pixels, tmp_path, ".jpg", Compression="jpeg:98", Orientation=6)
+    (tmp_path / "a b.jpg").write_bytes(data)
+    level = base(load(textured({"uri": "a%20b.jpg"}))).levels[0]
+    # Exif's orientation is no part of glTF: nothing is turned.
+    np.testing.assert_allclose(level[..., :3], linear(pixels), atol=0.04)
+
+
+def test_images_wherever_they_lie(load: Load, tmp_path: Path) -> None:
+    data = encoded(noise(5, 4), tmp_path)
+    (tmp_path / "a.png").write_bytes(data)
+    (tmp_path / "inner").mkdir()
+    # The name and the MIME type say nothing: the first bytes do.
+    (tmp_path / "inner" / "b.bin").write_bytes(data)
+    by_view = textured()
+    by_view.json["images"] = [{"bufferView": by_view.view(data), "mimeType": "image/jpeg"}]
+    (tmp_path / "mesh.glb").write_bytes(by_view.as_glb())
+    loaded = [
+        load(textured()),
+        load(textured({"uri": "inner/b.bin"})),
+        load(textured({"uri": "data:image/png;base64," + base64.b64encode(data).decode()})),
+        load(by_view),
+        load_mesh(tmp_path / "mesh.glb"),
+    ]
+    for mesh in loaded:
+        np.testing.assert_array_equal(base(mesh).levels[0], base(loaded[0]).levels[0])
+        assert mesh.texcoords is not None
+        np.testing.assert_array_equal(mesh.texcoords, loaded[0].texcoords)
+
+
+def test_an_image_is_read_once(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    document = textured()
+    second = document.primitive(CORNERS, material=1, indices=document.accessor(FRONT, BYTE))
+    second["attributes"]["TEXCOORD_0"] = document.accessor(PLACES)
+    document.json["materials"].append(
+        {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 1}}
+    )
+    document.json["textures"].append({"source": 0})
+    monkeypatch.setattr(gltf_textures, "MAX_TEXELS", 4 * 3)
+    first, last = load(document).surfaces
+    assert first.base is last.emission
+    assert first.emission is last.base is WHITE
+    # With another sampler it is another texture.
+    document.json["samplers"] = [{"wrapS": 33071}]
+    document.json["textures"][1]["sampler"] = 0
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*images\[0\].*too many"):
+        load(document)
+
+
+# What is drawn
+
+
+def test_factor_times_vertex_colour_times_texture(
+    renderer: Renderer, load: Load, tmp_path: Path
+) -> None:
+    size = (8, 6)
+    colours, lights = noise(*size), noise(4, 3)
+    (tmp_path / "a.png").write_bytes(encoded(colours, tmp_path))
+    (tmp_path / "b.png").write_bytes(encoded(lights, tmp_path))
+    document = textured(sampler=0)
+    wall = panel(size)
+    positions = wall.vertices[:, :3] * (1, -1, 1)
+    (primitive,) = document.json["meshes"][0]["primitives"]
+    attributes = primitive["attributes"]
+    attributes["POSITION"] = document.accessor(positions)
+    attributes["COLOR_0"] = document.accessor([[0.5, 1.0, 0.25]] * 4)
+    attributes["NORMAL"] = document.accessor([[0, 0, 1]] * 4)
+    assert wall.texcoords is not None
+    attributes["TEXCOORD_0"] = document.accessor(wall.texcoords[:, :2])
+    # Its own texture coordinates: upside down.
+    attributes["TEXCOORD_1"] = document.accessor(wall.texcoords[:, :2] * (1, -1))
+    primitive["indices"] = document.accessor(wall.indices, SHORT)
+    document.json["samplers"] = [{"magFilter": 9728, "minFilter": 9728}]
+    document.json["textures"].append({"source": 1, "sampler": 0})
+    document.json["images"].append({"uri": "b.png"})
+    material = document.json["materials"][0]
+    material["pbrMetallicRoughness"]["baseColorFactor"] = [1.0, 0.5, 0.125, 1.0]
+    material["emissiveFactor"] = [1.0, 0.5, 0.25]
+    material["emissiveTexture"] = {"index": 1, "texCoord": 1}
+    material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": 6.0}}
+    document.json["extensionsUsed"] = ["KHR_materials_emissive_strength"]
+    scene = Scene(body=load(document), camera=CAMERA)
+    shown = renderer.render(scene, None, size, shading="deferred")
+    expected = linear(colours) * (0.5, 0.5, 0.03125)
+    # The texture is rounded to half, and so is the product.
+    np.testing.assert_allclose(shown["albedo"][..., :3], expected, rtol=2.1 * HALF, atol=1e-7)
+    expected = linear(lights)[::-1].repeat(2, 0).repeat(2, 1) * (6.0, 3.0, 1.5)
+    np.testing.assert_allclose(shown["brightness"][..., :3], expected, rtol=2.1 * HALF, atol=1e-6)
+    # And the files' vertex colours and textures reach the forward system.
+    lit = renderer.render(scene, None, size)["scene"]
+    other = dataclasses.replace(scene, body=dataclasses.replace(scene.body, surfaces=()))
+    assert np.abs(lit.astype(int) - renderer.render(other, None, size)["scene"]).max() > 50
+
+
+def test_triangles_without_a_texture_come_first(load: Load) -> None:
+    document = textured()
+    document.primitive([[5.0, 0, 0], [6.0, 0, 0], [5.0, 1, 0]])
+    mesh = load(document)
+    (surface,) = mesh.surfaces
+    assert surface.index_count == 6
+    assert mesh.indices.tolist() == [6, 7, 8, 0, 1, 2, 3, 4, 5]
+    assert mesh.texcoords is not None
+    assert not mesh.texcoords[6:].any()
+
+
+def test_flat_normals_take_the_texture_coordinates_with_them(load: Load) -> None:
+    mesh = load(textured())
+    assert mesh.texcoords is not None
+    np.testing.assert_array_equal(mesh.texcoords[:, :2], np.array(PLACES)[FRONT])
+    # x = -1 is the left, y = 1 the top, which the mesh has at -1.
+    np.testing.assert_array_equal(mesh.vertices[:, :2] / 2 + 0.5, mesh.texcoords[:, :2])
+
+
+@pytest.mark.parametrize("factor", [None, [0.0, 0.0, 0.0]])
+def test_no_emission_needs_no_texture(load: Load, factor: Any) -> None:
+    document = textured()
+    del document.json["materials"][0]["pbrMetallicRoughness"]
+    document.json["materials"][0]["emissiveTexture"] = {"index": 0}
+    document.json["images"][0]["uri"] = "gone.png"
+    if factor is not None:
+        document.json["materials"][0]["emissiveFactor"] = factor
+    mesh = load(document)
+    assert mesh.emission is None
+    assert not mesh.surfaces
+
+
+# Samplers
+
+
+@pytest.mark.parametrize(
+    ("sampler", "address_mode", "filters", "levels"),
+    [
+        (None, ("repeat", "repeat"), ("linear", "linear", "linear"), 3),
+        ({}, ("repeat", "repeat"), ("linear", "linear", "linear"), 3),
+        ({"wrapS": 33071}, ("clamp-to-edge", "repeat"), ("linear", "linear", "linear"), 3),
+        ({"wrapT": 33648}, ("repeat", "mirror-repeat"), ("linear", "linear", "linear"), 3),
+        ({"magFilter": 9728}, ("repeat", "repeat"), ("nearest", "linear", "linear"), 3),
+        ({"minFilter": 9728}, ("repeat", "repeat"), ("linear", "nearest", "nearest"), 1),
+        ({"minFilter": 9729}, ("repeat", "repeat"), ("linear", "linear", "nearest"), 1),
+        ({"minFilter": 9984}, ("repeat", "repeat"), ("linear", "nearest", "nearest"), 3),
+        ({"minFilter": 9985}, ("repeat", "repeat"), ("linear", "linear", "nearest"), 3),
+        ({"minFilter": 9986}, ("repeat", "repeat"), ("linear", "nearest", "linear"), 3),
+        ({"minFilter": 9987}, ("repeat", "repeat"), ("linear", "linear", "linear"), 3),
+    ],
+)
+def test_samplers(
+    load: Load, sampler: Any, address_mode: Any, filters: tuple[str, ...], levels: int
+) -> None:
+    document = textured() if sampler is None else textured(sampler=0)
+    document.json["samplers"] = [sampler or {}]
+    made = base(load(document))
+    assert made.address_mode == address_mode
+    assert (made.mag_filter, made.min_filter, made.mipmap_filter) == filters
+    assert len(made.levels) == levels
+
+
+# Texture coordinates
+
+
+@pytest.mark.parametrize(("component", "full"), [(BYTE, 255), (SHORT, 65535)])
+def test_normalized_whole_numbers(load: Load, component: int, full: int) -> None:
+    document = textured()
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    places = np.array([[0, 0], [0, full], [full, full], [full // 3, 0]])
+    attributes["TEXCOORD_0"] = document.accessor(places, component, normalized=True)
+    mesh = load(document)
+    assert mesh.texcoords is not None
+    np.testing.assert_allclose(mesh.texcoords[:, :2], (places / full)[FRONT], atol=1e-7)
+    document.json["accessors"][-1]["normalized"] = False
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*TEXCOORD_0.*not normalized"):
+        load(document)
+
+
+def turned(offset: tuple[float, float], angle: float, scale: tuple[float, float]) -> Array:
+    """Scale, then turn counter-clockwise as one sees it with v down, then move."""
+    u, v = (np.array(PLACES) * scale).T
+    complex_places = (u - 1j * v) * np.exp(1j * angle)
+    return np.stack((complex_places.real + offset[0], -complex_places.imag + offset[1]), axis=1)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, PLACES),
+        ({"offset": [0.25, -3.0]}, turned((0.25, -3.0), 0, (1, 1))),
+        ({"scale": [2.0, -0.5]}, turned((0, 0), 0, (2, -0.5))),
+        ({"rotation": 0.3}, turned((0, 0), 0.3, (1, 1))),
+        (
+            {"offset": [0.1, 0.2], "rotation": -2.0, "scale": [3.0, 0.5]},
+            turned((0.1, 0.2), -2.0, (3.0, 0.5)),
+        ),
+        # The extension's example: the lower left quarter of the picture.
+        (
+            {"offset": [0, 1], "rotation": math.pi / 2, "scale": [0.5, 0.5]},
+            [[0, 1], [0.5, 1], [0.5, 0.5], [0, 0.5]],
+        ),
+    ],
+)
+def test_texture_transforms(load: Load, given: dict[str, Any], expected: Any) -> None:
+    document = textured()
+    info = document.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+    info["extensions"] = {"KHR_texture_transform": given}
+    document.json["extensionsUsed"] = ["KHR_texture_transform"]
+    document.json["extensionsRequired"] = ["KHR_texture_transform"]
+    mesh = load(document)
+    assert mesh.texcoords is not None
+    np.testing.assert_allclose(mesh.texcoords[:, :2], np.array(expected)[FRONT], atol=1e-6)
+
+
+@pytest.mark.parametrize("place", [1, 3])
+def test_other_sets_of_texture_coordinates(load: Load, place: int) -> None:
+    document = textured()
+    info = document.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+    info["texCoord"] = place
+    others = np.array(PLACES) * 0.5
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes[f"TEXCOORD_{place}"] = document.accessor(others)
+    mesh = load(document)
+    assert mesh.texcoords is not None
+    np.testing.assert_allclose(mesh.texcoords[:, :2], others[FRONT])
+    # The transform's own number goes before it.
+    info["extensions"] = {"KHR_texture_transform": {"texCoord": 0}}
+    document.json["extensionsUsed"] = ["KHR_texture_transform"]
+    mesh = load(document)
+    assert mesh.texcoords is not None
+    np.testing.assert_allclose(mesh.texcoords[:, :2], np.array(PLACES)[FRONT])
+
+
+# What is left out, and what is wrong
+
+
+def test_other_textures_are_named(load: Load, tmp_path: Path) -> None:
+    document = textured()
+    material = document.json["materials"][0]
+    material["normalTexture"] = {"index": 0}
+    material["occlusionTexture"] = {"index": 0}
+    material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {"index": 0}
+    material["emissiveFactor"] = [1.0, 1.0, 1.0]
+    material["emissiveTexture"] = {"index": 1}
+    document.json["textures"].append({"extensions": {"KHR_texture_basisu": {"source": 0}}})
+    document.json["extensionsUsed"] = ["KHR_texture_basisu"]
+    (tmp_path / "a.png").write_bytes(encoded(noise(4, 3), tmp_path))
+    with pytest.warns(UserWarning, match="left out") as caught:
+        mesh = document.load(tmp_path)
+    assert len(caught) == 1
+    for part in (
+        "metallic-roughness textures",
+        "normal textures",
+        "occlusion textures",
+        "whose image only an extension gives",
+        "extension KHR_texture_basisu",
+    ):
+        assert part in str(caught[0].message)
+    assert base(mesh) is not WHITE
+
+
+MATERIAL = ("materials", 0, "pbrMetallicRoughness")
+INFO = (*MATERIAL, "baseColorTexture")
+ATTRIBUTES = ("meshes", 0, "primitives", 0, "attributes")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ((*INFO, "index"), 1, r"index into textures is 1; 0\.\.0"),
+        ((*INFO, "index"), -1, r"index into textures"),
+        ((*INFO, "texCoord"), -1, r"baseColorTexture\.texCoord"),
+        ((*INFO, "texCoord"), 1, r"has no TEXCOORD_1.*materials\[0\]"),
+        (INFO, 5, "not a glTF 2.0 document"),
+        ((*INFO, "extensions"), {"KHR_texture_transform": 5}, "KHR_texture_transform is no object"),
+        ((*INFO, "extensions"), {"KHR_texture_transform": {"scale": [1]}}, "scale"),
+        ((*INFO, "extensions"), {"KHR_texture_transform": {"rotation": "a"}}, "rotation"),
+        ((*INFO, "extensions"), {"KHR_texture_transform": {"texCoord": 0.5}}, "texCoord"),
+        (
+            (*INFO, "extensions"),
+            {"KHR_texture_transform": {"scale": [3e38, 1], "offset": [3e38, 0]}},
+            "not finite",
+        ),
+        (("textures", 0, "source"), 1, r"textures\[0\]: index into images is 1"),
+        (("textures", 0, "sampler"), 0, r"textures\[0\]: index into samplers"),
+        (("images", 0), {}, r"images\[0\] needs either a URI or a bufferView"),
+        (("images", 0), {"uri": "a.png", "bufferView": 0}, r"images\[0\] needs either"),
+        (("images", 0), {"bufferView": 0}, r"images\[0\] is neither PNG nor JPEG"),
+        (("images", 0), {"bufferView": 99}, r"index into bufferViews is 99"),
+        (("images", 0, "uri"), "data:image/png;base64,%", "base64"),
+        (("images", 0, "uri"), "data:image/png,", "base64"),
+        (("images", 0, "uri"), "mesh.gltf", r"images\[0\] is neither PNG nor JPEG"),
+        (("images", 0, "uri"), "https://example.org/a.png", r"images\[0\].*scheme"),
+        (("images", 0, "uri"), "../a.png", r"images\[0\].*leads out"),
+        (("images", 0, "uri"), "/a.png", r"images\[0\].*leads out"),
+        (("images", 0, "uri"), "link.png", r"images\[0\].*leads out"),
+        (("images", 0, "uri"), ".", r"images\[0\].*is no file"),
+        ((*ATTRIBUTES, "TEXCOORD_0"), 99, r"index into accessors is 99"),
+        ((*ATTRIBUTES, "TEXCOORD_0"), 0, "SCALAR.*VEC2"),
+        ((*ATTRIBUTES, "TEXCOORD_0"), 1, "VEC3.*VEC2"),
+        (("samplers",), [{"wrapS": 10496}], r"samplers\[0\]\.wrapS is 10496; 33071, 33648, 10497"),
+        (("samplers",), [{"magFilter": 9987}], r"magFilter is 9987; 9728, 9729"),
+        (("samplers",), [{"minFilter": 1}], r"minFilter is 1"),
+    ],
+)
+def test_damage_is_named(tmp_path: Path, path: Any, value: Any, message: str) -> None:
+    folder = tmp_path / "model"
+    folder.mkdir()
+    document = textured()
+    (folder / "a.png").write_bytes(encoded(noise(4, 3), folder))
+    (tmp_path / "a.png").write_bytes((folder / "a.png").read_bytes())
+    (folder / "link.png").symlink_to(tmp_path / "a.png")
+    if path == ("samplers",):
+        document.json["textures"][0]["sampler"] = 0
+    place: Any = document.json
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    with pytest.raises(ValueError, match=rf"mesh\.gltf.*{message}"):
+        document.load(folder)
+
+
+def test_a_missing_image_is_an_os_error_that_names_it(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"images\[0\] of .*mesh\.gltf.*a\.png"):
+        textured().load(tmp_path)
+
+
+def test_too_few_texture_coordinates(load: Load) -> None:
+    document = textured()
+    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["TEXCOORD_0"] = document.accessor(PLACES[:3])
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*TEXCOORD_0 has 3 entries for 4 vertices"):
+        load(document)
+    attributes["TEXCOORD_0"] = document.accessor([*PLACES[:3], [np.nan, 0]])
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*TEXCOORD_0 holds NaN"):
+        load(document)
+    attributes["TEXCOORD_0"] = document.accessor(PLACES, FLOAT, type="SCALAR")
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*'SCALAR'.*VEC2"):
+        load(document)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_an_image_cut_anywhere_is_refused(tmp_path: Path, suffix: str) -> None:
+    data = encoded(noise(16, 16), tmp_path, suffix)
+    for length in [*range(0, len(data) // 2, len(data) // 12), len(data) - 40]:
+        (tmp_path / "a.png").write_bytes(data[:length])
+        with pytest.raises(ValueError, match=r"mesh\.gltf: images\[0\]") as caught:
+            textured().load(tmp_path)
+        assert "vkbloom-" not in str(caught.value)
+
+
+def huge_png(width: int, height: int) -> bytes:
+    """Return a PNG whose header promises more than it holds."""
+    header = width.to_bytes(4, "big") + height.to_bytes(4, "big") + b"\x08\x02\0\0\0"
+    data = b"\x89PNG\r\n\x1a\n"
+    for kind, body in ((b"IHDR", header), (b"IDAT", zlib.compress(b"\0" * 99)), (b"IEND", b"")):
+        data += len(body).to_bytes(4, "big") + kind + body
+        data += zlib.crc32(kind + body).to_bytes(4, "big")
+    return data
+
+
+@pytest.mark.parametrize("size", [(16385, 1), (1, 16385), (12000, 12000), (2**20, 2**20)])
+def test_huge_images_are_refused_by_their_header(tmp_path: Path, size: tuple[int, int]) -> None:
+    (tmp_path / "a.png").write_bytes(huge_png(*size))
+    with pytest.raises(ValueError, match=r"mesh\.gltf: images\[0\]"):
+        textured().load(tmp_path)
+
+
+def test_an_image_file_that_is_too_long(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vkbloom.scene.gltf_file._MAX_IMAGE_BYTES", 10)
+    with pytest.raises(ValueError, match=r"mesh\.gltf.*images\[0\].*too many"):
+        load(textured())
+
+
+def test_without_openimageio_the_message_says_what_to_install(
+    load: Load, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load(textured())
+    monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+    with pytest.raises(ModuleNotFoundError, match=r"textures.*pip install vkbloom\[images\]"):
+        load(textured())
+
+
+def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
+    document = textured(sampler=0)
+    data = encoded(noise(4, 3), tmp_path)
+    document.json["images"] = [{"bufferView": document.view(data), "mimeType": "image/png"}]
+    document.json["samplers"] = [
+        {"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9986}
+    ]
+    material = document.json["materials"][0]
+    transform = {"offset": [0.0, 1.0], "rotation": 0.5, "scale": [2.0, 2.0], "texCoord": 0}
+    material["emissiveTexture"] = {
+        "index": 0,
+        "texCoord": 0,
+        "extensions": {"KHR_texture_transform": transform},
+    }
+    material["emissiveFactor"] = [1.0, 1.0, 1.0]
+    document.json["extensionsUsed"] = ["KHR_texture_transform"]
+    original = json.loads(document.as_gltf())
+    path = tmp_path / "mesh.gltf"
+    assert load_or_refuse(path, json.dumps(original).encode()) is not None
+    refused = 0
+    tops = ("materials", "textures", "images", "samplers")
+    chosen = [keys for keys in places(original) if keys[0] in tops]
+    for number, (*parents, last) in enumerate(chosen):
+        # Half of the values at each place, the other half at the next.
+        for value in ODD_VALUES[number % 2 :: 2]:
+            changed = copy.deepcopy(original)
+            place = changed
+            for key in parents:
+                place = place[key]
+            place[last] = value
+            refused += load_or_refuse(path, json.dumps(changed).encode()) is None
+    # Most of them break something; were all let through, the checks would be off.
+    assert refused > 100
+
+
+def test_decoding_is_the_curves_definition() -> None:
+    values = np.arange(65536) / 65535
+    np.testing.assert_allclose(
+        decode_srgb(values),
+        linear(np.arange(65536, dtype=np.uint16)[:, np.newaxis])[:, 0],
+        atol=1e-12,
+    )

@@ -1,0 +1,428 @@
+"""Frames of the forward system: against the original's, and what holds between framebuffers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from numpy.typing import NDArray
+from skimage.metrics import structural_similarity
+
+import vkbloom
+from tests.screens import noise, screen
+from vkbloom import Camera, Renderer, Scene, Separable, reference
+from vkbloom.scene import Mesh
+from vkbloom.scene.skybox import Cubemap
+
+SIZE = (320, 180)
+FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]
+
+
+def levels_apart(image: NDArray[np.uint8], expected: NDArray[Any]) -> int:
+    """Return the largest difference, in levels, of an 8-bit image from another."""
+    return int(np.abs(image.astype(int) - expected.astype(int)).max())
+
+
+def rgb(image: NDArray[Any]) -> NDArray[Any]:
+    return image[..., :3]
+
+
+# The original's frames
+
+
+@pytest.mark.parametrize("name", ["glow", "blur_vertical", "final"])
+def test_the_originals_frames(renderer: Renderer, shared_data: Path, name: str) -> None:
+    case = json.loads((shared_data / "seed_frames" / "case.json").read_text())
+    meshes = shared_data / "retroufo"
+    scene = Scene.from_gltf(
+        meshes / "retroufo.gltf",
+        glow=meshes / "retroufo_glow.gltf",
+        skybox=meshes / "cubemap_space.ktx",
+    )
+    settings = Separable(
+        bloom=case["bloom"], blur_scale=case["blur_scale"], blur_strength=case["blur_strength"]
+    )
+    frames = renderer.render(scene, settings, tuple(case["size"]), time=case["time"])
+    stored = oiio.ImageBuf(str(shared_data / "seed_frames" / f"{name}.png"))
+    expected = np.asarray(stored.get_pixels(oiio.UINT8))[..., :3]
+    image = rgb(frames[name])
+    assert image.shape == expected.shape
+    assert expected.max() > 200
+    similarity = structural_similarity(  # type: ignore[no-untyped-call]  # it has no types
+        image, expected, data_range=255, channel_axis=2
+    )
+    assert similarity >= 0.999
+    apart = np.abs(image.astype(int) - expected).max(axis=2)
+    assert (apart <= 2).mean() >= 0.995
+
+
+# Framebuffers
+
+
+@pytest.mark.parametrize(
+    ("format", "dtype"),
+    [
+        (None, "uint8"),
+        ("rgba8unorm", "uint8"),
+        ("rgba16float", "float16"),
+        ("rgba32float", "float32"),
+    ],
+)
+def test_names_shapes_and_dtypes(renderer: Renderer, scene: Scene, format: Any, dtype: str) -> None:
+    frames = renderer.render(scene, Separable(format=format, bloom_size=(40, 24)), (64, 36))
+    assert [(name, array.shape, array.dtype.name) for name, array in frames.items()] == [
+        ("glow", (24, 40, 4), dtype),
+        ("glow_depth", (24, 40), "float32"),
+        ("blur_vertical", (24, 40, 4), dtype),
+        ("bloom", (36, 64, 4), dtype),
+        ("scene", (36, 64, 4), "uint8"),
+        ("depth", (36, 64), "float32"),
+        ("final", (36, 64, 4), "uint8"),
+    ]
+    for array in frames.values():
+        assert type(array) is np.ndarray
+        assert array.flags.c_contiguous
+        assert array.flags.owndata
+        assert array.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("settings", "bloom_size"),
+    [
+        (Separable(), (256, 256)),
+        (Separable(bloom_scale=0.5), (160, 90)),
+        (Separable(bloom_scale=0.333), (106, 59)),
+        (Separable(bloom_scale=0.001), (1, 1)),
+        (Separable(bloom_size=(31, 7)), (31, 7)),
+        (Separable(bloom_size=(31, 7), bloom_scale=0.5), (31, 7)),
+    ],
+)
+def test_the_size_of_the_bloom_buffers(
+    renderer: Renderer, scene: Scene, settings: Separable, bloom_size: tuple[int, int]
+) -> None:
+    frames = renderer.render(scene, settings, SIZE)
+    for name in ("glow", "glow_depth", "blur_vertical"):
+        assert frames[name].shape[1::-1] == bloom_size
+    assert frames["bloom"].shape[1::-1] == SIZE
+
+
+def test_the_default_is_the_tutorial_at_1280_x_720(renderer: Renderer, scene: Scene) -> None:
+    frames = renderer.render(scene)
+    assert list(frames) == FORWARD
+    assert frames["final"].shape == (720, 1280, 4)
+    assert frames.settings == Separable() == vkbloom.presets["tutorial"]
+
+
+def test_without_bloom(renderer: Renderer, scene: Scene) -> None:
+    with_bloom = renderer.render(scene, None, SIZE)
+    frames = renderer.render(scene, Separable(bloom=False), SIZE)
+    assert list(frames) == ["scene", "depth", "final"]
+    np.testing.assert_array_equal(frames["scene"], with_bloom["scene"])
+    np.testing.assert_array_equal(frames["final"], frames["scene"])
+
+
+def test_direct_has_no_vertical_pass(renderer: Renderer, scene: Scene) -> None:
+    frames = renderer.render(scene, Separable(direct=True), SIZE)
+    assert list(frames) == [name for name in FORWARD if name != "blur_vertical"]
+
+
+def test_the_saucer_fills_the_framebuffers(renderer: Renderer, scene: Scene) -> None:
+    frames = renderer.render(scene, None, SIZE)
+    for name in ("glow", "blur_vertical", "bloom", "scene", "final"):
+        assert (frames[name][..., 3] == 255).all()
+        assert rgb(frames[name]).max() > 100
+        assert rgb(frames[name]).std() > 10
+    for name in ("depth", "glow_depth"):
+        assert frames[name].max() == 1.0
+        assert 0.0 < frames[name].min() < 1.0
+    # The glow is there, and only there, where the depth of its buffer was written.
+    assert ((frames["glow_depth"] < 1) >= (rgb(frames["glow"]) > 0).any(axis=2)).all()
+
+
+def test_whole_turns_change_nothing(renderer: Renderer, scene: Scene) -> None:
+    # Of the last one 32 bits do not hold the quarter.
+    first, second, third, other, late = (
+        renderer.render(scene, None, SIZE, time=turns)
+        for turns in (0.0, 1.0, -12345.0, 0.25, 2.0**40 + 0.25)
+    )
+    for name in FORWARD:
+        np.testing.assert_array_equal(first[name], second[name])
+        np.testing.assert_array_equal(first[name], third[name])
+        assert not np.array_equal(first[name], other[name])
+        np.testing.assert_array_equal(other[name], late[name])
+
+
+@pytest.mark.parametrize(("near", "far"), [(6.0, 256.0), (50.0, 1e5), (1e-4, 3.0)])
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_no_clip_plane_cuts_the_sky(
+    renderer: Renderer, scene: Scene, shading: Any, near: float, far: float
+) -> None:
+    # Moved far behind the camera: nothing but sky.
+    behind = Camera(position=(0.0, 0.0, 1e4))
+    cut = dataclasses.replace(behind, near=near, far=far)
+    settings = Separable(bloom=False)
+    whole, other = (
+        renderer.render(scene.with_camera(camera), settings, SIZE, shading=shading)["scene"]
+        for camera in (behind, cut)
+    )
+    assert rgb(whole).any()
+    np.testing.assert_array_equal(other, whole)
+
+
+@pytest.mark.parametrize(
+    ("side", "level"), [(128, 0.0), (48, math.log2(64 / 48)), (23, math.log2(64 / 23))]
+)
+def test_a_small_frame_sees_the_skys_mip_levels(
+    renderer: Renderer, scene: Scene, side: int, level: float
+) -> None:
+    # Each level has its number as its colour, and one face of 64 texels fills the frame.
+    levels = [
+        np.full((6, 64 >> number, 64 >> number, 4), number, np.float32) for number in range(3)
+    ]
+    camera = Camera(position=(0.0, 0.0, 1e4), rotation=(0.0, 0.0, 0.0), fov=90.0)
+    sky = dataclasses.replace(scene, skybox=Cubemap(tuple(levels)), camera=camera)
+    seen = renderer.render(sky, Separable(bloom=False), (side, side), shading="deferred")["albedo"]
+    # Linear between levels; devices approximate which, lavapipe to 0.04 here.
+    np.testing.assert_allclose(rgb(seen), level, atol=0.1)
+
+
+def test_no_sky_is_black(renderer: Renderer, scene: Scene) -> None:
+    bare = Scene(body=scene.body, glow=scene.glow)
+    frames = renderer.render(bare, None, SIZE)
+    sky = frames["depth"] == 1.0
+    assert sky.any()
+    assert not rgb(frames["scene"])[sky].any()
+    assert rgb(renderer.render(scene, None, SIZE)["scene"])[sky].any()
+
+
+def test_no_glow_is_no_bloom(renderer: Renderer, scene: Scene) -> None:
+    frames = renderer.render(Scene(body=scene.body, skybox=scene.skybox), None, SIZE)
+    assert list(frames) == FORWARD
+    assert not rgb(frames["glow"]).any()
+    assert not rgb(frames["bloom"]).any()
+    assert (frames["glow_depth"] == 1.0).all()
+    np.testing.assert_array_equal(frames["final"], frames["scene"])
+
+
+def test_the_body_does_not_hide_the_glow(renderer: Renderer, scene: Scene) -> None:
+    # A body over all of the screen, nearer than the glow.
+    wall = screen(np.ones((1, 1, 3)), SIZE)
+    assert wall.glow is not None
+    near = Camera(position=(0, 1, -10.25), rotation=(0, 0, 0))
+    hidden = Scene(body=wall.glow, glow=scene.glow, camera=near)
+    shown = Scene(body=scene.body, glow=scene.glow, camera=near)
+    glow = renderer.render(hidden, None, SIZE, attachments="glow")["glow"]
+    assert rgb(glow).any()
+    np.testing.assert_array_equal(
+        glow, renderer.render(shown, None, SIZE, attachments="glow")["glow"]
+    )
+
+
+def test_of_two_surfaces_in_one_place_the_later_is_seen(renderer: Renderer) -> None:
+    # The depth test is LESS_OR_EQUAL in the forward system.
+    first, second = (screen(colour * np.ones((1, 1, 3)), SIZE).glow for colour in (0.25, 0.5))
+    assert first is not None
+    assert second is not None
+    both = Mesh(
+        np.concatenate((first.vertices, second.vertices)),
+        np.concatenate((first.indices, second.indices + np.uint32(len(first.vertices)))),
+    )
+    camera = screen(np.ones((1, 1, 3)), SIZE).camera
+    seen, alone = (
+        renderer.render(Scene(body=mesh, glow=mesh, camera=camera), None, SIZE)
+        for mesh in (both, second)
+    )
+    for name in ("glow", "scene"):
+        assert rgb(alone[name]).any()
+        np.testing.assert_array_equal(seen[name], alone[name], err_msg=name)
+
+
+def test_depth_is_what_the_projection_says(renderer: Renderer) -> None:
+    # A wall 10 units away, near 0.1, far 256: far (d - near) / (d (far - near)), depth 0..1.
+    expected = 256 * (10 - 0.1) / (10 * (256 - 0.1))
+    frames = renderer.render(screen(np.ones((1, 1, 3)), SIZE), None, SIZE)
+    np.testing.assert_allclose(frames["glow_depth"], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("format", ["rgba8unorm", "rgba32float"])
+def test_a_screen_is_the_glow_that_it_is_made_from(renderer: Renderer, format: Any) -> None:
+    image = noise((37, 23))
+    settings = Separable(format=format, bloom_size=(37, 23))
+    glow = renderer.render(screen(image, (64, 36)), settings, (64, 36))["glow"]
+    if format == "rgba8unorm":
+        assert levels_apart(rgb(glow), np.round(image * 255)) == 0
+    else:
+        np.testing.assert_allclose(rgb(glow), image, atol=1e-6)
+
+
+# The threshold of the glow
+
+
+def luminance(image: NDArray[Any]) -> NDArray[Any]:
+    result: NDArray[Any] = image @ (0.2126, 0.7152, 0.0722)
+    return result
+
+
+def test_the_hard_threshold(renderer: Renderer) -> None:
+    image = noise((37, 23), 4.0)
+    settings = Separable(threshold=1.0, format="rgba32float", bloom_size=(37, 23))
+    glow = rgb(renderer.render(screen(image, (64, 36)), settings, (64, 36))["glow"])
+    passes = (luminance(image) > 1.0)[..., np.newaxis]
+    assert 0.1 < passes.mean() < 0.9
+    np.testing.assert_allclose(glow, image * passes, rtol=1e-5, atol=1e-6)
+
+
+def test_the_soft_threshold(renderer: Renderer) -> None:
+    image = noise((37, 23), 4.0)
+    threshold, knee = 1.5, 0.5
+    settings = Separable(threshold=threshold, knee=knee, format="rgba32float", bloom_size=(37, 23))
+    glow = rgb(renderer.render(screen(image, (64, 36)), settings, (64, 36))["glow"])
+    brightest = image.max(axis=2, keepdims=True)
+    k = threshold * knee
+    q = np.clip(brightest - threshold + k, 0, 2 * k) ** 2 / (4 * k + 1e-5)
+    factor = np.maximum(q, brightest - threshold) / np.maximum(brightest, 1e-5)
+    assert len(np.unique(np.round(factor, 3))) > 50
+    np.testing.assert_allclose(glow, image * factor, rtol=1e-5, atol=1e-5)
+
+
+# The composite
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.37, 0.81])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Separable(),
+        Separable(blur_scale=0.6, blur_strength=0.7),
+        Separable(blur_strength=8.0),
+        Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25))),
+        Separable(first_tap=0, texel="x", bloom_size=(200, 50)),
+        Separable(direct=True, bloom_scale=0.25),
+        Separable(format="rgba16float", bloom_scale=0.5),
+        Separable(format="rgba32float"),
+    ],
+)
+def test_final_is_scene_plus_bloom(
+    renderer: Renderer, scene: Scene, settings: Separable, turns: float
+) -> None:
+    frames = renderer.render(scene, settings, SIZE, time=turns)
+    unit = 255 if frames["bloom"].dtype != np.uint8 else 1
+    total = rgb(frames["scene"]).astype(float) + rgb(frames["bloom"]).astype(float) * unit
+    assert levels_apart(rgb(frames["final"]), np.round(np.clip(total, 0, 255))) <= 1
+    assert (frames["final"][..., 3] == 255).all()
+
+
+@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
+@pytest.mark.parametrize("tonemap", ["none", "reinhard", "aces", "exponential"])
+@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb"])
+def test_final_is_the_references(
+    renderer: Renderer, scene: Scene, composite: Any, tonemap: Any, encoding: Any
+) -> None:
+    settings = Separable(
+        composite=composite,
+        tonemap=tonemap,
+        encoding=encoding,
+        intensity=0.6,
+        exposure=-0.5,
+        bloom_size=(80, 80),
+    )
+    frames = renderer.render(scene, settings, SIZE)
+    expected = reference.composite(frames["scene"], frames["bloom"], settings)
+    assert levels_apart(frames["final"], np.round(255 * expected)) <= 1
+
+
+@pytest.mark.parametrize("tonemap", ["khronos_neutral", "agx"])
+def test_the_longer_tone_maps(renderer: Renderer, scene: Scene, tonemap: Any) -> None:
+    settings = Separable(tonemap=tonemap, exposure=1.0, intensity=2.0, format="rgba16float")
+    frames = renderer.render(scene, settings, SIZE)
+    expected = reference.composite(frames["scene"], frames["bloom"], settings)
+    assert levels_apart(frames["final"], np.round(255 * expected)) <= 1
+
+
+def test_tone_maps_without_bloom(renderer: Renderer, scene: Scene) -> None:
+    settings = Separable(bloom=False, tonemap="reinhard", encoding="gamma22", exposure=1.0)
+    frames = renderer.render(scene, settings, SIZE)
+    expected = reference.composite(frames["scene"], None, settings)
+    assert levels_apart(frames["final"], np.round(255 * expected)) <= 1
+
+
+# Attachments, arrays to fill, what else comes back
+
+
+def test_attachments_are_what_was_wanted(renderer: Renderer, scene: Scene) -> None:
+    everything = renderer.render(scene, None, SIZE)
+    some = renderer.render(scene, None, SIZE, attachments=("final", "glow"))
+    assert list(some) == ["glow", "final"]
+    for name, array in some.items():
+        np.testing.assert_array_equal(array, everything[name])
+    assert list(renderer.render(scene, None, SIZE, attachments="depth")) == ["depth"]
+    assert list(renderer.render(scene, None, SIZE, attachments=())) == []
+
+
+def test_arrays_are_filled_in_place(renderer: Renderer, scene: Scene) -> None:
+    expected = renderer.render(scene, None, SIZE)
+    out = {name: np.full_like(array, 77) for name, array in expected.items()}
+    frames = renderer.render(scene, None, SIZE, out=out)
+    for name, array in frames.items():
+        assert array is out[name]
+        np.testing.assert_array_equal(array, expected[name])
+
+
+def test_arrays_that_are_not_given_are_allocated(renderer: Renderer, scene: Scene) -> None:
+    # A part of a larger array, as long as it is contiguous.
+    large = np.zeros((3, SIZE[1], SIZE[0], 4), np.uint8)
+    frames = renderer.render(scene, None, SIZE, out={"final": large[1]})
+    assert list(frames) == FORWARD
+    assert np.shares_memory(frames["final"], large)
+    np.testing.assert_array_equal(large[1], renderer.render(scene, None, SIZE)["final"])
+    assert not large[0].any()
+    assert not large[2].any()
+
+
+def test_frames_do_not_change_with_later_ones(renderer: Renderer, scene: Scene) -> None:
+    first = renderer.render(scene, None, SIZE)
+    kept = {name: array.copy() for name, array in first.items()}
+    renderer.render(scene, Separable(blur_strength=0.1), SIZE, time=0.5)
+    for name, array in first.items():
+        np.testing.assert_array_equal(array, kept[name])
+
+
+def test_timings_are_times_of_the_device(renderer: Renderer, scene: Scene) -> None:
+    begin = time.perf_counter()
+    frames = renderer.render(scene, None, (640, 360), time=0.123)
+    elapsed = time.perf_counter() - begin
+    assert list(frames.timings) == ["glow", "blur_vertical", "bloom", "scene", "final"]
+    assert all(math.isfinite(seconds) and seconds > 0 for seconds in frames.timings.values())
+    assert sum(frames.timings.values()) < elapsed
+
+
+def test_the_time_of_a_pass_follows_its_work(renderer: Renderer, scene: Scene) -> None:
+    # 4,096 times the pixels and 33 times the taps: a time that is of the same order is another's.
+    small = Separable(weights=(1.0,), bloom_size=(16, 16), format="rgba32float")
+    large = small.replace(weights=(0.02,) * 33, bloom_size=(1024, 1024), blur_scale=1.5)
+    quick, slow = (
+        min(
+            renderer.render(scene, settings, SIZE, time=turns).timings["blur_vertical"]
+            for turns in (0.1, 0.2, 0.3)
+        )
+        for settings in (small, large)
+    )
+    assert slow > 5 * quick
+
+
+def test_info(renderer: Renderer, scene: Scene) -> None:
+    frames = renderer.render(scene, None, (8, 8))
+    assert frames.info == {
+        "adapter": renderer.info.name,
+        "driver": renderer.info.driver_info,
+        "version": vkbloom.__version__,
+        "nan": 0,
+        "inf": 0,
+    }

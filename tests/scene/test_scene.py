@@ -1,0 +1,241 @@
+"""Scenes as values: validation, identity, and how they show themselves."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vkbloom.scene import Camera, Mesh, Scene
+from vkbloom.scene.skybox import Cubemap
+
+SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+
+def mesh(**changes: Any) -> Mesh:
+    arrays = {
+        "vertices": np.arange(27, dtype=np.float32).reshape(3, 9),
+        "indices": np.array([0, 1, 2], np.uint32),
+    }
+    return Mesh(**{**arrays, **changes})
+
+
+def scene(**changes: Any) -> Scene:
+    return Scene(**{"body": mesh(), **changes})
+
+
+# Mesh
+
+
+def test_a_mesh_keeps_its_own_read_only_arrays() -> None:
+    vertices = np.ones((3, 9), np.float32)
+    emission = np.ones((3, 3), np.float32)
+    indices = np.array([0, 1, 2], np.uint32)
+    made = Mesh(vertices, indices, emission)
+    vertices[...], indices[...], emission[...] = 0, 0, 0
+    assert made.emission is not None
+    for array in (made.vertices, made.indices, made.emission):
+        assert array.any()
+        assert array.flags.c_contiguous
+        assert not array.flags.writeable
+
+
+def test_a_mesh_does_not_trust_a_read_only_view() -> None:
+    owner = np.ones((3, 9), np.float32)
+    view = owner.view()
+    view.flags.writeable = False
+    made = mesh(vertices=view)
+    owner[...] = 0
+    assert (made.vertices == 1).all()
+
+
+def test_a_mesh_copies_no_read_only_owner() -> None:
+    vertices = np.ones((3, 9), np.float32)
+    vertices.flags.writeable = False
+    assert mesh(vertices=vertices).vertices is vertices
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "error"),
+    [
+        ("vertices", [[0.0] * 9], TypeError),
+        ("vertices", np.zeros((3, 9)), TypeError),
+        ("vertices", np.zeros((3, 8), np.float32), ValueError),
+        ("vertices", np.zeros((0, 9), np.float32), ValueError),
+        ("vertices", np.full((3, 9), np.nan, np.float32), ValueError),
+        ("indices", np.array([0, 1, 2]), TypeError),
+        ("indices", np.array([0, 1], np.uint32), ValueError),
+        ("indices", np.array([], np.uint32), ValueError),
+        ("indices", np.array([0, 1, 3], np.uint32), ValueError),
+        ("indices", np.array([[0, 1, 2]], np.uint32), ValueError),
+        ("emission", np.zeros((2, 3), np.float32), ValueError),
+        ("emission", np.zeros((3, 3), np.float16), TypeError),
+    ],
+)
+def test_meshes_that_are_refused(field: str, value: Any, error: type[Exception]) -> None:
+    with pytest.raises(error, match=field):
+        mesh(**{field: value})
+
+
+# Camera
+
+
+def test_the_default_camera_is_the_one_of_the_forward_system() -> None:
+    camera = Camera()
+    assert (camera.position, camera.rotation) == ((0.0, 0.0, -10.25), (7.5, -343.0, 0.0))
+    assert (camera.fov, camera.near, camera.far) == (45.0, 0.1, 256.0)
+
+
+def test_a_camera_takes_any_numbers_and_is_a_value() -> None:
+    camera = Camera(position=np.array([1, 2, 3]), rotation=[0, 0, 0], fov=np.float32(60))  # type: ignore[arg-type]
+    assert camera == Camera((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 60.0)
+    assert hash(camera) == hash(Camera((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 60.0))
+    assert type(camera.position[0]) is float
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        camera.fov = 3.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "error"),
+    [
+        ("position", (0, 0), ValueError),
+        ("position", (0, 0, math.nan), ValueError),
+        ("position", "abc", TypeError),
+        ("position", 3, TypeError),
+        ("rotation", (0, 0, math.inf), ValueError),
+        ("rotation", (0, 0, "1"), TypeError),
+        ("rotation", (0, 0, True), TypeError),
+        ("fov", 0, ValueError),
+        ("fov", 180, ValueError),
+        ("fov", math.nan, ValueError),
+        ("fov", None, TypeError),
+        ("near", 0, ValueError),
+        ("near", 10**400, ValueError),
+        ("far", 0.1, ValueError),
+        ("far", math.inf, ValueError),
+    ],
+)
+def test_cameras_that_are_refused(field: str, value: Any, error: type[Exception]) -> None:
+    with pytest.raises(error, match=field):
+        Camera(**{field: value})
+
+
+# Scene
+
+
+def test_every_scene_has_a_serial_of_its_own() -> None:
+    first = scene()
+    others = [
+        scene(),
+        first.with_camera(first.camera),
+        dataclasses.replace(first, glow_intensity=2.0),
+        copy.copy(first),
+        pickle.loads(pickle.dumps(first)),
+    ]
+    assert len({first.serial, *(other.serial for other in others)}) == 6
+
+
+def test_a_changed_camera_changes_nothing_else() -> None:
+    first = scene(glow=mesh(), skybox=Cubemap((np.zeros((6, 1, 1, 4), np.uint8),)))
+    second = first.with_camera(Camera(fov=60))
+    assert second.camera.fov == 60.0
+    assert first.camera.fov == 45.0
+    assert second.body is first.body
+    assert second.glow is first.glow
+    assert second.skybox is first.skybox
+
+
+def test_a_pickled_scene_is_the_same_and_read_only() -> None:
+    emission = np.ones((3, 3), np.float32)
+    first = scene(glow=mesh(emission=emission), camera=Camera(fov=60), glow_intensity=3)
+    second = pickle.loads(pickle.dumps(first))
+    np.testing.assert_array_equal(second.body.vertices, first.body.vertices)
+    np.testing.assert_array_equal(second.glow.emission, emission)
+    assert not second.body.indices.flags.writeable
+    assert (second.camera, second.glow_intensity) == (first.camera, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "error"),
+    [
+        ("body", None, TypeError),
+        ("glow", "glow.gltf", TypeError),
+        ("skybox", np.zeros((6, 1, 1, 4), np.uint8), TypeError),
+        ("camera", None, TypeError),
+        ("glow_intensity", -0.5, ValueError),
+        ("glow_intensity", math.inf, ValueError),
+        ("glow_intensity", "1", TypeError),
+    ],
+)
+def test_scenes_that_are_refused(field: str, value: Any, error: type[Exception]) -> None:
+    with pytest.raises(error, match=field):
+        scene(**{field: value})
+
+
+def test_a_scene_cannot_be_changed() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scene().camera = Camera()  # type: ignore[misc]
+
+
+def test_a_scene_shows_what_it_holds() -> None:
+    sky = Cubemap((np.zeros((6, 2, 2, 4), np.uint8), np.zeros((6, 1, 1, 4), np.uint8)))
+    shown = scene(glow=mesh(), skybox=sky)
+    for text in (repr(shown), shown._repr_html_()):
+        for part in ("1 triangles, 3 vertices", "2 x 2 uint8", "levels: 2", "fov 45", "-10.25"):
+            assert part in text
+    assert "array" not in repr(shown)
+    assert "glow: none" in repr(scene())
+    assert "skybox: none" in repr(scene())
+
+
+def test_the_built_in_scene() -> None:
+    ufo = Scene.ufo()
+    assert ufo.glow is not None
+    assert ufo.skybox is not None
+    assert ufo.camera == Camera()
+    assert ufo.skybox.dtype == np.uint8
+    # All of the saucer lies within the default frame's depth range and near its centre.
+    assert np.abs(ufo.body.vertices[:, :3]).max() < 10.0
+    assert Scene.ufo().serial != ufo.serial
+
+
+@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
+def test_a_scene_from_files() -> None:
+    folder = SEED_DATA / "retroufo"
+    loaded = Scene.from_gltf(
+        folder / "retroufo.gltf",
+        glow=str(folder / "retroufo_glow.gltf"),
+        skybox=folder / "cubemap_space.ktx",
+        glow_intensity=2,
+        camera=Camera(fov=30),
+    )
+    assert loaded.glow is not None
+    assert loaded.skybox is not None
+    assert len(loaded.body.indices) != len(loaded.glow.indices)
+    assert (loaded.skybox.size, loaded.glow_intensity, loaded.camera.fov) == (512, 2.0, 30.0)
+    # The beam of light hangs below the saucer: y points down.
+    assert loaded.glow.vertices[:, 1].max() > 5.0 > -loaded.glow.vertices[:, 1].min()
+
+
+def test_paths_of_another_type() -> None:
+    wrong: Any = 3
+    with pytest.raises(TypeError, match=r"^base: "):
+        Scene.from_gltf(wrong)
+    with pytest.raises(TypeError, match=r"^glow: "):
+        Scene.from_gltf("base.gltf", glow=wrong)
+
+
+def test_a_scene_of_one_file_has_neither_glow_nor_sky() -> None:
+    folder = SEED_DATA / "retroufo"
+    if not folder.exists():
+        pytest.skip("the shared data folder is not there")
+    loaded = Scene.from_gltf(folder / "cube.gltf")
+    assert (loaded.glow, loaded.skybox, loaded.camera) == (None, None, Camera())
+    with pytest.raises(FileNotFoundError, match=r"gone\.gltf"):
+        Scene.from_gltf(folder / "cube.gltf", glow=folder / "gone.gltf")

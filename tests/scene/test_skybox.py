@@ -1,0 +1,519 @@
+"""Skies: KTX 1, face images, panoramas, arrays, and their mip levels."""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+import struct
+import sys
+import warnings
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from vkbloom.scene import ktx, skybox
+from vkbloom.scene.skybox import Cubemap
+
+SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+# name -> (glInternalFormat, glFormat, glType, channels, dtype)
+FORMATS = {
+    "RGBA8": (0x8058, 0x1908, 0x1401, 4, "u1"),
+    "RGB8": (0x8051, 0x1907, 0x1401, 3, "u1"),
+    "RGBA16F": (0x881A, 0x1908, 0x140B, 4, "f2"),
+    "RGB16F": (0x881B, 0x1907, 0x140B, 3, "f2"),
+    "RGBA32F": (0x8814, 0x1908, 0x1406, 4, "f4"),
+    "RGB32F": (0x8815, 0x1907, 0x1406, 3, "f4"),
+}
+
+
+def faces_of(side: int, channels: int = 4, dtype: str = "u1") -> NDArray[Any]:
+    """Texels that all differ from their neighbours."""
+    values = np.arange(6 * side * side * channels).reshape(6, side, side, channels)
+    return (values * 37 % 251).astype(dtype)
+
+
+def ktx_bytes(
+    levels: list[NDArray[Any]], name: str = "RGBA8", order: Literal["<", ">"] = "<", **header: int
+) -> bytes:
+    internal, gl_format, gl_type, channels, kind = FORMATS[name]
+    dtype = np.dtype(kind).newbyteorder(order)
+    side = levels[0].shape[1]
+    fields = {
+        "endianness": 0x04030201,
+        "gl_type": gl_type,
+        "type_size": dtype.itemsize,
+        "gl_format": gl_format,
+        "internal": internal,
+        "base": gl_format,
+        "width": side,
+        "height": side,
+        "depth": 0,
+        "elements": 0,
+        "faces": 6,
+        "level_count": len(levels),
+        "key_values": 12,
+    }
+    assert set(header) <= set(fields)
+    data = b"\xabKTX 11\xbb\r\n\x1a\n" + struct.pack(f"{order}13I", *{**fields, **header}.values())
+    data += struct.pack(f"{order}I", 5) + b"a\0b\0\0" + bytes(3)
+    for level in levels:
+        assert level.shape[3] == channels
+        row = level.shape[2] * channels * dtype.itemsize
+        padding = bytes(-row % 4)
+        data += struct.pack(f"{order}I", (row + len(padding)) * level.shape[1])
+        for face in level.astype(dtype):
+            data += b"".join(line.tobytes() + padding for line in face)
+    return data
+
+
+def write_image(path: Path, image: NDArray[Any], kind: str) -> Path:
+    height, width, channels = image.shape
+    spec = oiio.ImageSpec(width, height, channels, kind)
+    # The texels as they are: without this, those of a PNG would be divided by their alpha.
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    file = oiio.ImageOutput.create(str(path))
+    assert file is not None, oiio.geterror()
+    assert file.open(str(path), spec), file.geterror()
+    assert file.write_image(np.ascontiguousarray(image)), file.geterror()
+    file.close()
+    return path
+
+
+def look_up(faces: NDArray[Any], direction: tuple[float, float, float]) -> NDArray[Any]:
+    """Return the nearest texel, by the face table of the Vulkan specification, written out."""
+    x, y, z = direction
+    face, s, t, major = max(
+        (0 if x > 0 else 1, -z if x > 0 else z, -y, abs(x)),
+        (2 if y > 0 else 3, x, z if y > 0 else -z, abs(y)),
+        (4 if z > 0 else 5, x if z > 0 else -x, -y, abs(z)),
+        key=lambda row: row[3],
+    )
+    side = faces.shape[1]
+    column = min(int((s / major + 1) / 2 * side), side - 1)
+    row = min(int((t / major + 1) / 2 * side), side - 1)
+    texel: NDArray[Any] = faces[face, row, column]
+    return texel
+
+
+def refusal(path: Path) -> str | None:
+    """Return the message with which a file is refused as it should be, None if it is loaded."""
+    try:
+        skybox.load(path)
+    except ValueError as error:
+        return str(error)
+    return None
+
+
+# Cubemap and arrays
+
+
+@pytest.mark.parametrize("dtype", ["u1", "f2", "f4"])
+def test_rgb_arrays_get_full_alpha(dtype: str) -> None:
+    faces = faces_of(4, 3, dtype)
+    cube = skybox.load(faces)
+    assert (cube.size, cube.dtype, len(cube.levels)) == (4, np.dtype(dtype), 3)
+    np.testing.assert_array_equal(cube.levels[0][..., :3], faces)
+    for level in cube.levels:
+        assert (level[..., 3] == (255 if dtype == "u1" else 1)).all()
+
+
+def test_rgba_arrays_are_used_as_they_are_and_not_shared() -> None:
+    faces = faces_of(4)
+    cube = skybox.load(faces)
+    np.testing.assert_array_equal(cube.levels[0], faces)
+    faces[...] = 0
+    assert cube.levels[0].any()
+    for level in cube.levels:
+        assert level.flags.c_contiguous
+        assert not level.flags.writeable
+        with pytest.raises(ValueError, match="read-only"):
+            level[0, 0, 0, 0] = 1
+
+
+def test_other_layouts_and_byte_orders_are_converted() -> None:
+    faces = faces_of(3, 4, "f4")
+    for given_faces in (np.asfortranarray(faces), faces.astype(">f4"), faces[:, ::-1][:, ::-1]):
+        level = skybox.load(given_faces).levels[0]
+        assert level.dtype == np.dtype(np.float32)
+        assert level.flags.c_contiguous
+        np.testing.assert_array_equal(level, faces)
+
+
+def test_a_cubemap_is_returned_itself() -> None:
+    cube = skybox.load(faces_of(2))
+    assert skybox.load(cube) is cube
+
+
+def test_a_pickled_cubemap_stays_read_only() -> None:
+    cube = pickle.loads(pickle.dumps(skybox.load(faces_of(2))))
+    np.testing.assert_array_equal(cube.levels[0], faces_of(2))
+    assert not cube.levels[1].flags.writeable
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [(5, 4, 4, 4), (6, 4, 3, 4), (6, 4, 4, 2), (6, 4, 4), (6, 0, 0, 4), (4, 4, 4)],
+)
+def test_arrays_of_another_shape(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"skybox has shape"):
+        skybox.load(np.zeros(shape, np.uint8))
+
+
+@pytest.mark.parametrize("dtype", ["u2", "f8", "i1", "?"])
+def test_arrays_of_another_dtype(dtype: str) -> None:
+    with pytest.raises(TypeError, match="uint8, float16 or float32"):
+        skybox.load(np.zeros((6, 2, 2, 4), dtype))
+
+
+@pytest.mark.parametrize("source", [5, None, b"sky.png", {"+x": "a.png"}, [1, 2, 3, 4, 5, 6]])
+def test_other_sources(source: Any) -> None:
+    with pytest.raises(TypeError, match="skybox must be"):
+        skybox.load(source)
+
+
+def test_levels_that_are_no_mip_chain() -> None:
+    four, two, one = skybox.load(faces_of(4)).levels
+    assert len(Cubemap((four, two)).levels) == 2
+    for levels in ((), (four, one), (four, two.astype("f4")), (one, one), (four[..., :3],)):
+        with pytest.raises(ValueError, match="levels"):
+            Cubemap(levels)
+    with pytest.raises(TypeError, match=r"levels\[0\]"):
+        Cubemap((four.astype("f8"),))
+    with pytest.raises(TypeError, match=r"levels\[1\]"):
+        Cubemap((four, [1]))  # type: ignore[arg-type]
+
+
+# Mip levels
+
+
+def test_a_mip_level_is_the_mean_of_four() -> None:
+    faces = np.zeros((6, 2, 2, 4), np.uint8)
+    faces[0, :, :, 0] = [[1, 2], [3, 4]]
+    faces[5, :, :, 1] = [[255, 255], [255, 254]]
+    faces[3, :, :, 2] = [[0, 0], [0, 1]]
+    top = skybox.mip_levels(faces)[1]
+    # 2.5 rounds to even, 254.75 up, 0.25 down.
+    assert (top[0, 0, 0, 0], top[5, 0, 0, 1], top[3, 0, 0, 2]) == (2, 255, 0)
+    assert top.dtype == np.uint8
+
+
+def test_rounding_does_not_add_up() -> None:
+    # Rounded level by level, the mean of 3/4 would become 1 at once and never come back.
+    faces = np.zeros((6, 4, 4, 4), np.uint8)
+    faces[:, :2, :2] = [[[1], [1]], [[1], [0]]]
+    assert [int(level.max()) for level in skybox.mip_levels(faces)] == [1, 1, 0]
+
+
+def test_odd_sides_are_floored() -> None:
+    faces = faces_of(7, 4, "f4")
+    levels = skybox.mip_levels(faces)
+    assert [level.shape for level in levels] == [(6, n, n, 4) for n in (7, 3, 1)]
+    np.testing.assert_allclose(
+        levels[1][2, 1, 2], faces[2, 2:4, 4:6].reshape(4, 4).mean(axis=0), rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("dtype", ["f2", "f4"])
+def test_mip_levels_of_floats_neither_overflow_nor_spread_nan(dtype: str) -> None:
+    largest = np.finfo(dtype).max
+    faces = np.full((6, 2, 2, 4), largest, dtype)
+    faces[1, 0, 0] = math.nan
+    faces[2, 0, 0] = math.inf
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        levels = skybox.mip_levels(faces)
+    np.testing.assert_array_equal(levels[0], faces)
+    assert (levels[1][0] == largest).all()
+    np.testing.assert_allclose(levels[1][1:3].astype("f8"), float(largest) * 0.75, rtol=1e-3)
+
+
+# KTX 1
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("name", list(FORMATS))
+@pytest.mark.parametrize("side", [1, 3, 4])
+def test_ktx_formats(tmp_path: Path, name: str, order: Literal["<", ">"], side: int) -> None:
+    channels, kind = FORMATS[name][3:]
+    # Single-channel rows of 3 texels are padded in RGB8 and RGB16F.
+    levels = [faces_of(max(1, side >> i), channels, kind) + i for i in range(side.bit_length())]
+    path = tmp_path / "sky.ktx"
+    path.write_bytes(ktx_bytes(levels, name, order))
+    for read, written in zip(ktx.read(path), levels, strict=True):
+        assert read.dtype == np.dtype(kind)
+        np.testing.assert_array_equal(read, written)
+    cube = skybox.load(str(path))
+    assert len(cube.levels) == len(levels)
+    assert cube.levels[-1].shape == (6, 1, 1, 4)
+
+
+def test_a_ktx_with_one_level_gets_the_others(tmp_path: Path) -> None:
+    path = tmp_path / "sky.ktx"
+    for count in (0, 1):
+        path.write_bytes(ktx_bytes([faces_of(4)], level_count=count))
+        cube = skybox.load(path)
+        assert [level.shape[1] for level in cube.levels] == [4, 2, 1]
+        np.testing.assert_array_equal(cube.levels[1], skybox.mip_levels(faces_of(4))[1])
+
+
+def test_a_ktx_with_a_part_of_the_chain_keeps_it(tmp_path: Path) -> None:
+    path = tmp_path / "any.name"
+    path.write_bytes(ktx_bytes([faces_of(8), faces_of(4)]))
+    assert [level.shape[1] for level in skybox.load(path).levels] == [8, 4]
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ({"faces": 1}, "1 faces"),
+        ({"depth": 4}, "3-D"),
+        ({"elements": 2}, "array"),
+        ({"height": 2}, "square"),
+        ({"width": 0, "height": 0}, "square"),
+        ({"level_count": 4}, "4 mip levels"),
+        ({"level_count": 2**32 - 1}, "mip levels"),
+        ({"internal": 0x83F1}, "glInternalFormat 0x83f1"),
+        ({"gl_type": 0, "gl_format": 0}, "glType"),
+        ({"endianness": 0x12345678}, "endianness"),
+        ({"width": 2**31, "height": 2**31}, "truncated"),
+        ({"key_values": 2**32 - 4}, "truncated"),
+        ({"key_values": 16}, "level 0 gives"),
+    ],
+)
+def test_ktx_headers_that_are_refused(tmp_path: Path, header: dict[str, int], message: str) -> None:
+    path = tmp_path / "sky.ktx"
+    path.write_bytes(ktx_bytes([faces_of(4), faces_of(2)], "RGBA8", "<", **header) + bytes(8))
+    with pytest.raises(ValueError, match=rf"sky\.ktx: .*{message}"):
+        skybox.load(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xabKTX", b"\xabKTX 20\xbb\r\n\x1a\n", b"PNG"])
+def test_what_is_no_ktx(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "sky.ktx"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"sky\.ktx: "):
+        skybox.load(path)
+
+
+def test_a_ktx_cut_anywhere_is_refused(tmp_path: Path) -> None:
+    whole = ktx_bytes([faces_of(2), faces_of(1)])
+    path = tmp_path / "sky.ktx"
+    path.write_bytes(whole)
+    assert len(ktx.read(path)) == 2
+    for size in range(len(whole)):
+        path.write_bytes(whole[:size])
+        with pytest.raises(ValueError, match=r"sky\.ktx: "):
+            skybox.load(path)
+
+
+@settings(
+    max_examples=1000,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(changes=st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1, max_size=4))
+def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[int, int]]) -> None:
+    content = bytearray(ktx_bytes([faces_of(2, 3, "f2"), faces_of(1, 3, "f2")], "RGB16F"))
+    for place, value in changes:
+        # Three in four changes go to the header.
+        content[place % (len(content) if place % 4 == 0 else 64)] = value
+    path = tmp_path / "sky.ktx"
+    path.write_bytes(bytes(content))
+    assert "sky.ktx" in (refusal(path) or "sky.ktx")
+
+
+def test_missing_files_are_os_errors_that_name_them(tmp_path: Path) -> None:
+    for source in (tmp_path / "gone.ktx", tmp_path / "gone.png", [tmp_path / "gone.png"] * 6):
+        with pytest.raises(FileNotFoundError, match="gone"):
+            skybox.load(source)
+
+
+# Images
+
+
+@pytest.mark.parametrize(
+    ("suffix", "kind", "dtype", "channels"),
+    [
+        ("png", "uint8", "u1", 3),
+        ("png", "uint8", "u1", 4),
+        ("exr", "half", "f2", 3),
+        ("exr", "float", "f4", 4),
+        ("tif", "float", "f4", 3),
+    ],
+)
+def test_six_face_images(tmp_path: Path, suffix: str, kind: str, dtype: str, channels: int) -> None:
+    # With alphas of all sizes, so that a multiplication by it would show.
+    faces = faces_of(4, channels, dtype)
+    paths = [write_image(tmp_path / f"{i}.{suffix}", faces[i], kind) for i in range(6)]
+    cube = skybox.load(paths)
+    assert cube.dtype == np.dtype(dtype)
+    np.testing.assert_array_equal(cube.levels[0][..., :channels], faces)
+    assert len(cube.levels) == 3
+
+
+def test_16_bit_images_become_floats(tmp_path: Path) -> None:
+    face = np.full((2, 2, 3), 65535, np.uint16)
+    face[0, 0, 0] = 13107
+    cube = skybox.load([write_image(tmp_path / "a.png", face, "uint16")] * 6)
+    assert cube.dtype == np.dtype(np.float32)
+    np.testing.assert_allclose(cube.levels[0][3, 0, 0], [0.2, 1, 1, 1], rtol=1e-6)
+
+
+def test_face_images_that_do_not_fit(tmp_path: Path) -> None:
+    good = write_image(tmp_path / "good.png", np.zeros((4, 4, 3), np.uint8), "uint8")
+    wide = write_image(tmp_path / "wide.png", np.zeros((4, 8, 3), np.uint8), "uint8")
+    large = write_image(tmp_path / "large.png", np.zeros((8, 8, 3), np.uint8), "uint8")
+    float_face = write_image(tmp_path / "float.exr", np.zeros((4, 4, 3), np.float32), "float")
+    grey = write_image(tmp_path / "grey.png", np.zeros((4, 4, 1), np.uint8), "uint8")
+    damaged = tmp_path / "damaged.png"
+    damaged.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40))
+    with pytest.raises(ValueError, match="5 face images"):
+        skybox.load([good] * 5)
+    for bad, message in (
+        (wide, "the -z face is 8 x 4"),
+        (large, "the -z face is 8 x 8"),
+        (float_face, "float32"),
+        (grey, "1 channels"),
+        (damaged, "damaged.png"),
+    ):
+        with pytest.raises(ValueError, match=rf"{bad.name}.*{message}|{message}"):
+            skybox.load([good] * 5 + [bad])
+
+
+def test_a_panorama_cut_anywhere_is_refused_or_read(tmp_path: Path) -> None:
+    values = np.random.default_rng(1).integers(0, 256, (16, 32, 3), np.uint8)
+    whole = write_image(tmp_path / "whole.png", values, "uint8").read_bytes()
+    path = tmp_path / "sky.png"
+    refused = 0
+    for size in range(0, len(whole), 7):
+        path.write_bytes(whole[:size])
+        # A cut after the texels is no damage.
+        message = refusal(path)
+        if message is not None:
+            assert "sky.png" in message
+            refused += 1
+    assert refused > len(whole) // 7 // 2
+
+
+def test_without_openimageio_the_message_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_image(tmp_path / "a.png", np.zeros((2, 4, 3), np.uint8), "uint8")
+    monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[images\]"):
+        skybox.load(path)
+
+
+# Panoramas
+
+
+def panorama_of_directions(height: int) -> NDArray[np.float32]:
+    """Return a panorama whose colour at every pixel is the direction that it stands for."""
+    longitude = ((np.arange(2 * height) + 0.5) / (2 * height) - 0.5) * 2 * np.pi
+    latitude = ((np.arange(height) + 0.5) / height - 0.5) * np.pi
+    down, around = np.meshgrid(latitude, longitude, indexing="ij")
+    x, y, z = np.cos(down) * np.sin(around), np.sin(down), -np.cos(down) * np.cos(around)
+    return np.stack((x, y, z), axis=-1).astype(np.float32)
+
+
+def test_a_panorama_ends_up_in_the_directions_it_shows() -> None:
+    faces = skybox.project_equirectangular(panorama_of_directions(256), 64)
+    rng = np.random.default_rng(3)
+    for direction in rng.normal(size=(500, 3)):
+        unit = direction / np.linalg.norm(direction)
+        # A texel of a face spans up to 2/64, of which its centre is at most 0.7 away.
+        found = look_up(faces, tuple(unit))
+        assert np.linalg.norm(found - unit) < 0.7 * 2 / 64 + 0.01
+
+
+def test_a_panorama_is_upright_and_unmirrored_in_a_frame() -> None:
+    """Seen by a camera without rotation, whose frame has -y at its top and +x at its right."""
+    panorama = np.zeros((64, 128, 3), np.uint8)
+    panorama[:32, 32:64] = (255, 0, 0)  # up, left of the centre
+    panorama[:32, 64:96] = (0, 255, 0)  # up, right
+    panorama[32:, 32:64] = (0, 0, 255)  # down, left
+    panorama[32:, 64:96] = (255, 255, 255)  # down, right
+    faces = skybox.project_equirectangular(panorama, 32)
+    assert look_up(faces, (-0.5, -0.5, -1)).tolist() == [255, 0, 0]
+    assert look_up(faces, (0.5, -0.5, -1)).tolist() == [0, 255, 0]
+    assert look_up(faces, (-0.5, 0.5, -1)).tolist() == [0, 0, 255]
+    assert look_up(faces, (0.5, 0.5, -1)).tolist() == [255, 255, 255]
+    assert look_up(faces, (0.5, 0.5, 1)).tolist() == [0, 0, 0]
+
+
+def test_a_panorama_wraps_around() -> None:
+    panorama = np.full((4, 8, 3), 100, np.uint8)
+    panorama[:, 0] = 200
+    # The seam lies behind the camera, at +z: the middle of face 4 blends first and last column.
+    face = skybox.project_equirectangular(panorama, 65)[4]
+    assert face[32, 32].tolist() == [150, 150, 150]
+
+
+def test_values_that_are_not_finite_do_not_spread_from_a_panorama() -> None:
+    panorama = np.ones((4, 8, 3), np.float32)
+    panorama[1, 2] = math.nan
+    panorama[2, 5] = math.inf
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        faces = skybox.project_equirectangular(panorama, 8)
+    assert np.isfinite(faces).all()
+    assert faces.min() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("suffix", "kind", "dtype"),
+    [("png", "uint8", "u1"), ("exr", "half", "f2"), ("hdr", "float", "f4")],
+)
+def test_panorama_files(tmp_path: Path, suffix: str, kind: str, dtype: str) -> None:
+    path = write_image(tmp_path / f"sky.{suffix}", np.ones((8, 16, 3), dtype), kind)
+    cube = skybox.load(path)
+    assert (cube.size, cube.dtype) == (4, np.dtype(dtype))
+    assert (cube.levels[0][..., :3] == 1).all()
+
+
+def test_a_panorama_must_be_twice_as_wide_as_high(tmp_path: Path) -> None:
+    path = write_image(tmp_path / "sky.png", np.zeros((8, 17, 3), np.uint8), "uint8")
+    with pytest.raises(ValueError, match=r"sky\.png: 17 x 8; .*twice as wide"):
+        skybox.load(path)
+
+
+# The cubemap that comes with the original meshes
+
+
+@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
+def test_the_seed_cubemap_is_the_sky_of_the_seed_frame() -> None:
+    cube = skybox.load(SEED_DATA / "retroufo" / "cubemap_space.ktx")
+    assert (cube.size, cube.dtype, len(cube.levels)) == (512, np.dtype(np.uint8), 10)
+    frame = skybox._read_image(SEED_DATA / "seed_frames" / "final.png")[..., :3].astype(float)
+    case = json.loads((SEED_DATA / "seed_frames" / "case.json").read_text())
+    matrices = case["matrices_column_major"]
+    projection = np.reshape(matrices["proj"], (4, 4)).T
+    rotation = np.reshape(matrices["view"], (4, 4)).T[:3, :3]
+    differences = []
+    # Left and right of the saucer and its light, on the +z and the face beside it.
+    for column in (*range(5, 200, 10), *range(1180, 1280, 10)):
+        for row in range(5, 720, 15):
+            x = ((column + 0.5) / 640 - 1) / projection[0, 0]
+            y = ((row + 0.5) / 360 - 1) / projection[1, 1]
+            texel = look_up(cube.levels[0], tuple(np.array([x, y, -1.0]) @ rotation))
+            differences.append(np.abs(texel[:3] - frame[row, column]).max())
+    # The frame is filtered and this is not, so stars differ; the sky between them is smooth.
+    assert np.median(differences) < 2.0
+
+
+def test_a_face_that_ends_early_is_refused(tmp_path: Path) -> None:
+    panorama = tmp_path / "panorama.jpg"
+    noise = np.random.default_rng(0).integers(0, 256, (64, 128, 3), dtype=np.uint8)
+    assert oiio.ImageBuf(noise).write(str(panorama))
+    content = panorama.read_bytes()
+    panorama.write_bytes(content[: len(content) // 2])
+    with pytest.raises(ValueError, match=r"panorama\.jpg"):
+        skybox.load(panorama)

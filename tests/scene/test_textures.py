@@ -1,0 +1,462 @@
+"""Textures: what a fragment gets of them, against NumPy; mip levels; draws; what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
+from vkbloom import Frames, Renderer, Scene, Separable, reference
+from vkbloom.scene import Mesh
+from vkbloom.scene.textures import WHITE, Surface, Texture, mip_levels
+
+Array = NDArray[Any]
+
+HALF = 2.0**-11  # half of the last bit of a half float, relative
+# A filter's weights have 8 bits (Vulkan asks for 4, lavapipe and GPUs have 8), on each of two axes;
+# places in a texture are exact to far less than that here.
+FILTERED = 2 / 256 + HALF
+MODES = ("repeat", "mirror-repeat", "clamp-to-edge")
+
+
+def picture(width: int, height: int, *, highest: float = 1.0) -> NDArray[np.float16]:
+    """Return random linear colours (height, width, 4) that half floats hold, with alpha 1."""
+    colours = np.ones((height, width, 4), np.float16)
+    generator = np.random.default_rng((width, height))
+    colours[..., :3] = generator.random((height, width, 3)) * highest
+    return colours
+
+
+def texture(colours: NDArray[np.float16], filter: Any = "nearest", **more: Any) -> Texture:
+    return Texture((colours,), mag_filter=filter, min_filter=filter, **more)
+
+
+def deferred(renderer: Renderer, body: Mesh, size: tuple[int, int], **more: Any) -> Frames:
+    scene = Scene(body=body, camera=CAMERA, **more)
+    return renderer.render(scene, None, size, shading="deferred")
+
+
+def rgb(image: Array) -> NDArray[np.float64]:
+    return image[..., :3].astype(np.float64)
+
+
+def wrapped(texel: Array, side: int, mode: str) -> Array:
+    """Return the texels of 0..side-1 that stand for any whole numbers."""
+    if mode == "repeat":
+        return texel % side
+    if mode == "clamp-to-edge":
+        return np.clip(texel, 0, side - 1)
+    there = texel % (2 * side)
+    return np.where(there < side, there, 2 * side - 1 - there)
+
+
+def sampled(
+    colours: Array,
+    size: tuple[int, int],
+    places: tuple[float, float, float, float],
+    modes: tuple[str, str],
+    filter: str,
+) -> NDArray[np.float64]:
+    """Return what a panel of that size shows of colours, by the formulas of Vulkan's sampling."""
+    weights = []
+    for axis in range(2):
+        start, end, pixels = places[axis], places[axis + 2], size[axis]
+        side = colours.shape[1 - axis]
+        centres = (start + (end - start) * (np.arange(pixels) + 0.5) / pixels) * side
+        matrix = np.zeros((pixels, side))
+        if filter == "nearest":
+            parts = [(np.floor(centres), np.ones(pixels))]
+        else:
+            first = np.floor(centres - 0.5)
+            part = centres - 0.5 - first
+            parts = [(first, 1 - part), (first + 1, part)]
+        for texel, share in parts:
+            at = wrapped(texel.astype(int), side, modes[axis])
+            np.add.at(matrix, (np.arange(pixels), at), share)
+        weights.append(matrix)
+    shown: NDArray[np.float64] = np.einsum("yh,xw,hwc->yxc", *weights[::-1], rgb(colours))
+    return shown
+
+
+# What a fragment gets
+
+
+@pytest.mark.parametrize("scale", [(1, 1), (3, 2)])
+@pytest.mark.parametrize("side", [(16, 9), (7, 5), (1, 4)])
+def test_texels_are_exact_at_whole_scales(
+    renderer: Renderer, side: tuple[int, int], scale: tuple[int, int]
+) -> None:
+    colours, lights = picture(*side), picture(*side[::-1], highest=9)
+    size = (side[0] * scale[0], side[1] * scale[1])
+    shown = deferred(renderer, panel(size, texture(colours)), size)
+    expected = np.repeat(np.repeat(colours, scale[1], axis=0), scale[0], axis=1)
+    np.testing.assert_array_equal(shown["albedo"], expected)
+    assert not rgb(shown["brightness"]).any()
+
+    size = size[::-1]
+    emits = panel(size, emission=texture(lights), radiance=(1.0, 1.0, 1.0))
+    shown = deferred(renderer, emits, size)
+    expected = np.repeat(np.repeat(lights, scale[0], axis=0), scale[1], axis=1)
+    np.testing.assert_array_equal(shown["brightness"], expected)
+    assert (rgb(shown["albedo"]) == 1).all()
+
+
+@pytest.mark.parametrize("filter", ["nearest", "linear"])
+@pytest.mark.parametrize("modes", list(itertools.product(MODES, MODES)), ids="-".join)
+def test_wrapping_and_filters(renderer: Renderer, modes: tuple[str, str], filter: str) -> None:
+    colours, size = picture(5, 4), (96, 72)
+    # Over two repetitions to both sides; no pixel's centre is at an edge between two texels.
+    places = (-2.137, -1.713, 3.271, 2.609)
+    base = texture(colours, filter, address_mode=modes)
+    shown = deferred(renderer, panel(size, base, places=places), size)
+    expected = sampled(colours, size, places, modes, filter)
+    error = np.abs(rgb(shown["albedo"]) - expected)
+    assert error.max() <= (FILTERED if filter == "linear" else 0), error.max()
+
+
+def test_colour_times_texture(renderer: Renderer) -> None:
+    colours, size = picture(8, 8), (8, 8)
+    body = panel(size, texture(colours), texture(colours), colour=(0.5, 3, 0), radiance=(7, 0, 0.3))
+    shown = deferred(renderer, body, size)
+    for name, factor in (("albedo", (0.5, 3, 0)), ("brightness", (7, 0, 0.3))):
+        expected = rgb(colours) * factor
+        np.testing.assert_allclose(rgb(shown[name]), expected, rtol=1.01 * HALF, atol=1e-7)
+
+
+def test_both_textures_have_places_of_their_own(renderer: Renderer) -> None:
+    colours, size = picture(6, 6), (6, 6)
+    body = panel(size, texture(colours), texture(colours), radiance=(1.0, 1.0, 1.0))
+    assert body.texcoords is not None
+    # The second one is turned by half a turn.
+    turned = body.texcoords * (1, 1, -1, -1)
+    body = dataclasses.replace(body, texcoords=turned.astype(np.float32))
+    shown = deferred(renderer, body, size)
+    np.testing.assert_array_equal(shown["albedo"], colours)
+    np.testing.assert_array_equal(shown["brightness"], colours[::-1, ::-1])
+
+
+def test_without_a_texture_it_is_white(renderer: Renderer) -> None:
+    size = (8, 6)
+    plain = dataclasses.replace(panel(size, colour=(0.3, 0.2, 0.1)), surfaces=())
+    white = panel(size, colour=(0.3, 0.2, 0.1))
+    expected = deferred(renderer, plain, size)
+    for name, array in deferred(renderer, white, size).items():
+        np.testing.assert_array_equal(array, expected[name], err_msg=name)
+
+
+def test_the_forward_system_lights_texels_as_it_lights_vertex_colours(renderer: Renderer) -> None:
+    # Some over 0.9, from where on a colour counts as a lamp.
+    colours = picture(12, 8, highest=1.2)
+    by_vertex = screen(rgb(colours), (96, 64)).glow
+    assert by_vertex is not None
+    expected, shown = (
+        renderer.render(Scene(body=body, camera=CAMERA), None, (96, 64))
+        for body in (by_vertex, panel((96, 64), texture(colours)))
+    )
+    difference = np.abs(shown["scene"].astype(int) - expected["scene"])
+    # Both are rounded to 8 bits from colours and places that differ in their last bits.
+    assert difference.max() <= 1
+    assert len(np.unique(expected["scene"])) > 50
+
+
+def test_both_shadings_show_the_same(renderer: Renderer) -> None:
+    size = (64, 48)
+    body = panel(size, texture(picture(5, 7), "linear"), places=(0, 0, 2, 2))
+    forward = renderer.render(Scene(body=body, camera=CAMERA), Separable(bloom=False), size)
+    shown = deferred(renderer, body, size)
+    difference = np.abs(np.clip(rgb(shown["scene"]), 0, 1) * 255 - forward["scene"][..., :3])
+    # Half a level of rounding, and the G-buffer's half floats.
+    assert difference.max() <= 0.5 + 255 * 4 * HALF
+    gbuffer = (shown[name] for name in ("albedo", "normal", "position", "brightness"))
+    expected = reference.shade(*gbuffer)
+    assert (np.abs(shown["scene"] - expected) <= HALF * np.abs(expected) + 1e-5).all()
+
+
+# The glow mesh
+
+
+def test_a_glow_mesh_with_a_texture(renderer: Renderer) -> None:
+    colours, size = picture(16, 9), (16, 9)
+    scene = Scene(body=NOTHING, glow=panel(size, texture(colours)), camera=CAMERA)
+    settings = Separable(bloom_size=size, format="rgba16float")
+    np.testing.assert_array_equal(renderer.render(scene, settings, size)["glow"], colours)
+    strong = dataclasses.replace(scene, glow_intensity=4.0)
+    shown = renderer.render(strong, settings, size, shading="deferred")
+    np.testing.assert_array_equal(rgb(shown["brightness"]), 4 * rgb(colours))
+
+
+def test_emission_by_texture_and_a_glow_mesh_are_added(renderer: Renderer) -> None:
+    colours, size = picture(16, 9), (16, 9)
+    body = panel(size, emission=texture(colours), radiance=(3.0, 3.0, 3.0))
+    shown = deferred(renderer, body, size, glow=panel(size, texture(colours)))
+    expected = 4 * rgb(colours)
+    np.testing.assert_allclose(rgb(shown["brightness"]), expected, rtol=3 * HALF, atol=1e-6)
+    bright = dataclasses.replace(body, emission=np.full((4, 3), 3e38, np.float32))
+    shown = deferred(renderer, bright, size, glow=panel(size), glow_intensity=1e9)
+    assert np.isfinite(shown["brightness"]).all()
+    assert rgb(shown["brightness"]).max() == 65504
+
+
+# Several textures
+
+
+def test_surfaces_with_textures_of_several_sizes_beside_plain_triangles(renderer: Renderer) -> None:
+    size = (30, 8)
+    sides = [(10, 8), (5, 4)]
+    pictures = [picture(*side) for side in sides]
+    parts = [
+        dataclasses.replace(panel(size, across=(2 / 3, 1), colour=(0.5, 0.5, 0.5)), surfaces=()),
+        panel(size, texture(pictures[0]), across=(0, 1 / 3)),
+        panel(size, texture(pictures[1]), across=(1 / 3, 2 / 3)),
+    ]
+    body = Mesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.indices + np.uint32(4 * i) for i, part in enumerate(parts)]),
+        None,
+        np.concatenate([part.texcoords for part in parts if part.texcoords is not None]),
+        tuple(surface for part in parts for surface in part.surfaces),
+    )
+    shown = rgb(deferred(renderer, body, size)["albedo"])
+    np.testing.assert_array_equal(shown[:, :10], rgb(pictures[0]))
+    np.testing.assert_array_equal(shown[:, 10:20], rgb(pictures[1]).repeat(2, 0).repeat(2, 1))
+    np.testing.assert_array_equal(shown[:, 20:], 0.5)
+
+
+def test_hundreds_of_textures(renderer: Renderer) -> None:
+    count = 300
+    size = (count, 2)
+    shades = np.linspace(0, 1, count).astype(np.float16)
+    parts = [
+        panel(size, texture(np.full((1, 1, 4), shade)), across=(i / count, (i + 1) / count))
+        for i, shade in enumerate(shades)
+    ]
+    body = Mesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([SQUARE + np.uint32(4 * i) for i in range(count)]),
+        None,
+        np.zeros((4 * count, 4), np.float32),
+        tuple(part.surfaces[0] for part in parts),
+    )
+    shown = deferred(renderer, body, size)["albedo"]
+    np.testing.assert_array_equal(shown[..., 0], np.tile(shades, (2, 1)))
+
+
+def test_scenes_with_and_without_textures_take_turns(new_renderer: Callable[[], Renderer]) -> None:
+    renderer, size = new_renderer(), (8, 8)
+    scenes = [
+        Scene(body=body, camera=CAMERA)
+        for body in (
+            panel(size, texture(picture(8, 8))),
+            dataclasses.replace(panel(size), surfaces=()),
+            panel(size, texture(picture(4, 4))),
+        )
+    ]
+    first = [renderer.render(scene, None, size, shading="deferred") for scene in scenes]
+    for scene, expected in zip(scenes, first, strict=True):
+        again = renderer.render(scene, None, size, shading="deferred")
+        for name, array in expected.items():
+            np.testing.assert_array_equal(again[name], array, err_msg=name)
+    # The same scene again draws nothing again.
+    assert not renderer.render(scenes[-1], None, size, shading="deferred").timings
+
+
+# Mip levels
+
+
+def covered_means(line: Array, count: int) -> NDArray[np.float64]:
+    """Return the means of a line of texels over `count` equal parts of it, by its integral."""
+    edges = np.arange(len(line) + 1)
+    integral = np.concatenate(([0], np.cumsum(line.astype(np.float64))))
+    ends = np.interp(np.linspace(0, len(line), count + 1), edges, integral)
+    return np.diff(ends) * count / len(line)
+
+
+@pytest.mark.parametrize("side", [(8, 8), (7, 5), (1, 9), (13, 1), (1, 1), (6, 31)])
+def test_a_mip_level_is_the_mean_of_what_it_covers(side: tuple[int, int]) -> None:
+    levels = mip_levels(picture(*side))
+    for index, level in enumerate(levels):
+        height, width = (max(1, length >> index) for length in side[::-1])
+        assert level.shape == (height, width, 4)
+        assert level.dtype == np.float16
+    assert levels[-1].shape == (1, 1, 4)
+    for above, level in itertools.pairwise(levels):
+        expected = np.apply_along_axis(covered_means, 0, above, level.shape[0])
+        expected = np.apply_along_axis(covered_means, 1, expected, level.shape[1])
+        # Each is rounded to half, and so was what it was made of.
+        np.testing.assert_allclose(level, expected, atol=2 * HALF)
+    # No level moves the picture's brightness.
+    assert np.ptp([level.astype(np.float64).mean() for level in levels]) < 2 * HALF
+
+
+@pytest.mark.parametrize("scale", [2, 8])
+def test_a_pixel_is_the_mean_of_its_texels(renderer: Renderer, scale: int) -> None:
+    colours, size = picture(64, 64), (64 // scale, 64 // scale)
+    body = panel(size, Texture(mip_levels(colours)))
+    shown = rgb(deferred(renderer, body, size)["albedo"])
+    blocks = rgb(colours).reshape(size[1], scale, size[0], scale, 3)
+    # The level is chosen by a logarithm that devices round, so a little of the next ones may come.
+    np.testing.assert_allclose(shown, blocks.mean(axis=(1, 3)), atol=0.02)
+
+
+def test_minified_stripes_do_not_alias(renderer: Renderer) -> None:
+    stripes = np.ones((256, 256, 4), np.float16)
+    stripes[:, ::2, :3] = 0
+    # 9.14 texels a pixel: without mip levels the stripes beat with the pixels.
+    size = (28, 28)
+    smooth = deferred(renderer, panel(size, Texture(mip_levels(stripes))), size)["albedo"]
+    np.testing.assert_allclose(rgb(smooth), 0.5, atol=0.01)
+    wild = deferred(renderer, panel(size, texture(stripes)), size)["albedo"]
+    assert set(np.unique(rgb(wild))) == {0, 1}
+
+
+def test_filters_between_levels(renderer: Renderer) -> None:
+    # Levels of one colour each, so that the colour says which was read.
+    levels = tuple(np.full((64 >> i, 64 >> i, 4), i, np.float16) for i in range(7))
+    # 64 / 23 texels a pixel: level log2(2.78) = 1.48.
+    size = (23, 23)
+    shown = {
+        filter: rgb(
+            deferred(renderer, panel(size, Texture(levels, mipmap_filter=filter)), size)["albedo"]
+        )
+        for filter in ("nearest", "linear")
+    }
+    np.testing.assert_array_equal(shown["nearest"], 1)
+    # A device's logarithm may be a rough one.
+    np.testing.assert_allclose(shown["linear"], np.log2(64 / 23), atol=0.1)
+
+
+# Values
+
+
+def test_a_texture_keeps_its_own_read_only_levels() -> None:
+    colours = picture(4, 3)
+    made = Texture((colours,))
+    colours[...] = 0
+    assert made.levels[0].any()
+    assert not made.levels[0].flags.writeable
+    assert repr(made) == "Texture(4 x 3, levels: 1)"
+
+
+def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
+    size = (8, 8)
+    base = texture(picture(8, 8), address_mode=("clamp-to-edge", "repeat"))
+    body = panel(size, base, base, radiance=(1.0, 1.0, 1.0))
+    again = pickle.loads(pickle.dumps(body))
+    (surface,) = again.surfaces
+    assert surface.base is surface.emission
+    assert surface.base.address_mode == ("clamp-to-edge", "repeat")
+    shown, expected = (deferred(renderer, mesh, size) for mesh in (again, body))
+    np.testing.assert_array_equal(shown["brightness"], expected["brightness"])
+    assert body.summary == "4 triangles, 4 vertices, textures: 1"
+
+
+GOOD = picture(4, 4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"levels": ()}, ValueError, "levels is empty"),
+        ({"levels": ([[1.0]],)}, TypeError, "levels"),
+        ({"levels": (GOOD.astype(np.float32),)}, TypeError, "float16"),
+        ({"levels": (GOOD[..., :3],)}, ValueError, "(4, 4, 3)"),
+        ({"levels": (GOOD[:0],)}, ValueError, "(0, 4, 4)"),
+        ({"levels": (GOOD, GOOD)}, ValueError, "2 x 2"),
+        ({"levels": (*mip_levels(GOOD), GOOD[:1, :1])}, ValueError, "4 entries"),
+        ({"levels": (np.zeros((1, 16385, 4), np.float16),)}, ValueError, "16384"),
+        ({"levels": (np.full((1, 1, 4), np.inf, np.float16),)}, ValueError, "infinity"),
+        ({"address_mode": ("repeat",)}, ValueError, "address_mode"),
+        ({"address_mode": ("repeat", "border")}, ValueError, "'border'"),
+        ({"mag_filter": "cubic"}, ValueError, "mag_filter"),
+        ({"min_filter": "cubic"}, ValueError, "min_filter"),
+        ({"mipmap_filter": None}, ValueError, "mipmap_filter"),
+    ],
+)
+def test_textures_that_are_refused(
+    changes: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error) as caught:
+        Texture(**{"levels": (GOOD,), **changes})
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"texcoords": None}, ValueError, "texcoords is None"),
+        ({"texcoords": np.zeros((3, 4), np.float32)}, ValueError, "texcoords has 3 rows"),
+        ({"texcoords": np.zeros((4, 2), np.float32)}, ValueError, "texcoords"),
+        ({"texcoords": np.full((4, 4), np.nan, np.float32)}, ValueError, "texcoords"),
+        ({"surfaces": (5,)}, TypeError, "surfaces"),
+        ({"surfaces": (Surface(9), Surface(6))}, ValueError, "take 15 indices; there are 12"),
+    ],
+)
+def test_meshes_that_are_refused(
+    changes: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        dataclasses.replace(panel((4, 4)), **changes)
+
+
+@pytest.mark.parametrize("count", [0, -3, 4])
+def test_surfaces_that_are_refused(count: int) -> None:
+    with pytest.raises(ValueError, match=f"index_count is {count}"):
+        Surface(count)
+    with pytest.raises(TypeError, match="base"):
+        Surface(3, base=GOOD)  # type: ignore[arg-type]
+
+
+def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
+    """Give a mesh and textures to the core past the checks of `Mesh` and `Texture`."""
+    batch = renderer._core.render(
+        (serial, mesh, None, (), textures),
+        ((0, 0, -9), (0, 0, 0), 45, 0.1, 99),
+        (4, 4),
+        "forward",
+        0.0,
+        1.0,
+        None,
+    )
+    batch.add(Separable(), lambda name, shape, dtype: np.empty(shape, dtype))
+    batch.submit()
+
+
+BODY = panel((4, 4))
+RAW_BODY = (BODY.vertices, BODY.indices, None, BODY.texcoords, ((12, 0, 0),))
+RAW_WHITE = (WHITE.levels, "repeat", "repeat", "linear", "linear", "linear")
+
+
+@pytest.mark.parametrize(
+    ("mesh", "texture", "message"),
+    [
+        ((*RAW_BODY[:4], ((12, 1, 0),)), RAW_WHITE, "surface 0"),
+        ((*RAW_BODY[:4], ((12, 0, 1),)), RAW_WHITE, "surface 0"),
+        ((*RAW_BODY[:4], ((9, 0, 0), (6, 0, 0))), RAW_WHITE, "surface 1"),
+        ((*RAW_BODY[:3], None, RAW_BODY[4]), RAW_WHITE, "texcoords"),
+        ((*RAW_BODY[:3], np.zeros((3, 4), np.float32), RAW_BODY[4]), RAW_WHITE, "texcoords"),
+        (RAW_BODY, (*RAW_WHITE[:1], "edge", *RAW_WHITE[2:]), "edge"),
+        (RAW_BODY, (*RAW_WHITE[:5], "cubic"), "cubic"),
+        (RAW_BODY, ((), *RAW_WHITE[1:]), "no levels"),
+        (RAW_BODY, ((GOOD, GOOD), *RAW_WHITE[1:]), "level 1"),
+        (RAW_BODY, ((GOOD,) * 17, *RAW_WHITE[1:]), "17 mip levels"),
+        (RAW_BODY, ((GOOD[0],), *RAW_WHITE[1:]), "level 0"),
+        (
+            RAW_BODY,
+            ((np.ones((1, 2**17, 4), np.float16),), *RAW_WHITE[1:]),
+            "texture: a side of 131072 pixels is beyond this adapter's limit",
+        ),
+    ],
+)
+def test_the_core_checks_what_it_is_given(
+    renderer: Renderer, mesh: Any, texture: Any, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        draw_raw(renderer, 2**60, mesh, (texture,))
+    draw_raw(renderer, 2**61, RAW_BODY, (RAW_WHITE,))

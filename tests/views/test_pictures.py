@@ -1,0 +1,281 @@
+"""Pictures of framebuffers: PNG, and contact sheets as HTML and as PNG."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from numpy.typing import NDArray
+
+from tests.framebuffers import decode, make, mixed, noise
+from vkbloom import Separable
+from vkbloom.frames import Frames
+from vkbloom.views.pictures import contact_sheet_png, picture
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Noted(Separable):
+    """Settings whose text a page must escape."""
+
+    note: str = '</code><script>"&'
+
+
+@pytest.fixture
+def frames() -> Frames:
+    return mixed()
+
+
+class TestPng:
+    @pytest.mark.parametrize("channels", [3, 4])
+    @pytest.mark.parametrize("size", [(1, 1), (3, 5), (40, 33)])
+    def test_shows_8_bit_as_stored(
+        self, channels: int, size: tuple[int, int], tmp_path: Path
+    ) -> None:
+        image = noise(*size, channels, dtype="uint8")
+        shown = make({"final": image, "glow": noise(2, 2, 3, dtype="uint8")})._repr_png_()
+        assert np.array_equal(decode(shown, tmp_path), image)
+
+    @pytest.mark.parametrize("dtype", ["float16", "float32"])
+    def test_shows_linear_floats_by_the_srgb_curve(self, dtype: str, tmp_path: Path) -> None:
+        # 188 is the 8-bit sRGB level of 0.5, 99 that of 0.125, 3 that of 0.001 (12.92 * 0.001).
+        values = [-1.0, 0.0, 0.001, 0.125, 0.5, 1.0, 7.0, np.inf, -np.inf, np.nan]
+        levels = [0, 0, 3, 99, 188, 255, 255, 255, 0, 0]
+        image = np.array(values, dtype).reshape(1, -1, 1).repeat(4, axis=2)
+        shown = decode(make({"final": image})._repr_png_(), tmp_path)
+        assert shown[0, :, 0].tolist() == levels
+        # Alpha has no transfer curve: 0.125 * 255 and 0.5 * 255, rounded to even.
+        assert shown[0, 3:5, 3].tolist() == [32, 128]
+
+    def test_does_not_encode_twice(self, tmp_path: Path) -> None:
+        image = np.full((1, 1, 3), 0.2, np.float32)
+        frames = make({"bloom": image, "final": image}, settings=Separable(encoding="srgb"))
+        assert decode(frames._repr_png_(), tmp_path)[0, 0, 0] == 51
+        # `bloom` comes before the encoding.
+        frames = make({"bloom": image}, settings=Separable(encoding="srgb"))
+        assert decode(frames._repr_png_(), tmp_path)[0, 0, 0] == 124
+
+    def test_shows_depth_from_white_to_black(self, tmp_path: Path) -> None:
+        depth = np.array([[0.5, 0.75, 1.0, np.inf]], np.float32)
+        shown = decode(make({"depth": depth})._repr_png_(), tmp_path)
+        assert shown[0, :, 0].tolist() == [255, 128, 0, 0]
+
+    def test_stretches_by_the_range_of_another(self) -> None:
+        depth = np.array([[0.5, 0.75, 1.0, 1.5]], np.float32)
+        wider = np.array([[0.0, 1.0]], np.float32)
+        assert picture(depth, range_of=wider).ravel().tolist() == [128, 64, 0, 0]
+
+    def test_shows_16_bits_as_stored(self) -> None:
+        image = np.array([[[0, 32896, 65535]]], np.uint16)
+        assert picture(image).ravel().tolist() == [0, 128, 255]
+
+    @pytest.mark.parametrize("value", [0.0, 1.0, np.nan, np.inf, -np.inf])
+    @pytest.mark.filterwarnings("error")
+    def test_shows_flat_depth_and_position(self, value: float, tmp_path: Path) -> None:
+        flat = np.full((2, 3), value, np.float32)
+        assert (decode(make({"depth": flat})._repr_png_(), tmp_path) == 255).all()
+        position = np.stack([flat] * 3, axis=2)
+        assert (decode(make({"position": position})._repr_png_(), tmp_path) == 0).all()
+
+    def test_shows_g_buffers(self, tmp_path: Path) -> None:
+        normal = np.array([[[-1, 0, 1, 1]]], np.float16)
+        shown = decode(make({"normal": normal})._repr_png_(), tmp_path)
+        assert shown[0, 0, :3].tolist() == [0, 128, 255]
+        position = np.array([[[-4, 3, 9, 1], [4, 3, 1, 1], [0, 3, 5, 1]]], np.float16)
+        shown = decode(make({"position": position})._repr_png_(), tmp_path)
+        assert shown[0, :, 0].tolist() == [0, 255, 128]
+        assert shown[0, :, 1].tolist() == [0, 0, 0]
+        assert shown[0, :, 2].tolist() == [255, 0, 128]
+
+    def test_without_final_the_last_image_is_shown(self, tmp_path: Path) -> None:
+        glow, bloom = noise(2, 3, 4, dtype="uint8"), noise(4, 5, 4, dtype="uint8")
+        frames = make({"glow": glow, "bloom": bloom, "depth": noise(2, 2, dtype="float32")})
+        assert np.array_equal(decode(frames._repr_png_(), tmp_path), bloom)
+
+    def test_leaves_the_framebuffers_as_they_are(self, frames: Frames) -> None:
+        before = {name: array.tobytes() for name, array in frames.items()}
+        frames._repr_png_(), frames._repr_html_(), contact_sheet_png(frames)
+        assert {name: array.tobytes() for name, array in frames.items()} == before
+
+    def test_empty(self) -> None:
+        assert make({})._repr_png_() is None
+
+    def test_needs_only_numpy(self, frames: Frames, monkeypatch: pytest.MonkeyPatch) -> None:
+        with_everything = (frames._repr_png_(), frames._repr_html_())
+        monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+        monkeypatch.setitem(sys.modules, "xarray", None)
+        assert (frames._repr_png_(), frames._repr_html_()) == with_everything
+
+
+class TestHtml:
+    def pictures(self, page: str, folder: Path) -> list[NDArray[np.uint8]]:
+        found = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
+        return [decode(base64.b64decode(data, validate=True), folder) for data in found]
+
+    def test_shows_every_framebuffer_with_its_name_size_and_dtype(
+        self, frames: Frames, tmp_path: Path
+    ) -> None:
+        page = frames._repr_html_()
+        pictures = self.pictures(page, tmp_path)
+        assert [picture.shape[:2] for picture in pictures] == [a.shape[:2] for a in frames.values()]
+        assert re.findall(r'alt="(\w+),', page) == list(frames)
+        assert page.count("13 x 11, uint8") == page.count("13 x 11, uint8</span>") + 1 == 2
+
+    def test_pictures_are_averaged_down(self, tmp_path: Path) -> None:
+        image = np.zeros((200, 960, 3), np.uint8)
+        image[:, ::3] = 90
+        image[::2] += 40
+        wide, odd = make({"final": image}), make({"final": image[:199, :641]})
+        (picture,) = self.pictures(wide._repr_html_(), tmp_path)
+        assert picture.shape == (67, 320, 3)
+        # Groups of 3 x 3 pixels (some 3 x 2): a third of the columns at 90, 1 to 2 rows at 40.
+        assert set(np.unique(picture).tolist()) <= {43, 50, 57}
+        # The average of all groups is that of the image, within the uneven groups' weights.
+        assert abs(picture.mean() - image.mean()) < 0.5
+        (picture,) = self.pictures(odd._repr_html_(), tmp_path)
+        assert picture.shape == (99, 320, 3)
+
+    def test_alpha_hides_nothing(self, tmp_path: Path) -> None:
+        image = np.full((2, 2, 4), (10, 20, 30, 0), np.uint8)
+        (picture,) = self.pictures(make({"final": image})._repr_html_(), tmp_path)
+        assert picture[0, 0].tolist() == [10, 20, 30]
+
+    def test_everything_is_escaped_and_nothing_runs(self) -> None:
+        frames = make(
+            {"final": noise(1, 1, 3, dtype="uint8")}, timings={"<i>pass": 1.0}, settings=Noted()
+        )
+        page = frames._repr_html_()
+        assert "<script" not in page
+        assert "&lt;/code&gt;&lt;script&gt;" in page
+        assert "Some &lt;GPU&gt; &amp; co" in page
+        assert "&lt;i&gt;pass" in page
+        assert not {"<GPU>", "<i>", " & "} & set(re.findall(r"<GPU>|<i>| & ", page))
+        assert not re.search(r"\son\w+=", page)
+
+    def test_takes_the_colours_of_the_page(self, frames: Frames) -> None:
+        page = frames._repr_html_()
+        assert "color-scheme:light dark" in page
+        assert set(re.findall(r"[^-]color:([^;\"]+)", page)) == {"inherit"}
+
+    def test_pass_times_are_bars(self, frames: Frames) -> None:
+        page = frames._repr_html_()
+        assert re.findall(r'<div style="width:([\d.]+)%;', page) == ["25.0", "100.0", "50.0"]
+        assert re.findall(r"([\d.]+) ms", page) == ["1.000", "4.000", "2.000"]
+
+    @pytest.mark.parametrize("timings", [{}, {"glow": 0.0}, {"glow": float("nan")}])
+    def test_pass_times_that_tell_nothing(self, timings: dict[str, float]) -> None:
+        page = make({"final": noise(1, 1, 3, dtype="uint8")}, timings=timings)._repr_html_()
+        assert ("Time of each pass" in page) == bool(timings)
+        assert "nan%" not in page
+
+    def test_bright_floats_are_shown_with_less_exposure(self, tmp_path: Path) -> None:
+        # Of 100 pixels one is at 1000, which is left out as the brightest in a hundred; of the
+        # others all are 3: log2(3) rounded up to half stops is 2, and 3 / 4 is shown as 225.
+        image = np.full((10, 10, 4), 3, np.float16)
+        image[5, 5] = 1000
+        frames = make({"bloom": image, "scene": image / 3, "normal": image})
+        page = frames._repr_html_()
+        captions = re.findall(r"<span[^>]*>([^<]*)</span>", page)
+        assert captions == [
+            "10 x 10, float16, 3 to 1000, shown at -2 stops",
+            "10 x 10, float16, 1 to 333.2",
+            "10 x 10, float16, 3 to 1000",
+        ]
+        shown = self.pictures(page, tmp_path)
+        assert [picture[0, 0, 0] for picture in shown] == [225, 255, 255]
+        assert shown[0][5, 5, 0] == 255
+        # What has passed a curve is shown as it is.
+        mapped = make({"final": image}, settings=Separable(encoding="srgb"))
+        assert "stops" not in mapped._repr_html_()
+        assert "stops" in make({"final": image})._repr_html_()
+
+    def test_ranges_of_what_is_not_finite(self) -> None:
+        image = np.full((2, 2, 3), np.nan, np.float32)
+        assert ", nothing finite<" in make({"bloom": image})._repr_html_()
+        image[0, 0] = (-1, 0, np.inf)
+        assert ", -1 to 0, some not finite<" in make({"bloom": image})._repr_html_()
+
+    def test_tags_are_closed(self, frames: Frames) -> None:
+        for page in (frames._repr_html_(), make({}, timings={})._repr_html_()):
+            for tag in ("div", "figure", "figcaption", "code", "span", "b"):
+                assert len(re.findall(f"<{tag}[ >]", page)) == page.count(f"</{tag}>"), tag
+
+    def test_page_of_large_framebuffers_is_small(self) -> None:
+        ramp = np.linspace(0, 255, 1920).astype(np.uint8)
+        image = np.broadcast_to(ramp[np.newaxis, :, np.newaxis], (1080, 1920, 4))
+        page = make({f"down_{level}": image for level in range(9)})._repr_html_()
+        assert len(page) < 100_000
+
+
+class TestContactSheet:
+    def test_holds_every_picture_in_rows(self, tmp_path: Path) -> None:
+        colours = {"glow": (250, 0, 0), "bloom": (0, 250, 0), "final": (0, 0, 250)}
+        heights = {"glow": 90, "bloom": 45, "final": 90}
+        frames = make(
+            {name: np.full((heights[name], 160, 3), colours[name], np.uint8) for name in colours}
+        )
+        sheet = decode(contact_sheet_png(frames, columns=2, width=160), tmp_path)
+        # Margins of 11 pixels, two lines of title, three of labels; "bloom" is half as high.
+        boxes = {"glow": (33, 11), "bloom": (33 + 22, 182), "final": (33 + 90 + 44, 11)}
+        for name, colour in colours.items():
+            rows, columns = np.nonzero((sheet == colour).all(axis=2))
+            assert len(rows) == heights[name] * 160
+            assert (rows.min(), columns.min()) == boxes[name]
+            assert (rows.max(), columns.max()) == (
+                boxes[name][0] + heights[name] - 1,
+                boxes[name][1] + 159,
+            )
+
+    def test_labels_are_drawn(
+        self, frames: Frames, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        labelled = decode(contact_sheet_png(frames), tmp_path)
+        monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+        with pytest.warns(UserWarning, match=r"no labels.*vkbloom\[images\]"):
+            data = contact_sheet_png(frames)
+        monkeypatch.undo()
+        bare = decode(data, tmp_path)
+        changed = np.nonzero((labelled != bare).any(axis=(1, 2)))[0]
+        assert labelled.shape == bare.shape
+        # A title, then two lines below each of the two rows of pictures.
+        assert np.count_nonzero(np.diff(changed) > 50) == 2
+        assert labelled[changed].max() > 200
+
+    def test_missing_fonts_are_a_warning(
+        self, frames: Frames, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(oiio.ImageBufAlgo, "render_text", lambda *arguments: False)
+        with pytest.warns(UserWarning, match="no labels"):
+            assert contact_sheet_png(frames).startswith(b"\x89PNG")
+
+    @pytest.mark.parametrize("size", [(1, 1), (1, 3000), (3000, 1)])
+    def test_strips_stay_within_bounds(self, size: tuple[int, int], tmp_path: Path) -> None:
+        frames = make(
+            {"glow": noise(4, 4, 4, dtype="uint8"), "final": noise(*size, 3, dtype="uint8")}
+        )
+        sheet = decode(contact_sheet_png(frames), tmp_path)
+        assert max(sheet.shape) < 1000
+
+    @pytest.mark.parametrize(
+        ("arguments", "error", "message"),
+        [
+            ({"columns": 0}, ValueError, "columns: 0 is outside 1 to 32"),
+            ({"width": 127}, ValueError, "width: 127 is outside 128 to 4096"),
+            ({"width": 320.0}, TypeError, "width: an int"),
+        ],
+    )
+    def test_arguments_out_of_range(
+        self, frames: Frames, arguments: dict[str, Any], error: type[Exception], message: str
+    ) -> None:
+        with pytest.raises(error, match=message):
+            contact_sheet_png(frames, **arguments)
+
+    def test_empty(self) -> None:
+        with pytest.raises(ValueError, match="frames"):
+            contact_sheet_png(make({}))
