@@ -96,7 +96,14 @@
     THRESHOLD_ROWS(B, SETTING) \
     SETTING(B, highlight, 1000.0, 10.0, 65504.0) \
     SETTING(B, clamp_max, 65472.0, 0.0, 65504.0) \
-    SETTING(B, smooth_width, 0.01, 0.0001, 65504.0)
+    SETTING(B, smooth_width, 0.01, 0.0001, 65504.0) \
+    SETTING(B, threshold_scale, 2.0, 0.0, 65504.0) \
+    SETTING(B, luminance_cap, 12.0, 0.0, 65504.0) \
+    SETTING(B, glow_bloom, 0.0, 0.0, 1.0) \
+    SETTING(B, strength, 1.0, 0.0, 16.0) \
+    SETTING(B, smoothness, 0.1, 0.0, 1.0) \
+    SETTING(B, maximum, 3.4e38, 0.0, 65504.0) \
+    INPUT(B, float, exposure)
 
 // Levels of several sizes into one image, with their weights.
 #define GATHER_BLOCK(B, SETTING, INPUT, VEC4S) \
@@ -109,6 +116,14 @@
 
 // The light of the deferred system.
 #define LIGHTING_BLOCK(B, SETTING, INPUT, VEC4S) INPUT(B, float, limit)
+
+// The composite of Godot.
+#define GODOT_FINAL_BLOCK(B, SETTING, INPUT, VEC4S) \
+    SETTING(B, white, 1.0, 0.01, 65504.0) \
+    INPUT(B, float, intensity) \
+    INPUT(B, float, exposure) \
+    INPUT(B, float, limit) \
+    INPUT(B, int, noise_seed)
 
 #define COMPOSITE_BLOCK(B, SETTING, INPUT, VEC4S) \
     SETTING(B, intensity, 1.0, 0.0, 65504.0) \
@@ -128,7 +143,8 @@
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
-    BLOCK(composite, COMPOSITE_BLOCK)
+    BLOCK(composite, COMPOSITE_BLOCK) \
+    BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
 // Settings that no shader reads, for they shape the graph.
 // Whole numbers: COUNT(name, default, min, max); a flag is one of 0 and 1.
@@ -145,7 +161,10 @@
     COUNT(anti_flicker, 1, 0, 1) \
     COUNT(resolution, 384, 16, 2048) \
     COUNT(iterations, 6, 2, 8) \
-    COUNT(high_quality_filtering, 1, 0, 1)
+    COUNT(high_quality_filtering, 1, 0, 1) \
+    COUNT(node, 0, 0, 1) \
+    COUNT(bicubic, 1, 0, 1) \
+    COUNT(karis_average, 0, 0, 1)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \
@@ -153,10 +172,14 @@
     REAL(low_frequency_boost, 0.7, 0.0, 1.0) \
     REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
     REAL(high_pass_frequency, 1.0, 0.001, 1.0) \
-    REAL(scatter, 0.7, 0.0, 1.0)
+    REAL(scatter, 0.7, 0.0, 1.0) \
+    REAL(size, 0.5, 0.0, 1.0) \
+    REAL(filter_radius, 0.005, 0.0, 1.0)
 
-// The largest half float.
+// The largest half float, and the largest float of 11 bits; that of 10 bits is less.
 #define HALF_LIMIT 65504.0
+#define UFLOAT11_LIMIT 65024.0
+#define UFLOAT10_LIMIT 64512.0
 
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
@@ -188,14 +211,17 @@
 #define TILE_RADIUS 16
 #define WHOLE_VEC4S 5
 
-// The levels that one pass gathers.
-#define GATHERED_LEVELS 5
+// The most levels that one pass gathers, and the most of a chain.
+#define GATHERED_LEVELS 7
+#define MAX_LEVELS 16
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
     NAME(COMPOSITE_ADD, 0, add) \
     NAME(COMPOSITE_MIX, 1, mix) \
-    NAME(COMPOSITE_SCREEN, 2, screen)
+    NAME(COMPOSITE_SCREEN, 2, screen) \
+    NAME(COMPOSITE_SOFT_LIGHT, 3, soft_light) \
+    NAME(COMPOSITE_REPLACE, 4, replace)
 
 #define TONEMAP_NAMES(NAME) \
     NAME(TONEMAP_NONE, 0, none) \
@@ -235,8 +261,11 @@
     NAME(STORED_UNORM8, 0, unorm8) \
     NAME(STORED_HALF, 1, half) \
     NAME(STORED_SINGLE, 2, single) \
+    NAME(STORED_UFLOAT, 3, ufloat) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
-    NAME(UPSAMPLE_CUBIC, 2, cubic)
+    NAME(UPSAMPLE_CUBIC, 2, cubic) \
+    NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
+    NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic)

@@ -19,6 +19,13 @@ bool vkb_is_published(const struct vkb_settings *settings)
     return methods[settings->method].published;
 }
 
+enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers)
+{
+    return buffers == VKB_FORMAT_RG11B10_UFLOAT && vkb_is_published(settings)
+             ? VKB_FORMAT_RGBA32_FLOAT
+             : buffers;
+}
+
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
@@ -144,6 +151,23 @@ bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32
     return vkb_graph_add_pass(graph, &row, error);
 }
 
+// Godot's composite, which no variant of the others stands for.
+static void make_godots(const struct vkb_settings *settings, struct vkb_pass_row *row)
+{
+    const struct vkb_composite_params params = row->params.composite;
+
+    row->shader = VKB_SHADER_godot_final_frag;
+    row->block = VKB_BLOCK_godot_final;
+    memset(&row->params, 0, sizeof row->params);
+    row->params.godot_final = (struct vkb_godot_final_params){
+        .white = settings->values.godot_final.white,
+        .intensity = params.intensity,
+        .exposure = params.exposure,
+        .limit = params.limit,
+        .noise_seed = params.noise_seed,
+    };
+}
+
 bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
                        enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -176,5 +200,7 @@ bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint
     row.params.composite = settings->values.composite;
     row.params.composite.limit = vkb_formats[image.format].limit;
     row.params.composite.noise_seed = dither ? settings->values.dither_seed : 0;
+    if (settings->method == VKB_METHOD_GODOT && !off)
+        make_godots(settings, &row);
     return vkb_graph_add_pass(graph, &row, error);
 }

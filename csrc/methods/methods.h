@@ -85,6 +85,10 @@ VKB_METHODS(VKB_METHOD_FUNCTION)
 
 bool vkb_is_published(const struct vkb_settings *settings);
 
+// The format of what a method starts from and of the bloom, for bloom buffers of that format: of
+// the R11G11B10 of engines only the levels are, the frame before and after has a format of its own.
+enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers);
+
 // The last pass: `scene` and `bloom` (VKB_NO_IMAGE: none) to the framebuffer "final", of that
 // format and with the scene's channels.
 bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,

@@ -26,6 +26,7 @@ const enum vkb_mode vkb_stored_as[VKB_FORMAT_COUNT] = {
     [VKB_FORMAT_RGBA8_UNORM] = STORED_UNORM8,
     [VKB_FORMAT_RGBA16_FLOAT] = STORED_HALF,
     [VKB_FORMAT_RGBA32_FLOAT] = STORED_SINGLE,
+    [VKB_FORMAT_RG11B10_UFLOAT] = STORED_UFLOAT,
 };
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)

@@ -90,7 +90,8 @@ static bool doubles(const struct vkb_graph *graph, const struct vkb_pass_row *pa
     const int kernel = pass->constants[2];
 
     *radius = kernel == UPSAMPLE_TENT ? params->step_x : 0.0;
-    return pass->shader == VKB_SHADER_pyramid_up_frag && kernel != UPSAMPLE_CUBIC
+    return pass->shader == VKB_SHADER_pyramid_up_frag
+        && (kernel == UPSAMPLE_TENT || kernel == UPSAMPLE_LINEAR)
         && is_twice(graph, pass->targets[0], pass->reads[0]) && *radius <= 1.0
         && (kernel != UPSAMPLE_TENT || params->step_x == params->step_y);
 }

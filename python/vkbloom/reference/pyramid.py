@@ -90,16 +90,12 @@ def passes(
     weights = settings.level_weights
     shares = [1.0] * count if weights is None else [float(w) for w in weights[:count]]
     gain = 1 / count if weights is None else 1.0
-    # What up_k holds is its sum divided by this.
-    scales = [1.0] * count
-    if store.high == 1:
-        scales = [sum(map(abs, shares[k:])) or 1.0 for k in range(count)]
-    # The smallest level is stored without its weight.
+    # The sum is what is stored, times the factor; the smallest level is stored without its weight.
     up, factor = downs[-1], shares[-1]
     for k in range(count - 2, -1, -1):
-        upsampled = factor * _tent(up, sizes[k], settings.radius)
-        up = store((shares[k] * downs[k] + upsampled) / scales[k])
-        factor = scales[k]
+        total = shares[k] * downs[k] + factor * _tent(up, sizes[k], settings.radius)
+        factor = (abs(shares[k]) + abs(factor) or 1.0) if store.high == 1 else 1.0
+        up = store(total / factor)
         framebuffers[f"up_{k}"] = up
     framebuffers["bloom"] = store(gain * factor * _tent(up, size, settings.radius))
     return framebuffers
