@@ -62,10 +62,10 @@ class GodotBloom(Settings):
     Level i has the size floor(side / 2) >> i of the frame, never under 1. It is the image above it,
     the first one the frame, read bilinearly at the level's pixel centres, then blurred by the
     half-kernel 0.2024, 0.1790, 0.1240, 0.0672, 0.0285 along both axes, times the strength. Samples
-    come in pairs: place n reads clamp(2 floor(n / 2), 0, W - 2) + n mod 2, so that beyond the border
-    the last two repeat, and of an odd width the last pixel reads the one before it. Sides of 1 are
-    undefined in Godot; here all their places read the one sample. For the first level c is divided
-    by 1 + L before the blur and by 1 - L after it, L = max((0.299, 0.587, 0.114) . c, 0) /
+    come in pairs: place n reads clamp(2 floor(n / 2), 0, W - 2) + n mod 2, so that beyond the
+    border the last two repeat, and of an odd width the last pixel reads the one before it. Sides of
+    1 are undefined in Godot; here all their places read the one sample. For the first level c is
+    divided by 1 + L before the blur and by 1 - L after it, L = max((0.299, 0.587, 0.114) . c, 0) /
     max(cap, 6); then follow strength and exposure, then the factor
     max(smoothstep(threshold, threshold + scale, max(c)), glow_bloom), then the cap. ``bloom`` is
     the sum of the levels, enlarged, times their weights; a weight up to 0.0001 counts as 0, and

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 #: - ``"godot_4_5"``, ``"godot_4_6"``: godotengine/godot, servers/rendering/renderer_rd/shaders/
 #:   effects: copy.glsl @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc, with the environment's defaults
 #:   up to 4.5 and from 4.6 on.
-#: - ``"blender_bloom"``: the Glare node of Blender 4.5, type Bloom, quality High, with its defaults.
+#: - ``"blender_bloom"``: the Glare node of Blender 4.5, type Bloom, quality High, its defaults.
 #: - ``"pygfx"``: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
 presets: Mapping[str, Settings] = MappingProxyType(
     {

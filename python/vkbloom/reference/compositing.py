@@ -54,8 +54,9 @@ def composite(
 
     With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" s + (b - s) i
     and "screen" 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies
-    by 2^e. `vkbloom.GodotBloom` has composites of its own, with the exposure before. Dither rounds uint8 to floor(255 c + n) / 255 with c clamped to 0..1 and n a noise
-    of 0..1, and leaves other types alone. All of it works on rgb; alpha is the scene's.
+    by 2^e. `vkbloom.GodotBloom` has composites of its own, with the exposure before. Dither rounds
+    uint8 to floor(255 c + n) / 255 with c clamped to 0..1 and n a noise of 0..1, and leaves other
+    types alone. All of it works on rgb; alpha is the scene's.
 
     A component of the scene that is NaN or infinite stays so. To the tone maps that mix the
     channels it counts as 0.

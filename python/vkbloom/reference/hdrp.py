@@ -124,7 +124,10 @@ def _along_both(
 
 def _convolve(rows: Array, count: int) -> Array:
     """Apply the binomial to rows of which the first is _RADIUS before the result's first."""
-    return np.sum([weight * rows[i : i + count] for i, weight in enumerate(_KERNEL)], axis=0)
+    total = np.zeros((count, *rows.shape[1:]))
+    for i, weight in enumerate(_KERNEL):
+        total += weight * rows[i : i + count]
+    return total
 
 
 def _blur_rows(image: Array, count: int) -> Array:
@@ -151,10 +154,8 @@ def _cubic_rows(image: Array, count: int) -> Array:
     """Read the cubic B-spline as two bilinear taps, neither beyond 1 - 1 / count."""
     length = image.shape[0]
     furthest = (1 - 1 / count) * length - 0.5
-    return np.sum(
-        [
-            weight[:, np.newaxis, np.newaxis] * read_rows(image, np.minimum(position, furthest))
-            for position, weight in spline_taps(_up_positions(length, count))
-        ],
-        axis=0,
-    )
+    total = np.zeros((count, *image.shape[1:]))
+    for position, weight in spline_taps(_up_positions(length, count)):
+        rows = read_rows(image, np.minimum(position, furthest))
+        total += weight[:, np.newaxis, np.newaxis] * rows
+    return total

@@ -111,7 +111,8 @@ def _as_rg11b10(image: Array) -> Array:
     kept = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 2.0**16 - 2.0 ** (15 - bits))
     _, exponent = np.frexp(kept)
     step = np.exp2(np.maximum(exponent - 1, -14) - bits)
-    return np.minimum(np.round(kept / step) * step, 2.0**16 - 2.0 ** (15 - bits))
+    rounded: Array = np.round(kept / step) * step
+    return rounded
 
 
 _STORAGES = {

@@ -104,7 +104,7 @@ def passes(
 def gain(settings: PyramidSettings, size: tuple[int, int]) -> float:
     """Return what a flat image of 1 becomes: 1, as the weights of every filter sum to 1.
 
-    With level weights it is the sum of those that count, which are fewer where the chain ends early.
+    With level weights it is the sum of those that count, fewer where the chain ends early.
     """
     if settings.level_weights is None:
         return 1.0

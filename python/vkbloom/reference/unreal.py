@@ -41,10 +41,10 @@ def passes(
     """Return the framebuffers.
 
     down_0 and "bright" have half of the frame's size, rounded (of `node` floored), each next level
-    half of the one above, likewise. Each level is the one above it, the first one "bright", blurred by a Gaussian
-    along x with taps one pixel of the level apart, then along y. up_0 is the sum of the levels,
-    each bilinear and with its factor; the bloom is up_0, bilinear. In buffers that end at 1, up_0
-    is divided by the sum of the factors, 3.
+    half of the one above, likewise. Each level is the one above it, the first one "bright", blurred
+    by a Gaussian along x with taps one pixel of the level apart, then along y. up_0 is the sum of
+    the levels, each bilinear and with its factor; the bloom is up_0, bilinear. In buffers that end
+    at 1, up_0 is divided by the sum of the factors, 3.
 
     Parameters
     ----------
