@@ -20,9 +20,9 @@ docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
 
-# BENCH: more options of vkbloom bench.
+# BENCH: more options of python -m benchmarks.
 bench: build/stamp/core build/stamp/peers
-	$(PYTHON) -m vkbloom.bench --out out/bench.md $(BENCH)
+	$(PYTHON) -m benchmarks --out out/bench.md $(BENCH)
 
 lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .

@@ -27,11 +27,13 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
         if (!vkb_levels_image(&levels, "down_%u", level, size, &levels.downs[level], error))
             return false;
         size = vkb_halved(size);
-        struct vkb_pass_row row = vkb_pyramid_row(
-            &levels, level ? VKB_SHADER_pyramid_down_frag : VKB_SHADER_pygfx_down_frag, from,
-            levels.downs[level]);
-        row.constants[1] = level == 0 && settings->values.karis_average;
-        row.constant_count = 2;
+        struct vkb_pass_row row =
+            level ? vkb_down_row(&levels, false, from, levels.downs[level])
+                  : vkb_pyramid_row(&levels, VKB_SHADER_pygfx_down_frag, from, levels.downs[0]);
+        if (level == 0) {
+            row.constants[1] = settings->values.karis_average;
+            row.constant_count = 2;
+        }
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

@@ -185,9 +185,10 @@ PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments)
     PyObject *scene_tuple, *camera, *names, *shading;
     struct vkb_scene_source source = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!O!(II)OddO:render", &PyTuple_Type, &scene_tuple,
-                          &PyTuple_Type, &camera, &source.size.width, &source.size.height, &shading,
-                          &source.time, &source.glow_intensity, &names)
+    if (!PyArg_ParseTuple(arguments, "O!O!(O&O&)OddO:render", &PyTuple_Type, &scene_tuple,
+                          &PyTuple_Type, &camera, vkb_read_uint32, &source.size.width,
+                          vkb_read_uint32, &source.size.height, &shading, &source.time,
+                          &source.glow_intensity, &names)
         || !vkb_read_camera(camera, &source.camera))
         return NULL;
     struct batch *self = new_batch(renderer, names);
@@ -376,9 +377,7 @@ static PyObject *submit(PyObject *object, PyObject *unused)
                             (uint32_t)self->count, &self->flight, &error);
     if (done && source.input)
         self->specials = renderer->frame.upload.specials;
-    // A validation message says more than what it led to.
-    if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, &error) && done;
+    done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
     release_source(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
@@ -445,8 +444,7 @@ static PyObject *collect(PyObject *object, PyObject *unused)
     done = renderer->open
              ? vkb_frame_collect(&renderer->device, &renderer->frame, flight, &over, &error)
              : vkb_require_open(renderer, &error);
-    if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, &error) && done;
+    done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
     if (!over) {
         set_adrift(self, flight);

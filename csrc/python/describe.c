@@ -97,8 +97,9 @@ PyObject *vkb_describe(PyObject *module, PyObject *arguments)
     struct vkb_error error = {0};
     int has_sky;
 
-    if (!PyArg_ParseTuple(arguments, "O(II)ps:describe", &settings_object, &source.size.width,
-                          &source.size.height, &has_sky, &shading)
+    if (!PyArg_ParseTuple(arguments, "O(O&O&)ps:describe", &settings_object, vkb_read_uint32,
+                          &source.size.width, vkb_read_uint32, &source.size.height, &has_sky,
+                          &shading)
         || !vkb_read_settings(vkb_module_state(module), settings_object, &settings))
         return NULL;
     source.has_sky = has_sky;

@@ -10,6 +10,7 @@
 #include "methods/methods.h"
 #include "run/frame.h"
 #include "variants/forms.h"
+#include "vulkan/process.h"
 
 #include <stdatomic.h>
 
@@ -17,7 +18,6 @@ struct vkb_module_state {
     PyObject *renderer_type, *batch_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
-    PyObject *lacking;  // dict of type to bytes: which of those its objects lack
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);
@@ -45,9 +45,11 @@ struct vkb_renderer {
     struct vkb_cargo *adrift;  // touched with the GIL
     long process;              // that opened it: the device is no other's, not even a forked one's
     atomic_bool open;          // changed with the lock, looked at without
-    PyObject *array_memory;    // a capsule, which the arrays hold too; NULL: closed
+    const struct vkb_messages *before;  // whose the messages are when the holder leaves
+    PyObject *array_memory;             // a capsule, which the arrays hold too; NULL: closed
     PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
     size_t pipeline_count;     // made so far; read and written with the GIL
+    struct vkb_cached cached;  // read and written with the GIL
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -63,13 +65,15 @@ bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *err
 bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
 void vkb_renderer_leave(struct vkb_renderer *renderer);
 
+// Whether what was `done` is so without a validation message either: such a message says more than
+// the failure that it led to. After an interruption, whose exception is set, the messages wait for
+// the next call. With the lock.
+bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struct vkb_error *error);
+
 // Whether this is the process that opened the renderer.
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Takes the cargo over, whose flight may be in the air.
 void vkb_renderer_set_adrift(struct vkb_renderer *renderer, struct vkb_cargo *cargo);
-
-// Whose the device is: this process's number, whatever it was forked from.
-long vkb_current_process(void);
 
 // Memory for large arrays that the device writes to without a copy; false with an exception set.
 bool vkb_array_memory_create(struct vkb_renderer *renderer);
@@ -87,13 +91,18 @@ PyObject *vkb_batch_of_image(PyObject *renderer, PyObject *arguments);
 // Makes what vkb_read_settings keeps in the state; false with an exception set.
 bool vkb_make_attributes(struct vkb_module_state *state);
 
-// A settings object's attributes; one that it lacks keeps its default. Objects of one type have the
-// same attributes. False with an exception set.
+// A settings object's attributes; one that it lacks keeps its default. False with an
+// exception set.
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 
 // Whether it is a tuple, as PyArg_ParseTuple must have it; else with a TypeError set.
 bool vkb_require_tuple(PyObject *object, const char *what);
+
+// Converters of PyArg_ParseTuple ("O&"), whose own codes for whole numbers without a sign take any
+// number modulo 2^32. 0 with an exception set.
+int vkb_read_uint32(PyObject *object, void *number);
+int vkb_read_serial(PyObject *object, void *number);  // 64 bits, not 0
 
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
@@ -137,6 +146,7 @@ PyObject *vkb_describe(PyObject *module, PyObject *arguments);
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);
 PyObject *vkb_fault_state(PyObject *module, PyObject *unused);
+PyObject *vkb_fault_forget(PyObject *module, PyObject *unused);
 #endif
 
 #endif

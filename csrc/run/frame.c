@@ -38,10 +38,10 @@ static bool write_recipe(struct vkb_run *run, uint32_t first, uint32_t end, stru
 {
     run->recipe_size = 0;
     for (uint32_t i = first; i < end; ++i) {
-        struct vkb_pass_row row;
+        struct vkb_pass_row row = run->graph->passes[i];
+        unsigned char bytes[sizeof row];
         uint64_t versions[VKB_MAX_READS + 1] = {0};
 
-        memcpy(&row, &run->graph->passes[i], sizeof row);
         for (uint32_t read = 0; read < row.read_count; ++read)
             versions[read] = run->slots[row.reads[read]]->version;
         if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
@@ -49,7 +49,8 @@ static bool write_recipe(struct vkb_run *run, uint32_t first, uint32_t end, stru
         memset(row.reads, 0, sizeof row.reads);
         memset(row.targets, 0, sizeof row.targets);
         row.depth = row.depth != VKB_NO_IMAGE;
-        if (!append(run, &row, sizeof row, error) || !append(run, versions, sizeof versions, error))
+        if (!append(run, bytes, vkb_pass_pack(&row, bytes), error)
+            || !append(run, versions, sizeof versions, error))
             return false;
     }
     return true;
@@ -354,6 +355,29 @@ static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb
     return true;
 }
 
+// Begins a submission: what no submission has used for long, and none may still use, goes.
+static void trim(const struct vkb_device *device, struct vkb_frame *frame,
+                 struct vkb_flight *flight)
+{
+    flight->number = ++frame->submissions;
+    const struct vkb_age age = {
+        .now = flight->number,
+        .pending = vkb_flights_pending(&frame->flights, flight->number),
+    };
+
+    vkb_pipelines_trim(device, &frame->pipelines, &age);
+    vkb_slots_trim(device, &frame->slots, &age);
+}
+
+struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
+{
+    return (struct vkb_cached){
+        .pipelines = frame->pipelines.entry_count,
+        .framebuffers = frame->slots.framebuffer_count,
+        .image_bytes = vkb_slots_size(&frame->slots),
+    };
+}
+
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
                       const struct vkb_frame_source *source, struct vkb_point *points,
                       uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error)
@@ -369,6 +393,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     if (!renew(device, frame, error)
         || !vkb_flights_take(device, &frame->flights, &run.flight, error))
         return false;
+    trim(device, frame, run.flight);
     done = (run.slots = vkb_alloc(error, image_count, sizeof *run.slots))
         && (run.wanted = vkb_alloc(error, image_count, sizeof *run.wanted))
         && (run.needed = vkb_alloc(error, pass_count, sizeof *run.needed))
@@ -448,7 +473,7 @@ bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct v
     return true;
 }
 
-bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
+bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
 {
-    return vkb_flights_land(device, &frame->flights, error);
+    return vkb_flights_end(device, &frame->flights, error);
 }

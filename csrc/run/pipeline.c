@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-// Keys are compared byte by byte: fill them from zero, padding included.
+// Keys are compared byte by byte, so they have no padding.
 struct render_pass_key {
     enum vkb_format formats[VKB_MAX_TARGETS];
     enum vkb_format depth_format;
@@ -13,6 +13,10 @@ struct render_pass_key {
     struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
     uint32_t use_count;
 };
+_Static_assert(sizeof(struct render_pass_key)
+                   == (VKB_MAX_TARGETS + 4) * sizeof(uint32_t)
+                          + sizeof(struct vkb_target_use[VKB_MAX_TARGETS + 1]),
+               "a render pass's key has padding");
 
 struct vkb_render_pass_entry {
     struct render_pass_key key;
@@ -20,20 +24,24 @@ struct vkb_render_pass_entry {
 };
 
 struct pipeline_key {
-    enum vkb_shader vertex, shader;
-    enum vkb_geometry geometry;
-    enum vkb_binding_kind bindings;
-    bool textured;
-    enum vkb_blend blend;
+    VkRenderPass render_pass;
+    uint32_t vertex, shader;      // enum vkb_shader
+    uint32_t geometry, bindings;  // enum vkb_geometry, enum vkb_binding_kind
+    uint32_t textured;
+    uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
     uint32_t constant_count;
     int32_t constants[VKB_MAX_CONSTANTS];
-    VkRenderPass render_pass;
+    uint32_t zero;
 };
+_Static_assert(sizeof(struct pipeline_key)
+                   == sizeof(VkRenderPass) + (8 + VKB_MAX_CONSTANTS + 1) * sizeof(uint32_t),
+               "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
     struct pipeline_key key;
     VkPipeline handle;
+    uint64_t used;  // by which submission last
 };
 
 static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
@@ -172,6 +180,25 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
     vkb_free(pipelines->entries);
     vkb_free(pipelines->render_passes);
     *pipelines = (struct vkb_pipelines){0};
+}
+
+void vkb_pipelines_trim(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                        const struct vkb_age *age)
+{
+    const size_t left = pipelines->entry_count > VKB_KEPT_PIPELINES ? VKB_KEPT_PIPELINES / 2
+                                                                    : pipelines->entry_count;
+
+    pipelines->now = age->now;
+    while (pipelines->entry_count > left) {
+        struct vkb_pipeline_entry *oldest = &pipelines->entries[0];
+        for (size_t i = 1; i < pipelines->entry_count; ++i)
+            if (pipelines->entries[i].used < oldest->used)
+                oldest = &pipelines->entries[i];
+        if (!vkb_is_old(oldest->used, age))
+            return;
+        device->vk.vkDestroyPipeline(device->handle, oldest->handle, NULL);
+        *oldest = pipelines->entries[--pipelines->entry_count];
+    }
 }
 
 bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
@@ -504,6 +531,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     for (size_t i = 0; i < pipelines->entry_count; ++i)
         if (memcmp(&pipelines->entries[i].key, &key, sizeof key) == 0) {
             *pipeline = pipelines->entries[i].handle;
+            pipelines->entries[i].used = pipelines->now;
             return true;
         }
     if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
@@ -513,6 +541,8 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];
     memcpy(&entry->key, &key, sizeof key);
     entry->handle = *pipeline;
+    entry->used = pipelines->now;
+    ++pipelines->created;
     return true;
 }
 

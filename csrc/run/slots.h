@@ -1,9 +1,11 @@
 // The images that live from frame to frame, each under its name, with what it was made from. An
-// image is kept until a graph wants another size or format of it.
+// image is kept until a graph wants another size or format of it, or until it is old and the images
+// take much memory.
 #ifndef VKB_SLOTS_H
 #define VKB_SLOTS_H
 
 #include "graph/graph.h"
+#include "run/age.h"
 #include "vulkan/memory.h"
 
 struct vkb_slot {
@@ -13,7 +15,8 @@ struct vkb_slot {
     uint64_t version;       // given anew each time that the image is written
     unsigned char *recipe;  // what it was last made from, byte by byte comparable
     size_t recipe_size, recipe_capacity;
-    bool valid;  // once the device has run all that was recorded, it holds what the recipe says
+    uint64_t used;  // by which submission last
+    bool valid;     // once the device has run all that was recorded, it holds what the recipe says
 };
 
 struct vkb_framebuffer_entry;
@@ -22,9 +25,19 @@ struct vkb_slots {
     struct vkb_slot **slots;  // pointers, so that they stay where they are
     size_t count, capacity;
     uint64_t clock;  // the last id or version given out
+    uint64_t now;    // the number of the submission that uses them
     struct vkb_framebuffer_entry *framebuffers;
     size_t framebuffer_count, framebuffer_capacity;
 };
+
+// Bytes of all images' pixels.
+uint64_t vkb_slots_size(const struct vkb_slots *slots);
+
+// Begins a submission. Where the images take more than VKB_KEPT_IMAGE_BYTES, the old ones are
+// destroyed with their framebuffers, the oldest first, until half of that is left.
+enum { VKB_KEPT_IMAGE_BYTES = 256 << 20 };
+void vkb_slots_trim(const struct vkb_device *device, struct vkb_slots *slots,
+                    const struct vkb_age *age);
 
 void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots);
 

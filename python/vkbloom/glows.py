@@ -14,9 +14,9 @@ from vkbloom.settings import (
     BloomFormat,
     Composite,
     Settings,
-    _flag,
-    _number,
     check_level_weights,
+    flag_field,
+    number_field,
 )
 
 __all__ = ["GODOT_LEVELS", "BlenderGlare", "GodotBloom", "PygfxBloom"]
@@ -80,15 +80,15 @@ class GodotBloom(Settings):
 
     threshold: float | None = 1.0
     composite: Composite = "screen"
-    intensity: float = _number("intensity", default=0.3)
+    intensity: float = number_field("intensity", default=0.3)
     format: BloomFormat | None = "rgba16float"
-    threshold_scale: float = _number("threshold_scale")
-    luminance_cap: float = _number("luminance_cap")
-    glow_bloom: float = _number("glow_bloom")
-    strength: float = _number("strength")
+    threshold_scale: float = number_field("threshold_scale")
+    luminance_cap: float = number_field("luminance_cap")
+    glow_bloom: float = number_field("glow_bloom")
+    strength: float = number_field("strength")
     level_weights: tuple[float, ...] = (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0)
-    bicubic: bool = _flag("bicubic")
-    white: float = _number("white")
+    bicubic: bool = flag_field("bicubic")
+    white: float = number_field("white")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -140,9 +140,9 @@ class BlenderGlare(Settings):
 
     threshold: float | None = 1.0
     format: BloomFormat | None = "rgba16float"
-    smoothness: float = _number("smoothness")
+    smoothness: float = number_field("smoothness")
     # --size is that of a frame.
-    size: float = _number("size", option="glare-size")
+    size: float = number_field("size", option="glare-size")
     maximum: float | None = None
 
     def __post_init__(self) -> None:
@@ -185,11 +185,11 @@ class PygfxBloom(Settings):
     composites: ClassVar[tuple[Composite, ...]] = ("mix",)
 
     composite: Composite = "mix"
-    intensity: float = _number("intensity", default=0.04)
+    intensity: float = number_field("intensity", default=0.04)
     format: BloomFormat | None = "rgba16float"
-    levels: int = _number("levels")
-    filter_radius: float = _number("filter_radius")
-    karis_average: bool = _flag("karis_average")
+    levels: int = number_field("levels")
+    filter_radius: float = number_field("filter_radius")
+    karis_average: bool = flag_field("karis_average")
 
     def __post_init__(self) -> None:
         super().__post_init__()

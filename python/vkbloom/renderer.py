@@ -6,17 +6,16 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
-from vkbloom.checks import check_size, check_time
+from vkbloom.checks import check_attachments, check_image, check_size, check_time
 from vkbloom.frames import Frames
-from vkbloom.io import pipeline_cache
-from vkbloom.settings import Separable, Settings
+from vkbloom.settings import SHADINGS, Settings, Shading, check_settings
+from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,18 +26,6 @@ if TYPE_CHECKING:
 
     from vkbloom.scene import Mesh, Scene
     from vkbloom.scene.textures import Texture
-
-Shading = Literal["forward", "deferred"]
-SHADINGS: tuple[Shading, ...] = get_args(Shading)
-
-# In this machine's byte order: for all but those, more is asked.
-_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
-
-
-def _version() -> str:
-    from vkbloom import __version__  # noqa: PLC0415  the package imports this module
-
-    return __version__
 
 
 def _frame_seconds() -> float:
@@ -51,47 +38,6 @@ def _frame_seconds() -> float:
     if not seconds > 0:
         raise ValueError(f"VKBLOOM_TIMEOUT: {text!r} is not a number of seconds above 0")
     return seconds
-
-
-def _check_settings(settings: Settings | None) -> Settings:
-    if settings is None:
-        return Separable()
-    if not isinstance(settings, Settings):
-        raise TypeError(f"settings: Settings are needed, not {settings!r}")
-    return settings
-
-
-def _check_image(image: object) -> NDArray[Any]:
-    """Return the image, in this machine's byte order, if the core can take it."""
-    if not isinstance(image, np.ndarray):
-        raise TypeError(f"image: an array is needed, not {type(image).__name__}")
-    if type(image) is not np.ndarray and np.ma.is_masked(image):
-        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
-    if image.dtype not in _DTYPES:
-        if image.dtype.name not in ("uint8", "float16", "float32"):
-            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
-        image = image.astype(image.dtype.newbyteorder("="), copy=False)
-    if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
-        raise ValueError(
-            f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
-        )
-    return image
-
-
-def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
-    """Return the wanted names, None for all."""
-    if attachments == "all":
-        return None
-    if isinstance(attachments, str):
-        return (attachments,)
-    try:
-        names = tuple(attachments)
-    except TypeError:
-        raise TypeError(f"attachments: names are needed, not {attachments!r}") from None
-    for name in names:
-        if not isinstance(name, str):
-            raise TypeError(f"attachments: names are needed, not {name!r}")
-    return names
 
 
 def _allocator(
@@ -158,7 +104,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range.
+        `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
+        what the adapter cannot run.
 
     Notes
     -----
@@ -169,37 +116,32 @@ class Renderer:
     be used again; closing waits for what the device is still at work on. A device that takes longer
     than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
     number. After a fork the child opens a renderer of its own, where the driver can; its parent's
-    raise ValueError.
-    """
+    raise ValueError. NVIDIA's driver cannot: start processes by multiprocessing's method "spawn".
 
-    #: The process that opened the last one: any other has been forked from it since.
-    _opened_in: ClassVar[int | None] = None
+    The first renderer, or list of `adapters`, opens the Vulkan loader for the life of the process:
+    drivers that are installed later, and variables such as VK_DRIVER_FILES that are set later, are
+    seen by new processes only.
+    """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
+        if not adapter:
+            raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
-        try:
-            self._core = _core.Renderer(
-                adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
-            )
-        except Error as error:
-            if self._opened_in not in (None, os.getpid()):
-                error.add_note(
-                    "This process was forked from one that had opened a renderer, which some "
-                    "drivers (NVIDIA's among them) refuse to work after; start it by "
-                    'multiprocessing\'s method "spawn" or "forkserver".'
-                )
-            raise
-        Renderer._opened_in = os.getpid()
+        from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
+        self._core = _core.Renderer(
+            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+        )
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._made_by = {
             "adapter": self.info.name,
             "driver": self.info.driver_info or self.info.driver,
-            "version": _version(),
+            "version": installed_version(),
         }
         self._saved_pipelines = 0
 
@@ -239,7 +181,7 @@ class Renderer:
         # Late: notebooks need it, and nothing else.
         from vkbloom.views import display  # noqa: PLC0415
 
-        return display.renderer_html(self)
+        return display.renderer_html(self.info, closed=self.closed)
 
     def render(
         self,
@@ -305,7 +247,7 @@ class Renderer:
         A pass runs only when what it reads, its settings or its size changed since it last ran;
         ``timings`` of the result names the passes that ran.
         """
-        settings = _check_settings(settings)
+        settings = check_settings(settings)
         arguments = _render_arguments(scene, size, shading, time, attachments)
         return self._run_one(self._core.render(*arguments), settings, out)
 
@@ -354,8 +296,8 @@ class Renderer:
         The same image again, to the byte, is not sent to the device again, and passes run only
         when what they read or their settings changed.
         """
-        settings = _check_settings(settings)
-        batch = self._core.apply(_check_image(image), _check_attachments(attachments))
+        settings = check_settings(settings)
+        batch = self._core.apply(check_image(image), check_attachments(attachments))
         return self._run_one(batch, settings, out)
 
     def apply_many(
@@ -387,9 +329,9 @@ class Renderer:
         settings are taken from their iterable before the frames that come before theirs.
         What a wrong one of them raises is raised in its turn, after the frames before it.
         """
-        image = _check_image(image)
-        names = _check_attachments(attachments)
-        yield from self._run_many(lambda: self._core.apply(image, names), settings_seq)
+        image = check_image(image)
+        names = check_attachments(attachments)
+        return self._run_many(lambda: self._core.apply(image, names), settings_seq)
 
     def render_many(
         self,
@@ -420,7 +362,7 @@ class Renderer:
         As for `apply_many`.
         """
         arguments = _render_arguments(scene, size, shading, time, attachments)
-        yield from self._run_many(lambda: self._core.render(*arguments), settings_seq)
+        return self._run_many(lambda: self._core.render(*arguments), settings_seq)
 
     def grid(
         self,
@@ -486,7 +428,7 @@ class Renderer:
         Points are visited in the order that runs the fewest passes, whatever the order of the
         axes. For grids that outgrow memory see `vkbloom.grid_to_zarr`.
         """
-        from vkbloom.grid.memory import in_memory  # noqa: PLC0415  it imports this module
+        from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
         from vkbloom.grid.plan import ask  # noqa: PLC0415
 
         asked = ask(
@@ -529,11 +471,12 @@ class Renderer:
     def _run_many(
         self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
     ) -> Iterator[Frames]:
+        # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
-        checked = map(_check_settings, settings_seq)
-        for settings, result in requests.run(checked, open_batch, _allocator(self._core, None)):
-            yield self._frames(settings, result)
+        checked = map(check_settings, settings_seq)
+        results = requests.run(checked, open_batch, _allocator(self._core, None))
+        return (self._frames(settings, result) for settings, result in results)
 
     def _frames(self, settings: Settings, result: requests.Result) -> Frames:
         self._save_pipelines()
@@ -545,6 +488,8 @@ class Renderer:
         """Keep the driver's pipeline cache on disk when new pipelines came into it."""
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
+            from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
             # Without the cache the next start is slower: no reason to lose a frame that is there.
             # A ValueError: another thread has closed the renderer.
             with contextlib.suppress(_core.Error, ValueError):
@@ -591,7 +536,7 @@ def _render_arguments(
         # Whole turns change nothing; without them large times keep their precision.
         math.fmod(turns, 1.0),
         scene.glow_intensity,
-        _check_attachments(attachments),
+        check_attachments(attachments),
     )
 
 
@@ -612,7 +557,7 @@ def _scene_arrays(scene: Scene) -> Any:
         )
         for texture in numbers
     )
-    return scene.serial, body, glow, sky, textures
+    return scene.contents_serial, body, glow, sky, textures
 
 
 def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:

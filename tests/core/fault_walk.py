@@ -34,7 +34,7 @@ SIZE = (24, 16)
 Arrays = Mapping[str, NDArray[Any]]
 Work = Callable[[Renderer], Arrays]
 Result = TypeVar("Result")
-core: Any = _core  # arm_fault and fault_state are in test builds only
+core: Any = _core  # arm_fault, fault_state and forget_instances are in test builds only
 
 
 def textured() -> Scene:
@@ -220,7 +220,8 @@ class Walk:
         return value, error, bool(failed)
 
     def renderer_at(self, n: int, result: int) -> bool:
-        """Opening a renderer with a fault at its n-th point; False: there are fewer."""
+        """Opening a process's first renderer with a fault at its n-th point; False: fewer there."""
+        core.forget_instances()
         renderer, error, failed = self._at(n, result, "", open_renderer)
         if error is not None and not failed:
             raise error

@@ -349,6 +349,67 @@ def test_a_device_that_takes_too_long(
     renderer.close()
 
 
+# Collects a renderer while its device is at work; prints how it ended, and after how many seconds
+# from the collection, or from Ctrl-C in it.
+COLLECT = """
+import gc, signal, sys, threading, time
+import numpy as np
+import vkbloom
+
+side, pressing = int(sys.argv[1]), sys.argv[2] == "pressed"
+image = np.random.default_rng(side).random((side, side, 4), dtype=np.float32)
+long = vkbloom.Separable(
+    weights=vkbloom.gaussian_weights(10.0, 32), blur_scale=0.5, direct=True, format="rgba32float"
+)
+renderer = vkbloom.Renderer()
+batch = renderer._core.apply(image, ("final",))
+batch.add(long, lambda name, shape, dtype: np.empty(shape, dtype))
+batch.submit()
+begin = time.perf_counter()
+
+def press():
+    global begin
+    begin = time.perf_counter()
+    signal.raise_signal(signal.SIGINT)
+
+timer = threading.Timer(0.1, press)
+if pressing:
+    timer.start()
+try:
+    del renderer, batch
+    gc.collect()
+    print("collected", time.perf_counter() - begin, flush=True)
+    if pressing:
+        timer.join()
+except KeyboardInterrupt:
+    print("interrupted", time.perf_counter() - begin, flush=True)
+"""
+
+
+@UNIX
+@LEAVES_BEHIND
+@pytest.mark.parametrize(
+    ("how", "limit", "words"), [("left", "0.1", "collected"), ("pressed", "300", "interrupted")]
+)
+def test_collecting_a_renderer_at_work(
+    large: NDArray[np.float32], how: str, limit: str, words: str
+) -> None:
+    """Once the wait in it had no limit and no end by Ctrl-C."""
+    # Twice the side: four times as long as half a second.
+    done = subprocess.run(
+        [sys.executable, "-c", COLLECT, str(2 * len(large)), how],
+        env={**os.environ, "VKBLOOM_TIMEOUT": limit},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    ending, seconds = done.stdout.split()
+    assert ending == words
+    assert float(seconds) < 1.0
+
+
 # Forks
 
 CHILD = """
@@ -415,20 +476,35 @@ def test_a_forked_process(how: str, tmp_path: Path) -> None:
     ), done.stdout + done.stderr
 
 
-def test_a_driver_that_does_not_survive_forks(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object) -> None:
-        raise vkbloom.Error("vkCreateDevice failed with VK_ERROR_INITIALIZATION_FAILED")
+# Prints what a child is told where its driver does not give it a device.
+ADVICE = """
+import os, sys
+import vkbloom
 
-    def notes() -> list[str]:
-        with pytest.raises(vkbloom.Error, match="vkCreateDevice failed") as refused:
-            Renderer()
-        return getattr(refused.value, "__notes__", [])
+vkbloom.adapters()
+for _ in range(2):
+    if os.fork():
+        os.wait()
+        sys.exit()
+    # The child, then the child's.
+    try:
+        vkbloom.Renderer("no such adapter")
+    except vkbloom.AdapterNotFoundError as error:
+        print(error, flush=True)
+"""
 
-    Renderer().close()
-    monkeypatch.setattr(vkbloom._core, "Renderer", refuse)
-    assert notes() == []
-    here = os.getpid()
-    monkeypatch.setattr(os, "getpid", lambda: here + 1)
-    (note,) = notes()
-    assert "forked" in note
-    assert '"spawn"' in note
+
+@UNIX
+def test_a_child_without_an_adapter_is_told_to_spawn() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", ADVICE], capture_output=True, text=True, timeout=120, check=True
+    )
+    told = done.stdout.splitlines()
+    assert len(told) == 2
+    for line in told:
+        assert "no such adapter" in line
+        assert "forked" in line
+        assert '"spawn"' in line
+    with pytest.raises(vkbloom.AdapterNotFoundError) as caught:
+        Renderer("no such adapter")
+    assert "forked" not in str(caught.value)

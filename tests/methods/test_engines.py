@@ -77,13 +77,15 @@ def every(array: Array, stride: int) -> Array:
     rows, columns = (
         np.unique([*range(0, length, stride), length - 1]) for length in array.shape[:2]
     )
-    return array[np.ix_(rows, columns)][..., :3]
+    kept: Array = array[np.ix_(rows, columns)][..., :3]
+    return kept
 
 
 def relative(actual: Array, expected: Array) -> NDArray[np.float64]:
     """Differences relative to the values, of those above 1e-3 of the largest one."""
     seen = expected > 1e-3 * expected.max()
-    return np.abs(actual.astype(np.float64) - expected)[seen] / expected[seen]
+    shares: NDArray[np.float64] = np.abs(actual - expected)[seen] / expected[seen]
+    return shares
 
 
 def test_no_frame_is_left_out(engine_frames: Path) -> None:
@@ -111,7 +113,8 @@ class Cut(Storage):
         kept = np.maximum(image, 0)
         _, exponent = np.frexp(kept)
         step = np.exp2(np.maximum(exponent - 1, -14) - np.array([6, 6, 5]))
-        return np.floor(kept / step) * step
+        cut: Array = np.floor(kept / step) * step
+        return cut
 
 
 def test_levels_of_bevy_in_r11g11b10(renderer: Renderer, engine_frames: Path) -> None:

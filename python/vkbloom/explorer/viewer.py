@@ -27,16 +27,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom.checks import check_number, check_size
+from vkbloom.checks import check_image, check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
-from vkbloom.renderer import SHADINGS, Renderer, _check_image, _check_settings
+from vkbloom.renderer import Renderer
+from vkbloom.settings import SHADINGS, check_settings
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
-    from vkbloom.renderer import Shading
     from vkbloom.scene import Scene
-    from vkbloom.settings import Settings
+    from vkbloom.settings import Settings, Shading
 
 __all__ = ["SIDES", "Viewer"]
 
@@ -86,10 +86,10 @@ class Viewer:
     ) -> None:
         from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
-        begun = _check_settings(settings)
+        begun = check_settings(settings)
         self.settings: dict[str, Settings] = {
             "a": begun,
-            "b": begun.replace(bloom=False) if against is None else _check_settings(against),
+            "b": begun.replace(bloom=False) if against is None else check_settings(against),
         }
         if shading not in SHADINGS:
             raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
@@ -100,7 +100,7 @@ class Viewer:
         else:
             self._scene = None
             # A copy, since the page may ask for it long after the caller has changed it.
-            self._image = np.array(_check_image(source), order="C")
+            self._image = np.array(check_image(source), order="C")
             self._own_size = (source.shape[1], source.shape[0])
             self._reduced = (self._own_size, self._image)
         if renderer is not None and renderer.closed:

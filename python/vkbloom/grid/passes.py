@@ -11,8 +11,7 @@ from collections.abc import Iterator, Sequence
 from vkbloom import _core
 from vkbloom.grid.axes import Axis
 from vkbloom.grid.order import Index
-from vkbloom.grid.sources import Point, Source, visit
-from vkbloom.renderer import Renderer
+from vkbloom.grid.sources import FrameRenderer, Point, Source, visit
 from vkbloom.settings import Settings
 
 __all__ = ["passes_alone", "point_at", "ranking", "ranking_of"]
@@ -41,7 +40,7 @@ def _walk(axes: Sequence[Axis], *, backwards: bool) -> Iterator[tuple[int | None
 
 
 def ranking(
-    renderer: Renderer,
+    renderer: FrameRenderer,
     source: Source,
     settings: Settings,
     axes: Sequence[Axis],
@@ -55,7 +54,7 @@ def ranking(
 
     Parameters
     ----------
-    renderer : Renderer
+    renderer : FrameRenderer
     source : Source
     settings : Settings
     axes : sequence of Axis

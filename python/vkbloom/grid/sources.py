@@ -9,19 +9,20 @@ import itertools
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import check_size, check_time
+from vkbloom.checks import check_image, check_size, check_time
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
-from vkbloom.settings import Settings
+from vkbloom.settings import SHADINGS, Settings
 
 if TYPE_CHECKING:
-    from vkbloom.renderer import Renderer, Shading
+    from vkbloom.adapter import AdapterInfo
     from vkbloom.scene import Scene
+    from vkbloom.settings import Shading
 
 __all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
 
@@ -42,8 +43,48 @@ class Point:
     place: float
 
 
+class FrameRenderer(Protocol):
+    """The part of a `Renderer` that grids use.
+
+    A renderer imports the grids for `Renderer.grid`, so that they do not import it.
+    """
+
+    @property
+    def info(self) -> AdapterInfo:
+        """The adapter."""
+
+    def apply_many(
+        self,
+        image: NDArray[Any],
+        settings_seq: Iterable[Settings],
+        *,
+        attachments: str | Sequence[str],
+    ) -> Iterator[Frames]:
+        """Give an image bloom with one settings after the other."""
+
+    def render_many(
+        self,
+        scene: Scene,
+        settings_seq: Iterable[Settings],
+        size: tuple[int, int],
+        *,
+        shading: Shading,
+        time: float,
+        attachments: str | Sequence[str],
+    ) -> Iterator[Frames]:
+        """Render a scene with one settings after the other."""
+
+    def _survey_apply(self, image: NDArray[Any], settings: Settings) -> Framebuffers:
+        """Return shape and dtype of all framebuffers that `apply` would give."""
+
+    def _survey_render(
+        self, scene: Scene, settings: Settings, size: tuple[int, int], shading: Shading
+    ) -> Framebuffers:
+        """Return shape and dtype of all framebuffers that `render` would give."""
+
+
 def visit(
-    renderer: Renderer,
+    renderer: FrameRenderer,
     source: ImageSource | SceneSource,
     points: Iterable[Point],
     attachments: str | Sequence[str],
@@ -52,7 +93,7 @@ def visit(
 
     Parameters
     ----------
-    renderer : Renderer
+    renderer : FrameRenderer
     source : Source
     points : iterable of Point
         Drawn as they are needed, some ahead.
@@ -90,7 +131,7 @@ class ImageSource:
 
     def many(
         self,
-        renderer: Renderer,
+        renderer: FrameRenderer,
         settings: Iterable[Settings],
         place: float,
         attachments: str | Sequence[str],
@@ -98,7 +139,7 @@ class ImageSource:
         """Yield the frames of some settings on one image."""
         return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
 
-    def survey(self, renderer: Renderer, settings: Settings, place: float) -> Framebuffers:
+    def survey(self, renderer: FrameRenderer, settings: Settings, place: float) -> Framebuffers:
         """Tell the shapes and dtypes of all framebuffers, without rendering."""
         return renderer._survey_apply(self.images[int(place)], settings)
 
@@ -145,7 +186,7 @@ class SceneSource:
 
     def many(
         self,
-        renderer: Renderer,
+        renderer: FrameRenderer,
         settings: Iterable[Settings],
         place: float,
         attachments: str | Sequence[str],
@@ -160,7 +201,7 @@ class SceneSource:
             attachments=attachments,
         )
 
-    def survey(self, renderer: Renderer, settings: Settings, place: float) -> Framebuffers:
+    def survey(self, renderer: FrameRenderer, settings: Settings, place: float) -> Framebuffers:
         """Tell the shapes and dtypes of all framebuffers, without rendering."""
         return renderer._survey_render(self.scene, settings, self.size, self.shading)
 
@@ -210,7 +251,6 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     TypeError, ValueError
         The source is none of these, or an argument does not belong to it.
     """
-    from vkbloom.renderer import SHADINGS, _check_image  # noqa: PLC0415  it imports the grids
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     if isinstance(source, Scene):
@@ -226,7 +266,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         if is_given:
             raise ValueError(f"{name}: only scenes have one, an image is given")
     if isinstance(source, np.ndarray):
-        return ImageSource([_check_image(source)])
+        return ImageSource([check_image(source)])
     labels: list[Any]
     if isinstance(source, Mapping):
         images, labels = list(source.values()), [str(label) for label in source]
@@ -238,7 +278,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         )
     if not images:
         raise ValueError("source: the list of images is empty")
-    return ImageSource([_check_image(image) for image in images], tuple(labels))
+    return ImageSource([check_image(image) for image in images], tuple(labels))
 
 
 def digest(value: object) -> str:
