@@ -19,18 +19,16 @@ static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, b
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
-// What is between the blurs is no buffer of the engine's: floats also where the buffers are coarse.
+// What is between the blurs is no buffer of the engine's, and the threshold magnifies what it would
+// be rounded by: single floats in any case.
 static bool add_step(const struct vkb_levels *levels, uint32_t level, uint32_t *image,
                      struct vkb_error *error)
 {
-    const enum vkb_format buffers = levels->source->format;
-    const enum vkb_format format = buffers == VKB_FORMAT_RGBA8_UNORM    ? VKB_FORMAT_RGBA16_FLOAT
-                                 : buffers == VKB_FORMAT_RG11B10_UFLOAT ? VKB_FORMAT_RGBA32_FLOAT
-                                                                        : buffers;
     char name[VKB_NAME_SIZE];
 
     snprintf(name, sizeof name, "down_%u_across", level);
-    return vkb_add_target(levels->graph, name, format, levels->sizes[level], false, image, error);
+    return vkb_add_target(levels->graph, name, VKB_FORMAT_RGBA32_FLOAT, levels->sizes[level], false,
+                          image, error);
 }
 
 bool vkb_add_godot(const struct vkb_settings *settings, const struct vkb_bloom_source *source,

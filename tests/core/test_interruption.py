@@ -19,6 +19,7 @@ import xarray
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.images import picture
 from vkbloom import DeviceLostError, Frames, Renderer, Scene, Separable, gaussian_weights
 
 LEAVES_BEHIND = pytest.mark.skipif(
@@ -51,17 +52,13 @@ def alarm() -> Iterator[Callable[[float], None]]:
     signal.signal(signal.SIGALRM, before)
 
 
-def noise(side: int) -> NDArray[np.float32]:
-    return np.random.default_rng(side).random((side, side, 4), dtype=np.float32)
-
-
 @pytest.fixture(scope="module")
 def large() -> NDArray[np.float32]:
     """An image that LONG takes a second or so for, so that there is a wait to leave."""
     with Renderer() as renderer:
-        renderer.apply(noise(8), LONG)
+        renderer.apply(picture(8, 8), LONG)
         for side in (256, 512, 1024, 2048, 4096):
-            image = noise(side)
+            image = picture(side, side)
             begin = time.perf_counter()
             renderer.apply(image, LONG, attachments="final")
             if time.perf_counter() - begin > 0.5:
@@ -82,7 +79,7 @@ def check(renderer: Renderer, scene: Scene) -> None:
             for name, array in expected.items():
                 np.testing.assert_array_equal(frames[name], array)
         np.testing.assert_array_equal(
-            renderer.apply(noise(9), SHORT)["final"], new.apply(noise(9), SHORT)["final"]
+            renderer.apply(picture(9, 9), SHORT)["final"], new.apply(picture(9, 9), SHORT)["final"]
         )
 
 
@@ -101,7 +98,7 @@ def test_a_long_frame_is_interrupted(
     large: NDArray[np.float32],
 ) -> None:
     renderer = new_renderer()
-    renderer.apply(noise(8), LONG)
+    renderer.apply(picture(8, 8), LONG)
     for _ in range(2):
         alarm(0.1)
         with pytest.raises(Alarm):
@@ -134,11 +131,11 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
 ) -> None:
     """Once the array of an interrupted call was given up with the renderer's lock held."""
     renderer = new_renderer()
-    renderer.apply(noise(8), LONG)
+    renderer.apply(picture(8, 8), LONG)
     finished: list[bool] = []
 
     def use_elsewhere() -> None:
-        thread = threading.Thread(target=renderer.apply, args=(noise(8), SHORT), daemon=True)
+        thread = threading.Thread(target=renderer.apply, args=(picture(8, 8), SHORT), daemon=True)
         thread.start()
         thread.join(20.0)
         finished.append(not thread.is_alive())
@@ -152,7 +149,7 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
     gc.collect()
     assert not finished
     # The next flight waits for the one that nobody wants any more, which is over then.
-    renderer.apply(noise(9), SHORT)
+    renderer.apply(picture(9, 9), SHORT)
     assert finished == [True]
 
 
@@ -285,7 +282,7 @@ def test_waiting_for_another_thread_is_interrupted(
     time.sleep(0.05)
     alarm(0.1)
     with pytest.raises(Alarm):
-        list(map(renderer.apply, [noise(8)] * 1000))
+        list(map(renderer.apply, [picture(8, 8)] * 1000))
     thread.join()
     check(renderer, scene)
 

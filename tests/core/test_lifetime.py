@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.framebuffers import assert_same
 from tests.screens import noise, screen
 from vkbloom import Frames, Renderer, Scene, Separable, adapters, gaussian_weights
 
@@ -26,12 +27,6 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def in_use() -> tuple[int, int]:
     """Return how many file descriptors and threads this process has."""
     return len(os.listdir("/proc/self/fd")), len(os.listdir("/proc/self/task"))
-
-
-def assert_same(frames: Frames, expected: Frames) -> None:
-    assert list(frames) == list(expected)
-    for name in expected:
-        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
 
 
 # One renderer
