@@ -124,7 +124,8 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
         )
     if settings.bloom and _DTYPES[format] != image.dtype:
         # The coarser bloom's rounding goes through the composite into a finer final.
-        limits["final"] = limits["final"] + settings.intensity * limits["bloom"]
+        of_bloom = settings.intensity * np.broadcast_to(limits["bloom"], expected["bloom"].shape)
+        limits["final"] = limits["final"] + of_bloom[..., : image.shape[2]]
     for name, array in frames.items():
         assert_close(name, array, expected[name], limits[name])
         if name != "final":
