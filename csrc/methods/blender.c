@@ -1,5 +1,6 @@
 // The bloom of Blender's Glare node, in high quality: formulas of the compositor of Blender 4.5.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // Godot's glow. Source: godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl
 // @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <stdio.h>
 
@@ -12,10 +13,9 @@ static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, b
 {
     struct vkb_pass_row row = vkb_prefilter_row(levels, VKB_SHADER_godot_blur_frag, from, to);
 
-    row.constants[2] = direction;
-    row.constants[3] = first;
-    row.constant_count = 4;
-    row.params.prefilter.exposure = first ? levels->settings->values.composite.exposure : 0.0f;
+    row.constants.direction = direction;
+    row.constants.first = first;
+    row.params.prefilter.exposure = first ? levels->settings->values.exposure : 0.0f;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

@@ -1,6 +1,7 @@
 // The PhysicalBasedBloomPass of pygfx. Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py
 // @ f5f8f72c.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 // A level for each halving of the longer side to 1, that of level 0 counted.
 static uint32_t most_levels(struct vkb_size first)
@@ -30,10 +31,7 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
         struct vkb_pass_row row =
             level ? vkb_down_row(&levels, false, from, levels.downs[level])
                   : vkb_pyramid_row(&levels, VKB_SHADER_pygfx_down_frag, from, levels.downs[0]);
-        if (level == 0) {
-            row.constants[1] = settings->values.karis_average;
-            row.constant_count = 2;
-        }
+        row.constants.karis_average = level == 0 && settings->values.karis_average;
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

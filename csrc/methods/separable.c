@@ -1,5 +1,6 @@
 // The separable blur: loops of a vertical and a horizontal pass, in layers that are added; or the
 // same kernel as one N x N pass.
+#include "methods/methods.h"
 #include "passes/blur.h"
 
 #include <stdio.h>
@@ -85,9 +86,8 @@ static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
         vkb_fullscreen_row(graph->images[to].name, VKB_SHADER_extract_frag, to);
     const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
 
-    row.constants[0] = THRESHOLD_NONE;
-    row.constants[1] = SAMPLING_WHOLE;
-    row.constant_count = 2;
+    row.constants.threshold_mode = THRESHOLD_NONE;
+    row.constants.sampling = SAMPLING_WHOLE;
     row.reads[0] = from;
     row.read_count = 1;
     row.block = VKB_BLOCK_extract;

@@ -2,7 +2,8 @@
 // com.unity.render-pipelines.universal, BloomPostProcessPass.cs @ 13e28e026298, Bloom.shader
 // @ 00d472fae509; HDRP: com.unity.render-pipelines.high-definition, HDRenderPipeline.PostProcess.cs
 // @ 0148835ea9ba, BloomBlur.compute @ 0e4ca4d79b2c.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -64,9 +65,8 @@ static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode directi
 {
     struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_hdrp_blur_frag, from, to);
 
-    row.constants[1] = direction;
-    row.constants[2] = first;
-    row.constant_count = 3;
+    row.constants.direction = direction;
+    row.constants.first = first;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

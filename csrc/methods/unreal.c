@@ -1,6 +1,7 @@
 // three.js' UnrealBloomPass. Source: mrdoob/three.js, examples/jsm/postprocessing/
 // UnrealBloomPass.js, the form with the kernels of #31528 and the factor of #32517.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -43,7 +44,7 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     for (; levels.count < UNREAL_LEVELS; ++levels.count) {
         const double factor = bloom_factors[levels.count];
         levels.sizes[levels.count] = size = half_of(settings, size);
-        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.pyramid.radius;
+        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
         whole += shares[levels.count];
     }
     // What ends at 1 holds the mean.
@@ -55,8 +56,7 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_unreal_prefilter_frag, source->glow, from);
-    row.constants[2] = settings->values.node;
-    row.constant_count = 3;
+    row.constants.node = settings->values.node;
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])

@@ -139,6 +139,7 @@ class BlenderGlare(Settings):
     composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = 1.0
+    intensity: float = number_field("intensity", range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     smoothness: float = number_field("smoothness")
     # --size is that of a frame.
@@ -148,7 +149,6 @@ class BlenderGlare(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_no_knee(self)
-        check_number("intensity", self.intensity, 0, 1)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -185,7 +185,7 @@ class PygfxBloom(Settings):
     composites: ClassVar[tuple[Composite, ...]] = ("mix",)
 
     composite: Composite = "mix"
-    intensity: float = number_field("intensity", default=0.04)
+    intensity: float = number_field("intensity", default=0.04, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     levels: int = number_field("levels")
     filter_radius: float = number_field("filter_radius")
@@ -194,7 +194,6 @@ class PygfxBloom(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_no_knee(self)
-        check_number("intensity", self.intensity, 0, 1)
         if self.threshold is not None:
             raise ValueError(
                 f"threshold: {self.threshold!r} is out of range, None, for pygfx has no threshold"

@@ -8,11 +8,6 @@
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
-layout(constant_id = 1) const int THRESHOLDED = 0;
-layout(constant_id = 2) const int DIRECTION = DIRECTION_VERTICAL;
-layout(constant_id = 3) const int FIRST = 0;
-
 layout(set = 0, binding = 1) uniform sampler2D source;
 
 #define TARGET_BINDING 2

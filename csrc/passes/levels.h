@@ -3,7 +3,7 @@
 #ifndef VKB_LEVELS_H
 #define VKB_LEVELS_H
 
-#include "methods/methods.h"
+#include "passes/pass.h"
 
 struct vkb_levels {
     const struct vkb_settings *settings;

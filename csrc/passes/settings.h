@@ -49,4 +49,18 @@ struct vkb_settings {
     uint32_t level_weight_count;  // 0: none are given
 };
 
+static inline bool vkb_is_published(const struct vkb_settings *settings)
+{
+    switch (settings->method) {
+#define VKB_METHOD_CASE(constant, name, published) \
+    case VKB_METHOD_##constant: \
+        return published;
+        VKB_METHODS(VKB_METHOD_CASE)
+#undef VKB_METHOD_CASE
+    case VKB_METHOD_COUNT:
+        break;
+    }
+    return false;
+}
+
 #endif
