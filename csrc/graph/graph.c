@@ -28,9 +28,38 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
     if (!vkb_grow(error, &graph->passes, &graph->pass_capacity, graph->pass_count + 1,
                   sizeof *graph->passes))
         return false;
-    // Rows are compared byte by byte to find what is out of date, so padding is copied too.
-    memcpy(&graph->passes[graph->pass_count++], row, sizeof *row);
+    graph->passes[graph->pass_count++] = *row;
     return true;
+}
+
+size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
+{
+    size_t size = 0;
+
+#define PACK(field) \
+    memcpy(bytes + size, &pass->field, sizeof pass->field); \
+    size += sizeof pass->field
+    PACK(name);
+    PACK(geometry);
+    PACK(textured);
+    PACK(vertex);
+    PACK(shader);
+    PACK(constants);
+    PACK(constant_count);
+    PACK(reads);
+    PACK(read_count);
+    PACK(loads);
+    PACK(alternative);
+    PACK(block_width);
+    PACK(block_height);
+    PACK(targets);
+    PACK(target_count);
+    PACK(depth);
+    PACK(load);
+    PACK(blend);
+    PACK(block);
+#undef PACK
+    return size + vkb_params_pack(pass->block, &pass->params, bytes + size);
 }
 
 bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)

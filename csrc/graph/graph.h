@@ -101,6 +101,10 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
 // The index after the last pass that shares a render pass with pass `first`.
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 
+// Writes all that the row says to `bytes`, which has room for a row, field by field: two rows say
+// the same where these bytes are equal. (The rows themselves have padding.) Returns how many.
+size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes);
+
 bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
 
 // Whether a pass blends what it draws with what the image holds.

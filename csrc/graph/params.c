@@ -1,5 +1,7 @@
 #include "graph/params.h"
 
+#include <string.h>
+
 #define SKIP_INPUT(block, type, name)
 #define SKIP_VEC4S(block, name, count)
 #define SETTING_ROW(block, name, initial, low, high) \
@@ -27,3 +29,26 @@ const struct vkb_choice_row vkb_choice_rows[VKB_CHOICE_COUNT] = {CHOICES(CHOICE_
 #define BLOCK_SIZE(block, ROWS) [VKB_BLOCK_##block] = sizeof(struct vkb_##block##_params),
 
 const size_t vkb_block_sizes[] = {[VKB_BLOCK_NONE] = 0, PARAMETER_BLOCKS(BLOCK_SIZE)};
+
+#define PACK(block, name) \
+    memcpy(bytes + size, &params->block.name, sizeof params->block.name); \
+    size += sizeof params->block.name;
+#define PACK_SETTING(block, name, initial, low, high) PACK(block, name)
+#define PACK_INPUT(block, type, name)                 PACK(block, name)
+#define PACK_VEC4S(block, name, count)                PACK(block, name)
+#define PACK_BLOCK(block, ROWS) \
+    case VKB_BLOCK_##block: \
+        ROWS(block, PACK_SETTING, PACK_INPUT, PACK_VEC4S) \
+        break;
+
+size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, unsigned char *bytes)
+{
+    size_t size = 0;
+
+    switch (block) {
+    case VKB_BLOCK_NONE:
+        break;
+        PARAMETER_BLOCKS(PACK_BLOCK)
+    }
+    return size;
+}

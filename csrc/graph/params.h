@@ -35,6 +35,10 @@ enum vkb_block {
 
 extern const size_t vkb_block_sizes[];  // bytes of each block's struct
 
+// Writes the fields of that block one after the other, without the padding between them, which has
+// no defined value. `bytes` has room for vkb_block_sizes[block]; returns how many were written.
+size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, unsigned char *bytes);
+
 // All settings that are numbers: the blocks side by side, from which a graph copies them to its
 // passes, and those that shape the graph.
 struct vkb_values {

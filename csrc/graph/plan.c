@@ -48,8 +48,12 @@ static uint32_t count_running(const struct vkb_graph *graph, const bool *needed,
 
 static bool same_pass(const struct vkb_graph *a, const struct vkb_graph *b, uint32_t i)
 {
-    return i < a->pass_count && i < b->pass_count
-        && memcmp(&a->passes[i], &b->passes[i], sizeof a->passes[i]) == 0;
+    unsigned char first[sizeof(struct vkb_pass_row)], second[sizeof first];
+
+    if (i >= a->pass_count || i >= b->pass_count)
+        return false;
+    const size_t size = vkb_pass_pack(&a->passes[i], first);
+    return size == vkb_pass_pack(&b->passes[i], second) && memcmp(first, second, size) == 0;
 }
 
 // Whether the neighbour has what the alternative spares, the same, but not the pass before it,

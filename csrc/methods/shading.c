@@ -25,10 +25,8 @@ bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
 
 struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source)
 {
-    struct vkb_mesh_params params;
+    struct vkb_mesh_params params = {0};
 
-    // From zero, padding included: rows are compared byte by byte.
-    memset(&params, 0, sizeof params);
     vkb_scene_matrices(&source->camera, source->time,
                        (double)source->size.width / source->size.height, &params);
     return params;

@@ -7,6 +7,7 @@
 #include "python/module.h"
 
 #include "run/pages.h"
+#include "run/readback.h"
 
 #include <string.h>
 
@@ -30,9 +31,6 @@ struct vkb_array_memory {
 
 // Places in NumPy's table, and the ABI that has them there.
 enum { GET_ABI = 0, SET_HANDLER = 304, NUMPY_ABI = 0x02000000 };
-
-// Smaller arrays come from NumPy, which keeps some of them, too.
-enum { LARGE_ELEMENTS = 1 << 18 };
 
 static void *take(void *context, size_t size)
 {
@@ -157,13 +155,25 @@ bool vkb_array_memory_create(struct vkb_renderer *renderer)
     return !memory->set_handler || renderer->array_context;
 }
 
-static bool is_large(PyObject *shape)
+// Bytes of an element of that dtype, 0 where no framebuffer has it.
+static size_t element_size(PyObject *dtype)
 {
-    double elements = 1.0;
+    for (int format = VKB_FORMAT_NONE + 1; PyUnicode_Check(dtype) && format < VKB_FORMAT_COUNT;
+         ++format)
+        if (PyUnicode_CompareWithASCIIString(dtype, vkb_formats[format].dtype) == 0)
+            return vkb_formats[format].channel_size;
+    return 0;
+}
+
+// Whether the device would write the array in place. Smaller ones come from NumPy, which keeps some
+// of them, too.
+static bool is_large(PyObject *shape, PyObject *dtype)
+{
+    double bytes = (double)element_size(dtype);
 
     for (Py_ssize_t i = 0, count = PyTuple_Size(shape); i < count; ++i)
-        elements *= PyLong_AsDouble(PyTuple_GetItem(shape, i));
-    return elements >= LARGE_ELEMENTS;
+        bytes *= PyLong_AsDouble(PyTuple_GetItem(shape, i));
+    return bytes >= VKB_IMPORTED_BYTES;
 }
 
 // In a copy of the context, as only one thread at a time can run in one.
@@ -185,7 +195,7 @@ PyObject *vkb_new_array(PyObject *object, PyObject *arguments)
     if (!PyArg_ParseTuple(arguments, "OO!O:new_array", &empty, &PyTuple_Type, &shape, &dtype))
         return NULL;
     struct vkb_array_memory *memory = memory_of(renderer);
-    if (!memory || !renderer->array_context || !is_large(shape))
+    if (!memory || !renderer->array_context || !is_large(shape, dtype))
         return PyErr_Occurred() ? NULL : PyObject_CallFunctionObjArgs(empty, shape, dtype, NULL);
     // Kept for the error, whatever becomes of the renderer.
     PyObject *capsule = Py_NewRef(renderer->array_memory);

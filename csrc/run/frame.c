@@ -38,10 +38,10 @@ static bool write_recipe(struct vkb_run *run, uint32_t first, uint32_t end, stru
 {
     run->recipe_size = 0;
     for (uint32_t i = first; i < end; ++i) {
-        struct vkb_pass_row row;
+        struct vkb_pass_row row = run->graph->passes[i];
+        unsigned char bytes[sizeof row];
         uint64_t versions[VKB_MAX_READS + 1] = {0};
 
-        memcpy(&row, &run->graph->passes[i], sizeof row);
         for (uint32_t read = 0; read < row.read_count; ++read)
             versions[read] = run->slots[row.reads[read]]->version;
         if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
@@ -49,7 +49,8 @@ static bool write_recipe(struct vkb_run *run, uint32_t first, uint32_t end, stru
         memset(row.reads, 0, sizeof row.reads);
         memset(row.targets, 0, sizeof row.targets);
         row.depth = row.depth != VKB_NO_IMAGE;
-        if (!append(run, &row, sizeof row, error) || !append(run, versions, sizeof versions, error))
+        if (!append(run, bytes, vkb_pass_pack(&row, bytes), error)
+            || !append(run, versions, sizeof versions, error))
             return false;
     }
     return true;

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-// Keys are compared byte by byte: fill them from zero, padding included.
+// Keys are compared byte by byte, so they have no padding.
 struct render_pass_key {
     enum vkb_format formats[VKB_MAX_TARGETS];
     enum vkb_format depth_format;
@@ -13,6 +13,10 @@ struct render_pass_key {
     struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
     uint32_t use_count;
 };
+_Static_assert(sizeof(struct render_pass_key)
+                   == (VKB_MAX_TARGETS + 4) * sizeof(uint32_t)
+                          + sizeof(struct vkb_target_use[VKB_MAX_TARGETS + 1]),
+               "a render pass's key has padding");
 
 struct vkb_render_pass_entry {
     struct render_pass_key key;
@@ -20,16 +24,19 @@ struct vkb_render_pass_entry {
 };
 
 struct pipeline_key {
-    enum vkb_shader vertex, shader;
-    enum vkb_geometry geometry;
-    enum vkb_binding_kind bindings;
-    bool textured;
-    enum vkb_blend blend;
+    VkRenderPass render_pass;
+    uint32_t vertex, shader;      // enum vkb_shader
+    uint32_t geometry, bindings;  // enum vkb_geometry, enum vkb_binding_kind
+    uint32_t textured;
+    uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
     uint32_t constant_count;
     int32_t constants[VKB_MAX_CONSTANTS];
-    VkRenderPass render_pass;
+    uint32_t zero;
 };
+_Static_assert(sizeof(struct pipeline_key)
+                   == sizeof(VkRenderPass) + (8 + VKB_MAX_CONSTANTS + 1) * sizeof(uint32_t),
+               "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
     struct pipeline_key key;

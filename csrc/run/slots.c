@@ -2,11 +2,13 @@
 
 #include <string.h>
 
-// Keys are compared byte by byte: fill them from zero, padding included.
+// Compared byte by byte: 64 bits each, so that there is no padding.
 struct framebuffer_key {
     VkRenderPass render_pass;
     uint64_t images[VKB_MAX_TARGETS + 1];
 };
+_Static_assert(sizeof(struct framebuffer_key) == (VKB_MAX_TARGETS + 2) * sizeof(uint64_t),
+               "a framebuffer's key has padding");
 
 struct vkb_framebuffer_entry {
     struct framebuffer_key key;

@@ -72,6 +72,15 @@ def test_other_arrays_are_plain(own: Renderer) -> None:
     assert get_handler_name() == PLAIN
 
 
+@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+def test_arrays_are_large_from_a_mebibyte_on(own: Renderer, dtype: str) -> None:
+    """Elements were counted once: a quarter of a mebibyte of uint8 was large."""
+    elements = (1 << 20) // np.dtype(dtype).itemsize
+    shapes = {(elements // 4, 4): "vkbloom", (elements // 4 - 1, 4): PLAIN, (1,): PLAIN}
+    for shape, name in shapes.items():
+        assert get_handler_name(own._core.new_array(np.empty, shape, dtype)) == name
+
+
 def test_an_array_given_back_is_written_in_place(own: Renderer) -> None:
     image = picture("float16")
     expected = final(own, image, 0.5).copy()
@@ -112,11 +121,11 @@ def test_arrays_outlive_the_renderer_and_can_grow(own: Renderer) -> None:
 
 
 def test_zeros_in_memory_that_was_used(own: Renderer) -> None:
-    used = own._core.new_array(np.empty, (1 << 18,), "uint8")
+    used = own._core.new_array(np.empty, (1 << 20,), "uint8")
     used[:] = 7
     before = place(used)
     del used
-    zeros = own._core.new_array(np.zeros, (1 << 18,), "uint8")
+    zeros = own._core.new_array(np.zeros, (1 << 20,), "uint8")
     assert place(zeros) == before
     assert not zeros.any()
 
