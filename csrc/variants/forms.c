@@ -124,6 +124,7 @@ static bool add_pixels(const struct vkb_form_choice *choice, const struct vkb_pa
 
 struct form {
     enum vkb_forms forms;
+    const char *name;
     vkb_form_add *add;
     uint32_t least_pixels;  // of the target
 };
@@ -134,22 +135,22 @@ struct form {
 enum { HALVE_STRIPS = 1 << 17, DOUBLE_STRIPS = 1 << 19 };
 
 static const struct form forms_table[] = {
-    {VKB_FORMS_CPU, vkb_add_line, 0},
-    {VKB_FORMS_CPU, vkb_add_enlarged, 0},
-    {VKB_FORMS_CPU, vkb_add_strips, 0},
-    {VKB_FORMS_CPU, vkb_add_from_lines, 0},
-    {VKB_FORMS_CPU, vkb_add_halved, 0},
-    {VKB_FORMS_CPU, vkb_add_doubled, 0},
-    {VKB_FORMS_CPU, vkb_add_doubled_final, 0},
-    {VKB_FORMS_CPU, add_pixels, 0},
-    {VKB_FORMS_GPU, vkb_add_whole_taps, 0},
-    {VKB_FORMS_GPU, vkb_add_enlarged, 0},
-    {VKB_FORMS_GPU, vkb_add_from_lines, 0},
-    {VKB_FORMS_GPU, vkb_add_tiles, 0},
-    {VKB_FORMS_GPU, vkb_add_halved, HALVE_STRIPS},
-    {VKB_FORMS_GPU, vkb_add_doubled, DOUBLE_STRIPS},
-    {VKB_FORMS_GPU, vkb_add_doubled_final, DOUBLE_STRIPS},
-    {VKB_FORMS_GPU, add_pixels, 0},
+    {VKB_FORMS_CPU, "line", vkb_add_line, 0},
+    {VKB_FORMS_CPU, "enlarged", vkb_add_enlarged, 0},
+    {VKB_FORMS_CPU, "strips", vkb_add_strips, 0},
+    {VKB_FORMS_CPU, "from_lines", vkb_add_from_lines, 0},
+    {VKB_FORMS_CPU, "halved", vkb_add_halved, 0},
+    {VKB_FORMS_CPU, "doubled", vkb_add_doubled, 0},
+    {VKB_FORMS_CPU, "doubled_final", vkb_add_doubled_final, 0},
+    {VKB_FORMS_CPU, "pixels", add_pixels, 0},
+    {VKB_FORMS_GPU, "texel_taps", vkb_add_whole_taps, 0},
+    {VKB_FORMS_GPU, "enlarged", vkb_add_enlarged, 0},
+    {VKB_FORMS_GPU, "from_lines", vkb_add_from_lines, 0},
+    {VKB_FORMS_GPU, "tiles", vkb_add_tiles, 0},
+    {VKB_FORMS_GPU, "halved", vkb_add_halved, HALVE_STRIPS},
+    {VKB_FORMS_GPU, "doubled", vkb_add_doubled, DOUBLE_STRIPS},
+    {VKB_FORMS_GPU, "doubled_final", vkb_add_doubled_final, DOUBLE_STRIPS},
+    {VKB_FORMS_GPU, "pixels", add_pixels, 0},
 };
 
 static bool add_in_its_form(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
@@ -159,13 +160,17 @@ static bool add_in_its_form(const struct vkb_form_choice *choice, const struct v
     const uint64_t pixels = (uint64_t)target->width * target->height;
 
     for (size_t i = 0; i < sizeof forms_table / sizeof forms_table[0]; ++i) {
+        const uint32_t first = choice->graph->pass_count;
         bool fits = false;
         if (forms_table[i].forms != choice->forms || pixels < forms_table[i].least_pixels)
             continue;
         if (!forms_table[i].add(choice, pass, &fits, error))
             return false;
-        if (fits)
-            return true;
+        if (!fits)
+            continue;
+        for (uint32_t added = first; added < choice->graph->pass_count; ++added)
+            choice->graph->passes[added].variant = forms_table[i].name;
+        return true;
     }
     return vkb_graph_add_pass(choice->graph, pass, error);
 }
