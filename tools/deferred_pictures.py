@@ -13,7 +13,7 @@ import textured_model
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.srgb import encode_srgb
+from vkbloom.io.srgb import encode_srgb
 
 SIZE = (640, 360)
 SETTINGS = vkbloom.presets["deferred"].replace(bloom_scale=0.25, intensity=2.0)

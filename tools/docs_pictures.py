@@ -21,7 +21,8 @@ import numpy as np
 import OpenImageIO as oiio
 
 import vkbloom
-from vkbloom import _core, pictures
+from vkbloom import _core
+from vkbloom.views import pictures
 
 mpl.use("agg")
 from matplotlib import pyplot as plt

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import files, pictures
-from vkbloom.dimensions import dimensions
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
+from vkbloom.io import files
+from vkbloom.views import pictures
+from vkbloom.views.dimensions import dimensions
 
 if TYPE_CHECKING:
     import xarray

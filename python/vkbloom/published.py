@@ -12,7 +12,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number, check_number
+from vkbloom.checks import check_number
+from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number
 
 __all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UnrealBloom", "UrpBloom"]
 

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from vkbloom import _core, batches, pipeline_cache
+from vkbloom import _core, requests
 from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
+from vkbloom.checks import check_size, check_time
 from vkbloom.frames import Frames
-from vkbloom.settings import Separable, Settings, check_size, check_time
+from vkbloom.io import pipeline_cache
+from vkbloom.settings import Separable, Settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vkbloom.scene import Mesh, Scene
-    from vkbloom.textures import Texture
+    from vkbloom.scene.textures import Texture
 
 Shading = Literal["forward", "deferred"]
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
@@ -235,7 +237,7 @@ class Renderer:
     def _repr_html_(self) -> str:
         """Return the table of `display.renderer_html`."""
         # Late: notebooks need it, and nothing else.
-        from vkbloom import display  # noqa: PLC0415
+        from vkbloom.views import display  # noqa: PLC0415
 
         return display.renderer_html(self)
 
@@ -530,10 +532,10 @@ class Renderer:
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
         checked = map(_check_settings, settings_seq)
-        for settings, result in batches.run(checked, open_batch, _allocator(self._core, None)):
+        for settings, result in requests.run(checked, open_batch, _allocator(self._core, None)):
             yield self._frames(settings, result)
 
-    def _frames(self, settings: Settings, result: batches.Result) -> Frames:
+    def _frames(self, settings: Settings, result: requests.Result) -> Frames:
         self._save_pipelines()
         arrays, timings, (nan, inf) = result
         info = {**self._made_by, "nan": nan, "inf": inf}

@@ -9,20 +9,16 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
-from collections.abc import Iterable
 from typing import Any, ClassVar, Literal, Self
 
-import numpy as np
-
 from vkbloom import _core
+from vkbloom.checks import as_float, check_floats, check_number, check_size
 
 Composite = Literal["add", "mix", "screen"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 Encoding = Literal["none", "gamma22", "srgb"]
 Texel = Literal["own", "x"]
 BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float"]
-
-FLT_MAX = (2 - 2**-23) * 2.0**127
 
 BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
 
@@ -46,45 +42,6 @@ def _flag(name: str) -> Any:
 def _choice(name: str) -> Any:
     """Declare a field that is one of the core's names; the first is the default."""
     return dataclasses.field(default=_core.CHOICES[name][0])
-
-
-def _as_float(name: str, value: Any) -> float:
-    """Return a real number as a float, one beyond all floats as infinity, or raise TypeError."""
-    try:
-        # All of these float() would take, the arrays and complex numbers with a warning.
-        no_number = isinstance(value, str | bytes | np.complexfloating)
-        if no_number or getattr(value, "ndim", 0) != 0:
-            raise TypeError
-        return float(value)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: a number is needed, not {value!r}") from None
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
-
-
-def check_number(name: str, value: float, low: float, high: float) -> float:
-    """Return the value as a float if ``low <= value <= high``.
-
-    Else raise ValueError, naming the field and its range, or TypeError where it is no number.
-    """
-    number = _as_float(name, value)
-    if not low <= number <= high:
-        raise ValueError(f"{name}: {value!r} is out of range, {low:g} to {high:g}")
-    return number
-
-
-def _finite_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
-    try:
-        if isinstance(values, str):
-            raise TypeError
-        numbers = tuple(_as_float(name, value) for value in values)
-    except TypeError:
-        raise TypeError(f"{name}: a sequence of numbers is needed, not {values!r}") from None
-    for number in numbers:
-        # The device has 32 bits, of which this is the largest number.
-        if not abs(number) <= FLT_MAX:
-            raise ValueError(f"{name}: {number!r} is out of range, {-FLT_MAX:g} to {FLT_MAX:g}")
-    return numbers
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -227,29 +184,9 @@ class Settings:
     def _repr_html_(self) -> str:
         """Return the table of `display.settings_html`."""
         # Late, because pictures of frames are made there, and frames have settings.
-        from vkbloom import display  # noqa: PLC0415
+        from vkbloom.views import display  # noqa: PLC0415
 
         return display.settings_html(self)
-
-
-def check_size(name: str, size: Any) -> tuple[int, int]:
-    """Return (width, height) as two ints of at least 1, else raise TypeError or ValueError."""
-    try:
-        width, height = size
-        whole = (int(width), int(height))
-    except (TypeError, ValueError, OverflowError):
-        raise TypeError(f"{name}: (width, height) is needed, not {size!r}") from None
-    if whole != (width, height) or min(whole) < 1 or max(whole) >= 2**31:
-        raise ValueError(f"{name}: {size!r} is out of range, whole numbers from 1 on")
-    return whole
-
-
-def check_time(time: Any) -> float:
-    """Return a time of a scene as a float, else raise TypeError or ValueError."""
-    turns = _as_float("time", time)
-    if not math.isfinite(turns):
-        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
-    return turns
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -301,7 +238,7 @@ class Separable(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "weights", _finite_floats("weights", self.weights))
+        object.__setattr__(self, "weights", check_floats("weights", self.weights))
         if not 1 <= len(self.weights) <= _core.MAX_WEIGHTS:
             raise ValueError(
                 f"weights: {len(self.weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
@@ -312,7 +249,7 @@ class Separable(Settings):
             raise TypeError(
                 f"layers: (scale, strength) pairs are needed, not {self.layers!r}"
             ) from None
-        layers = tuple(_finite_floats("layers", layer) for layer in pairs)
+        layers = tuple(check_floats("layers", layer) for layer in pairs)
         if not 1 <= len(layers) <= _core.MAX_LAYERS:
             raise ValueError(
                 f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}"
@@ -412,7 +349,7 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
         `sigma` is no number, or `radius` no integer.
     """
     limit = _core.MAX_WEIGHTS - 1
-    deviation = _as_float("sigma", sigma)
+    deviation = as_float("sigma", sigma)
     if not 0 < deviation < math.inf:
         raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
     if radius is None:

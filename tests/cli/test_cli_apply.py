@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.cli.program import program
-from vkbloom.image_reading import load
-from vkbloom.image_writing import save
-from vkbloom.images import Picture
+from vkbloom.io.image_reading import load
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
+from vkbloom.io.srgb import decode_srgb, encode_srgb
 from vkbloom.settings import Pyramid, Separable
-from vkbloom.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 

@@ -23,9 +23,9 @@ from tests.framebuffers import noise
 from vkbloom import Pyramid, Renderer, Separable
 from vkbloom.cli.axis_options import axis_values
 from vkbloom.cli.program import program
-from vkbloom.image_reading import load
-from vkbloom.image_writing import save
-from vkbloom.images import Picture
+from vkbloom.io.image_reading import load
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
 
 pytest.importorskip("OpenImageIO")
 xr = pytest.importorskip("xarray")

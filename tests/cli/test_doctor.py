@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 import vkbloom
-from vkbloom import doctor, pipeline_cache
+from vkbloom import doctor
 from vkbloom.doctor import child, drivers, installation, trial
 from vkbloom.doctor.finding import Finding
+from vkbloom.io import pipeline_cache
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader works on Linux")
 

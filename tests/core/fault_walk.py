@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
-from vkbloom.textures import Texture
+from vkbloom.scene.textures import Texture
 
 OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4

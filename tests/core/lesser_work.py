@@ -13,7 +13,8 @@ import numpy as np
 
 import vkbloom
 from tests import tolerance
-from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, UnrealBloom, skybox
+from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, UnrealBloom
+from vkbloom.scene import skybox
 
 DTYPES = ("uint8", "float16", "float32")
 # One of each form: lines, strips and tiles, levels half and twice as large, sums of all levels.

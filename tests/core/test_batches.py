@@ -21,7 +21,7 @@ from vkbloom import (
     Separable,
     Settings,
     _core,
-    batches,
+    requests,
 )
 from vkbloom.renderer import _scene_arrays
 
@@ -97,8 +97,8 @@ def test_frames_that_fill_a_batch_alone(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, points: int
 ) -> None:
     image = picture(33, 21, 4, 2)
-    monkeypatch.setattr(batches, "BYTES", points * image.nbytes)
-    monkeypatch.setattr(batches, "SECONDS", 1e6)
+    monkeypatch.setattr(requests, "BYTES", points * image.nbytes)
+    monkeypatch.setattr(requests, "SECONDS", 1e6)
     sizes = []
 
     def open_batch() -> Any:
@@ -107,19 +107,19 @@ def test_frames_that_fill_a_batch_alone(
         return batch
 
     settings = [Separable(exposure=exposure / 8) for exposure in range(20)]
-    results = list(batches.run(settings, open_batch, lambda _, *array: np.empty(*array)))
+    results = list(requests.run(settings, open_batch, lambda _, *array: np.empty(*array)))
     assert len(results) == 20
     assert max(batch.size for batch in sizes) == points * image.nbytes
     for point, (arrays, _, _) in results:
         np.testing.assert_array_equal(arrays["final"], renderer.apply(image, point)["final"])
 
 
-@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, batches.POINTS)])
+@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, requests.POINTS)])
 def test_a_batch_is_as_long_as_a_wait_may_be(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
 ) -> None:
     image = picture(33, 21, 4, 2)
-    monkeypatch.setattr(batches, "SECONDS", seconds)
+    monkeypatch.setattr(requests, "SECONDS", seconds)
     counts: list[int] = []
 
     def open_batch() -> Any:
@@ -131,7 +131,7 @@ def test_a_batch_is_as_long_as_a_wait_may_be(
         return np.empty(*array)
 
     settings = [Separable(exposure=step / 8) for step in range(100)]
-    results = list(batches.run(settings, open_batch, allocate))
+    results = list(requests.run(settings, open_batch, allocate))
     assert [point for point, _ in results] == settings
     # The first one goes alone, whatever it takes.
     assert max(counts) == most
@@ -177,7 +177,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, slow: int
 ) -> None:
     taken = collected = 0
-    took = batches._Points.took
+    took = requests._Points.took
 
     def took_long(points: Any, seconds: float, count: int) -> None:
         # The first batches, on whose time the next ones' size depends.
@@ -185,7 +185,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
         collected += 1
         took(points, 1e6 if collected <= slow else seconds, count)
 
-    monkeypatch.setattr(batches._Points, "took", took_long)
+    monkeypatch.setattr(requests._Points, "took", took_long)
 
     def endless() -> Iterator[Settings]:
         nonlocal taken
@@ -197,7 +197,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
     assert taken == 0
     next(frames)
     assert taken == 1
-    limit = (batches.AHEAD + 1) * batches.POINTS
+    limit = (requests.AHEAD + 1) * requests.POINTS
     for given in range(2, 300):
         next(frames)
         assert given <= taken <= given + limit
@@ -419,7 +419,7 @@ def run_failing(
         raise AssertionError
 
     try:
-        for result in batches.run(settings, open_batch, allocate):
+        for result in requests.run(settings, open_batch, allocate):
             results.append(result)
     except Exception as error:
         return results, error
@@ -441,7 +441,7 @@ def test_errors_that_no_setting_is_to_blame_for(
     kind: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # However slow the machine is, batches double up to the most there can be.
-    monkeypatch.setattr(batches, "SECONDS", 1e6)
+    monkeypatch.setattr(requests, "SECONDS", 1e6)
     settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
     blame = kind("all")
     results, error = run_failing(settings, {settings[50]: blame})

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vkbloom import Renderer, Scene, Separable, pipeline_cache
+from vkbloom import Renderer, Scene, Separable
+from vkbloom.io import pipeline_cache
 
 SIZE = (16, 16)
 

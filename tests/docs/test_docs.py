@@ -13,8 +13,8 @@ import pytest
 from click.testing import CliRunner
 
 from vkbloom.cli.program import program
-from vkbloom.image_writing import save
-from vkbloom.images import Picture
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXTS = [ROOT / "README.md", *sorted(ROOT.glob("*/*.md")), *sorted(ROOT.glob("python/*/*/*.md"))]

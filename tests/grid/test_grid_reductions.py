@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tests.framebuffers import make, noise
 from vkbloom import reductions
-from vkbloom.comparison import compare
+from vkbloom.views.comparison import compare
 
 # Of one pair of doubles.
 EXACT = 1e-12

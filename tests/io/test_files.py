@@ -18,10 +18,11 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-import vkbloom.files
+import vkbloom.io.files
 from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, noise, read
-from vkbloom import Separable, safe_writing
+from vkbloom import Separable
 from vkbloom.frames import Frames
+from vkbloom.io import safe_writing
 
 
 @pytest.fixture
@@ -357,7 +358,7 @@ class TestWriteErrors:
         def interrupted(array: Any) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("vkbloom.safe_writing.np.ascontiguousarray", interrupted)
+        monkeypatch.setattr("vkbloom.io.safe_writing.np.ascontiguousarray", interrupted)
         with pytest.raises(KeyboardInterrupt):
             safe_writing.write_whole(tmp_path / "a.png", b"bytes")
         assert names_in(tmp_path) == []
@@ -401,7 +402,7 @@ class TestWriteErrors:
             {"glow": noise(2, 2, 4, dtype="uint8"), "final": noise(9, 9, 3, dtype="uint8")}
         )
         (tmp_path / "out_glow.png").write_text("the one before")
-        original = vkbloom.files._write_image
+        original = vkbloom.io.files._write_image
 
         def write_image(oiio: Any, frames: Frames, name: str, *files: Path) -> bool:
             if name == "final":
@@ -409,7 +410,7 @@ class TestWriteErrors:
             return original(oiio, frames, name, *files)
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(vkbloom.files, "_write_image", write_image)
+            patch.setattr(vkbloom.io.files, "_write_image", write_image)
             with pytest.raises(OSError, match=r"out_final\.png"):
                 frames.save(tmp_path / "out.png")
         assert names_in(tmp_path) == ["out_glow.png"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from vkbloom import skybox
+from vkbloom.scene import skybox
 
 RUN = Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "run.py"
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address space of Linux")

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom import safe_writing
-from vkbloom.image_reading import decode, load
-from vkbloom.image_writing import check_writable, save
-from vkbloom.images import Colour, Picture, Window
-from vkbloom.srgb import decode_srgb, encode_srgb
+from vkbloom.io import safe_writing
+from vkbloom.io.image_reading import decode, load
+from vkbloom.io.image_writing import check_writable, save
+from vkbloom.io.images import Colour, Picture, Window
+from vkbloom.io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 

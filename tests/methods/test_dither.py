@@ -16,7 +16,7 @@ from tests.screens import CAMERA, panel
 from tests.tolerance import assert_close
 from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, UnrealBloom, reference
 from vkbloom.cli.program import program
-from vkbloom.textures import Texture
+from vkbloom.scene.textures import Texture
 
 Array = NDArray[Any]
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from vkbloom import Frames, Separable
 from vkbloom.cli.program import program
-from vkbloom.comparison import Comparison, Limits, compare, difference, flip_map
-from vkbloom.image_writing import save
-from vkbloom.images import Picture
-from vkbloom.srgb import decode_srgb
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
+from vkbloom.io.srgb import decode_srgb
+from vkbloom.views.comparison import Comparison, Limits, compare, difference, flip_map
 
 oiio = pytest.importorskip("OpenImageIO")
 metrics = pytest.importorskip("skimage.metrics")

@@ -30,11 +30,11 @@ from tests.scene.test_gltf import (
     places,
 )
 from tests.screens import CAMERA, panel
-from vkbloom import Renderer, Scene, gltf_textures
-from vkbloom.gltf import load_mesh
-from vkbloom.scene import Mesh
-from vkbloom.srgb import decode_srgb
-from vkbloom.textures import WHITE, Texture
+from vkbloom import Renderer, Scene
+from vkbloom.io.srgb import decode_srgb
+from vkbloom.scene import Mesh, gltf_textures
+from vkbloom.scene.gltf import load_mesh
+from vkbloom.scene.textures import WHITE, Texture
 
 Array = NDArray[Any]
 HALF = 2.0**-11  # half of the last bit of a half float, relative
@@ -493,7 +493,7 @@ def test_huge_images_are_refused_by_their_header(tmp_path: Path, size: tuple[int
 
 
 def test_an_image_file_that_is_too_long(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vkbloom.gltf_file._MAX_IMAGE_BYTES", 10)
+    monkeypatch.setattr("vkbloom.scene.gltf_file._MAX_IMAGE_BYTES", 10)
     with pytest.raises(ValueError, match=r"mesh\.gltf.*images\[0\].*too many"):
         load(textured())
 

@@ -19,7 +19,7 @@ import vkbloom
 from tests.screens import noise, screen
 from vkbloom import Camera, Renderer, Scene, Separable, reference
 from vkbloom.scene import Mesh
-from vkbloom.skybox import Cubemap
+from vkbloom.scene.skybox import Cubemap
 
 SIZE = (320, 180)
 FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from vkbloom.scene import Camera, Mesh, Scene
-from vkbloom.skybox import Cubemap
+from vkbloom.scene.skybox import Cubemap
 
 SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 

@@ -18,8 +18,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vkbloom import ktx, skybox
-from vkbloom.skybox import Cubemap
+from vkbloom.scene import ktx, skybox
+from vkbloom.scene.skybox import Cubemap
 
 SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 

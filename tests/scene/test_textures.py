@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
 from vkbloom import Frames, Renderer, Scene, Separable, reference
 from vkbloom.scene import Mesh
-from vkbloom.textures import WHITE, Surface, Texture, mip_levels
+from vkbloom.scene.textures import WHITE, Surface, Texture, mip_levels
 
 Array = NDArray[Any]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tests.framebuffers import decode, make, mixed, noise
 from vkbloom import Separable
 from vkbloom.frames import Frames
-from vkbloom.pictures import contact_sheet_png, picture
+from vkbloom.views.pictures import contact_sheet_png, picture
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ import numpy as np
 import vkbloom
 from vkbloom.cli import axis_options, scene_options
 from vkbloom.cli import grid as command
-from vkbloom.images import Picture, StoredImage
+from vkbloom.io.images import Picture, StoredImage
 
 IMAGE = np.linspace(0, 1, 60, dtype=np.float32).reshape(4, 5, 3)
 

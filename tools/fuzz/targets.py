@@ -21,8 +21,9 @@ import OpenImageIO
 import options
 import stores
 
-from vkbloom import ktx, pipeline_cache, skybox
-from vkbloom.gltf import load_mesh
+from vkbloom.io import pipeline_cache
+from vkbloom.scene import ktx, skybox
+from vkbloom.scene.gltf import load_mesh
 
 FOLDER = Path(tempfile.mkdtemp(prefix="vkbloom-fuzz-"))
 PROMISED = (OSError, ValueError)

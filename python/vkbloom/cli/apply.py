@@ -11,12 +11,12 @@ import click
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom import image_writing
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import COLOURS, note, read_picture, subimage_option
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.images import Colour, Picture
+from vkbloom.io import image_writing
+from vkbloom.io.images import Colour, Picture
 from vkbloom.settings import Encoding
 
 

@@ -10,12 +10,12 @@ from typing import Any
 import click
 from rich.console import Console
 
-from vkbloom import image_writing
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import check_part_is_given, note, read, subimage_option
 from vkbloom.cli.program import blaming_the_call
-from vkbloom.comparison import Comparison, Limits, compare, difference
-from vkbloom.images import Picture, StoredImage
+from vkbloom.io import image_writing
+from vkbloom.io.images import Picture, StoredImage
+from vkbloom.views.comparison import Comparison, Limits, compare, difference
 
 
 @click.command()

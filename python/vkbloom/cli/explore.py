@@ -13,6 +13,7 @@ import click
 from numpy.typing import NDArray
 
 import vkbloom
+from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
 from vkbloom.cli.image_files import read_picture, subimage_option
@@ -20,7 +21,6 @@ from vkbloom.cli.program import blaming_the_call, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.explorer.viewer import Viewer
-from vkbloom.extras import import_extra
 from vkbloom.renderer import SHADINGS, Shading
 
 _LARGEST_PORT: Final = 65535

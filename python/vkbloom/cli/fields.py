@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol
 import click
 
 from vkbloom.cli.program import given
-from vkbloom.descriptions import described_parameters
+from vkbloom.views.descriptions import described_parameters
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Any]

@@ -21,7 +21,7 @@ from typing import Any, Final
 import click
 
 import vkbloom
-from vkbloom import image_writing, safe_writing
+from vkbloom.checks import import_extra
 from vkbloom.cli import axis_options
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
@@ -30,11 +30,11 @@ from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.extras import import_extra
 from vkbloom.grid.image_files import FileForm, GridFiles
 from vkbloom.grid.plan import Layout, ask
 from vkbloom.grid.rendering import render_grid
-from vkbloom.images import Colour, Picture
+from vkbloom.io import image_writing, safe_writing
+from vkbloom.io.images import Colour, Picture
 from vkbloom.renderer import Shading
 
 _SHADINGS: Final = typing.get_args(Shading)

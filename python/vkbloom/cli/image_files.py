@@ -11,9 +11,9 @@ from typing import Any, Final
 import click
 import numpy as np
 
-from vkbloom import image_reading
 from vkbloom.cli.program import given
-from vkbloom.images import Colour, Picture, StoredImage
+from vkbloom.io import image_reading
+from vkbloom.io.images import Colour, Picture, StoredImage
 
 #: What the colours in a file can be said to be.
 COLOURS: Final = ("linear", "srgb")
@@ -22,7 +22,7 @@ _STANDARD_ERROR = 2
 
 
 def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--subimage``, the argument of `vkbloom.image_reading.load`."""
+    """Add ``--subimage``, the argument of `vkbloom.io.image_reading.load`."""
     return click.option(
         "--subimage",
         metavar="N",

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import click
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 
 __all__ = ["FILE_OPTION", "CommandWithFile"]
 

@@ -9,9 +9,10 @@ from typing import Any, Final
 
 import click
 
-from vkbloom import Camera, Scene, gltf, skybox
+from vkbloom import Camera, Scene
 from vkbloom.cli import fields
 from vkbloom.cli.program import blaming_the_call
+from vkbloom.scene import gltf, skybox
 
 _BUILT_IN: Final = "ufo"
 _FACES: Final = 6

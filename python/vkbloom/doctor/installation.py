@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from vkbloom import pipeline_cache
 from vkbloom.doctor.finding import Finding, Status
+from vkbloom.io import pipeline_cache
 
 # What each extra of the package is for; which distributions it needs is read from the metadata.
 _EXTRAS: Final = {

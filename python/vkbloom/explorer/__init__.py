@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal
 
 from vkbloom import _core
-from vkbloom.descriptions import described_parameters
 from vkbloom.presets import presets
 from vkbloom.settings import Settings
+from vkbloom.views.descriptions import described_parameters
 
 __all__ = ["METHODS", "as_code", "controls", "settings_from"]
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import pictures
+from vkbloom.views import pictures
 
 __all__ = ["picture_of", "reduced", "texts_of"]
 

@@ -27,10 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
+from vkbloom.checks import check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.renderer import SHADINGS, Renderer, _check_image, _check_settings
-from vkbloom.settings import check_number, check_size
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames

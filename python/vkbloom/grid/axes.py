@@ -12,8 +12,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.descriptions import described_parameters
-from vkbloom.settings import Settings, check_time
+from vkbloom.checks import check_time
+from vkbloom.settings import Settings
+from vkbloom.views.descriptions import described_parameters
 
 __all__ = ["Axis", "image_axis", "read_axes", "unit_and_description"]
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import check_numbers, check_summed, check_text
 from vkbloom.grid.identity import FORMAT, chunk_in, short

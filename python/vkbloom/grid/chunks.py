@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 
 __all__ = ["check_numbers", "check_summed", "check_text"]
 

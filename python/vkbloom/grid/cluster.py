@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 from vkbloom._core import DeviceLostError, Error
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import Block
 from vkbloom.grid.plan import Grid, Layout, lay_out

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.grid import views
 
 if TYPE_CHECKING:

@@ -11,7 +11,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import image_writing, safe_writing
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import differences, identity
 from vkbloom.grid.memory import chunk_of
@@ -19,7 +18,8 @@ from vkbloom.grid.order import Block, Index, blocks, points
 from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.running import Writer
 from vkbloom.grid.sources import ImageSource
-from vkbloom.images import Encoding, Picture, check_name
+from vkbloom.io import image_writing, safe_writing
+from vkbloom.io.images import Encoding, Picture, check_name
 
 __all__ = ["FileForm", "GridFiles"]
 
@@ -28,7 +28,7 @@ _INDEX: Final = "grid.json"
 
 @dataclass(frozen=True)
 class FileForm:
-    """What the files of an image's `final` hold, as `vkbloom.images.Picture` has it."""
+    """What the files of an image's `final` hold, as `vkbloom.io.images.Picture` has it."""
 
     encoding: Encoding | None
     numbers: str

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 
 if TYPE_CHECKING:
     from zarr.abc.store import Store

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import blocks, default_chunk
 from vkbloom.grid.plan import Grid, Layout, attributes_of, lay_out

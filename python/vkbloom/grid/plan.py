@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.dimensions import dimensions, leading
 from vkbloom.frames import Frames
 from vkbloom.grid import passes
 from vkbloom.grid.axes import Axis, image_axis, read_axes
@@ -20,6 +19,7 @@ from vkbloom.grid.order import Index
 from vkbloom.grid.reductions import Comparing, Reduction
 from vkbloom.grid.sources import Framebuffers, Point, Source, read_source, visit
 from vkbloom.settings import Settings
+from vkbloom.views.dimensions import dimensions, leading
 
 if TYPE_CHECKING:
     from vkbloom.renderer import Renderer

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from types import TracebackType
 from typing import Any
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.grid.filling import Tally
 
 __all__ = ["Progress"]

@@ -14,8 +14,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.comparison import Metric, compare
 from vkbloom.frames import Frames
+from vkbloom.views.comparison import Metric, compare
 
 __all__ = ["FLIP", "PSNR", "SSIM", "EncircledEnergy", "Max", "Mean", "Reduction"]
 

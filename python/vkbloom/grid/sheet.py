@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import pictures
-from vkbloom.dimensions import leading
+from vkbloom.checks import check_index
 from vkbloom.grid import views
+from vkbloom.views import pictures
+from vkbloom.views.dimensions import leading
 
 if TYPE_CHECKING:
     import xarray
@@ -66,8 +67,8 @@ def contact_sheet(
     TypeError, ValueError
         The Dataset is no grid or holds no framebuffers, or an argument is wrong.
     """
-    width = pictures.in_range("width", width, 48, 4096)
-    most = pictures.in_range("most", most, 1, 64)
+    width = check_index("width", width, 48, 4096)
+    most = check_index("most", most, 1, 64)
     rows, columns = _shown(dataset, rows, columns)
     name = _attachment(dataset, attachment)
     shown = [axis for axis in (rows, columns) if axis is not None]

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.checks import check_size, check_time
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
-from vkbloom.settings import Settings, check_size, check_time
+from vkbloom.settings import Settings
 
 if TYPE_CHECKING:
     from vkbloom.renderer import Renderer, Shading

@@ -23,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import check_summed
 from vkbloom.grid.identity import FORMAT, differences, identity, short

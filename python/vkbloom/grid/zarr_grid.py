@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.extras import import_extra
+from vkbloom.checks import import_extra
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import chunk_in
 from vkbloom.grid.keys import Keys, open_keys

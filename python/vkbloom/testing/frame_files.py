@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from vkbloom import image_reading
+from vkbloom.io import image_reading
 
 __all__ = ["read_frame"]
 
@@ -25,7 +25,7 @@ def read_frame(path: str | os.PathLike[str]) -> NDArray[Any]:
     -------
     ndarray, shape (H, W, 3) or (H, W, 4)
         float16 of half, float32 of float, uint8 of 8 bits; of 16 bits float32, decoded to linear
-        values as `vkbloom.image_reading.decode` does. Top row first.
+        values as `vkbloom.io.image_reading.decode` does. Top row first.
 
     Raises
     ------

@@ -10,8 +10,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.comparison import Comparison, Metric, compare
-from vkbloom.settings import check_number
+from vkbloom.checks import check_number
+from vkbloom.views.comparison import Comparison, Metric, compare
 
 __all__ = ["DEFAULTS", "Stage", "Tolerances", "Verdict", "first_failure", "judge", "judge_image"]
 
@@ -143,8 +143,8 @@ def judge(
     Parameters
     ----------
     expected, actual : mapping of str to ndarray
-        By name, in the order that the data flows. Arrays as `vkbloom.comparison.compare` takes
-        them.
+        By name, in the order that the data flows. Arrays as
+        `vkbloom.views.comparison.compare` takes them.
     tolerances : Tolerances
 
     Returns

@@ -13,7 +13,7 @@ from typing import Literal, NoReturn
 
 import numpy as np
 
-from vkbloom.settings import check_number
+from vkbloom.checks import check_number
 from vkbloom.testing.probe import Bloom, Image, Probe
 
 __all__ = [

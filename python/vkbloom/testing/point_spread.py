@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.settings import check_number
+from vkbloom.checks import check_number
 from vkbloom.testing.laws import compare_with_law, fail
 from vkbloom.testing.probe import Bloom, Image, Probe
 

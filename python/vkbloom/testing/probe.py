@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.settings import check_number, check_size
+from vkbloom.checks import check_number, check_size
 
 __all__ = ["Bloom", "Image", "Probe"]
 

@@ -19,8 +19,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import image_reading, image_writing, safe_writing
-from vkbloom.images import Picture
+from vkbloom.io import image_reading, image_writing, safe_writing
+from vkbloom.io.images import Picture
 
 __all__ = ["NAME", "Origin", "Reference", "ReferenceFolder", "cpu_vendor"]
 

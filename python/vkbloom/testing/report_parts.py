@@ -16,10 +16,10 @@ from typing import Any, Final, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import pictures
-from vkbloom.comparison import difference, flip_map
 from vkbloom.testing.judging import Verdict
 from vkbloom.testing.records import Figures
+from vkbloom.views import pictures
+from vkbloom.views.comparison import difference, flip_map
 
 __all__ = ["Histogram", "Part", "Shown", "figures", "write"]
 

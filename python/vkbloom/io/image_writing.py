@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import safe_writing
-from vkbloom.extras import import_extra
-from vkbloom.images import DTYPES, KEPT_ATTRIBUTES, SPACES, Colour, Encoding, Picture
-from vkbloom.srgb import encode_srgb
+from vkbloom.checks import import_extra
+from vkbloom.io import safe_writing
+from vkbloom.io.images import DTYPES, KEPT_ATTRIBUTES, SPACES, Colour, Encoding, Picture
+from vkbloom.io.srgb import encode_srgb
 
 if TYPE_CHECKING:
     import OpenImageIO

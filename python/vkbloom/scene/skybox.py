@@ -16,9 +16,9 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from . import ktx
-from .image_reading import check_plausible, opened
-from .images import failure_of
+from vkbloom.io.image_reading import check_plausible, opened
+from vkbloom.io.images import failure_of
+from vkbloom.scene import ktx
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
@@ -191,7 +191,7 @@ def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
     Parameters
     ----------
     path
-        See `vkbloom.ktx.read` for the texel formats.
+        See `vkbloom.scene.ktx.read` for the texel formats.
 
     Returns
     -------

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.images import check_name
+from vkbloom.io.images import check_name
 
 if TYPE_CHECKING:
     import OpenImageIO

@@ -14,11 +14,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
-from .image_reading import check_plausible, opened
-from .images import failure_of
-from .srgb import decode_srgb
-from .textures import MAX_SIDE, AddressMode, Filter, Texture, mip_levels
+from vkbloom.io.image_reading import check_plausible, opened
+from vkbloom.io.images import failure_of
+from vkbloom.io.srgb import decode_srgb
+from vkbloom.scene.gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
+from vkbloom.scene.textures import MAX_SIDE, AddressMode, Filter, Texture, mip_levels
 
 # The images that glTF has (3.8.3), known by how they begin.
 _KINDS: Final = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}

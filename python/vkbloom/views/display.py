@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from vkbloom import pictures
+from vkbloom.views import pictures
 
 if TYPE_CHECKING:
     from vkbloom.renderer import Renderer
@@ -27,7 +27,7 @@ __all__ = ["renderer_html", "scene_html", "settings_html"]
 _CELL: Final = "padding:1px 12px 1px 0;text-align:left;vertical-align:top"
 _FACE_SIDE: Final = 72  # pixels
 # Places of the faces +x, -x, +y, -y, +z, -z in a cross of four columns: "row / column". -y is the
-# one above, see `vkbloom.skybox`.
+# one above, see `vkbloom.scene.skybox`.
 _CROSS: Final = ("2 / 3", "2 / 1", "3 / 2", "1 / 2", "2 / 2", "2 / 4")
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.extras import import_extra
-from vkbloom.images import (
+from vkbloom.checks import import_extra
+from vkbloom.io.images import (
     DTYPES,
     KEPT_ATTRIBUTES,
     SPACES,
@@ -23,7 +23,7 @@ from vkbloom.images import (
     check_name,
     failure_of,
 )
-from vkbloom.srgb import decode_srgb
+from vkbloom.io.srgb import decode_srgb
 
 if TYPE_CHECKING:
     import OpenImageIO

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .gltf_file import (
+from vkbloom.scene.gltf_file import (
     EMISSIVE_STRENGTH,
     FLOAT_MAX,
     INTEGERS,
@@ -25,9 +25,9 @@ from .gltf_file import (
     GltfFile,
     Parsed,
 )
-from .gltf_textures import TextureReader, TextureUse
-from .scene import Mesh
-from .textures import WHITE, Surface, Texture
+from vkbloom.scene.gltf_textures import TextureReader, TextureUse
+from vkbloom.scene.scene import Mesh
+from vkbloom.scene.textures import WHITE, Surface, Texture
 
 _LINE_MODES: Final = {0: "points", 1: "lines", 2: "line loops", 3: "line strips"}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import safe_writing
-from vkbloom.dimensions import leading
-from vkbloom.extras import import_extra
-from vkbloom.images import check_name
+from vkbloom.checks import import_extra
+from vkbloom.io import safe_writing
+from vkbloom.io.images import check_name
+from vkbloom.views.dimensions import leading
 
 if TYPE_CHECKING:
     import OpenImageIO

@@ -22,7 +22,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from .extras import import_extra
+from vkbloom.checks import import_extra
 
 Floats: TypeAlias = NDArray[np.float64]
 # An object of pygltflib, which has no types.

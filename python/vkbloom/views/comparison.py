@@ -10,9 +10,8 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.extras import import_extra
-from vkbloom.settings import check_number
-from vkbloom.srgb import decode_srgb
+from vkbloom.checks import check_number, import_extra
+from vkbloom.io.srgb import decode_srgb
 
 __all__ = ["Comparison", "Limits", "Metric", "compare", "difference", "flip_map"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import html
 import math
-import operator
 import struct
 import warnings
 import zlib
@@ -15,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.dimensions import leading
-from vkbloom.extras import import_extra
-from vkbloom.srgb import encode_srgb
+from vkbloom.checks import check_index, import_extra
+from vkbloom.io.srgb import encode_srgb
+from vkbloom.views.dimensions import leading
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 __all__ = [
     "contact_sheet_html",
     "contact_sheet_png",
-    "in_range",
     "labelled",
     "leading_png",
     "picture",
@@ -161,8 +159,8 @@ def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> byt
     ValueError
         If `columns` or `width` is out of range, or `frames` is empty.
     """
-    columns = in_range("columns", columns, 1, 32)
-    width = in_range("width", width, 128, 4096)
+    columns = check_index("columns", columns, 1, 32)
+    width = check_index("width", width, 128, 4096)
     if not frames:
         raise ValueError("frames: a contact sheet needs one framebuffer at least")
     columns = min(columns, len(frames))
@@ -322,17 +320,6 @@ def _aspect(arrays: Mapping[str, NDArray[Any]]) -> float:
 
 def _described(array: NDArray[Any]) -> str:
     return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}"
-
-
-def in_range(field: str, value: int, low: int, high: int) -> int:
-    """Return a whole number, else raise TypeError or ValueError that names the field."""
-    try:
-        index = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{field}: an int is needed, not {type(value).__name__}") from None
-    if not low <= index <= high:
-        raise ValueError(f"{field}: {index} is outside {low} to {high}")
-    return index
 
 
 def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from .skybox import read_only
+from vkbloom.scene.skybox import read_only
 
 #: What lies beyond a texture's edge, and how texels are weighed: the names of WebGPU.
 AddressMode = Literal["repeat", "mirror-repeat", "clamp-to-edge"]

@@ -19,9 +19,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from . import skybox as sky
-from .skybox import Cubemap, SkyboxSource, read_only
-from .textures import WHITE, Surface
+from vkbloom.scene import skybox as sky
+from vkbloom.scene.skybox import Cubemap, SkyboxSource, read_only
+from vkbloom.scene.textures import WHITE, Surface
 
 _serials = itertools.count(1)
 _FACE_SUFFIXES: Final = ("px", "nx", "py", "ny", "pz", "nz")
@@ -262,7 +262,7 @@ class Scene:
         Parameters
         ----------
         base : str or path-like
-            File of the mesh that is lit; see `vkbloom.gltf.load_mesh` for what is read.
+            File of the mesh that is lit; see `vkbloom.scene.gltf.load_mesh` for what is read.
         glow : str or path-like, optional
             File of the mesh that glows, or None.
         skybox : str, path-like, sequence of these, ndarray or Cubemap, optional
@@ -290,7 +290,7 @@ class Scene:
             pygltflib, or OpenImageIO for an image, is not installed.
         """
         # Imported late because gltf.py makes the Mesh defined here.
-        from . import gltf  # noqa: PLC0415
+        from vkbloom.scene import gltf  # noqa: PLC0415
 
         for name, path in (("base", base), ("glow", "" if glow is None else glow)):
             if not isinstance(path, str | os.PathLike):
@@ -351,7 +351,7 @@ class Scene:
     def _repr_html_(self) -> str:
         """Return the page of `display.scene_html`."""
         # Late: pictures are of no use where nobody looks.
-        from vkbloom import display  # noqa: PLC0415
+        from vkbloom.views import display  # noqa: PLC0415
 
         return display.scene_html(self)
 
