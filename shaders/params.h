@@ -161,6 +161,8 @@
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
 #define MAX_LAYERS 8
+// The largest scale and strength of a layer; the smallest is 0.
+#define LAYER_LIMIT 16.0
 
 // Invocations of a workgroup: in a row, of shaders that write several pixels each; a side, of those
 // that write one.

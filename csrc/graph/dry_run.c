@@ -86,7 +86,7 @@ static bool step(struct vkb_dry_run *dry_run, struct vkb_plan_step *planned, boo
     return vkb_planner_run(&dry_run->planner, planned, &dry_run->clock, note_run, ran, error);
 }
 
-bool vkb_dry_run_step(struct vkb_dry_run *dry_run, const struct vkb_plan *plan, const void *source,
+bool vkb_dry_run_step(struct vkb_dry_run *dry_run, const struct vkb_plan *plan, uint64_t source,
                       bool *ran, struct vkb_error *error)
 {
     struct vkb_plan_step planned = {.plan = plan};

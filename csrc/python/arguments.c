@@ -2,6 +2,7 @@
 // exception set.
 #include "python/module.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -34,67 +35,40 @@ bool vkb_make_attributes(struct vkb_module_state *state)
 {
     const size_t count = ATTRIBUTE_VALUES + vkb_value_row_count;
 
-    state->lacking = PyDict_New();
     state->attributes = PyTuple_New((Py_ssize_t)count);
     for (size_t i = 0; state->attributes && i < count; ++i) {
         PyObject *name = PyUnicode_InternFromString(attribute_name(i));
         if (!name || PyTuple_SetItem(state->attributes, (Py_ssize_t)i, name) < 0)
             return false;
     }
-    return state->attributes && state->lacking;
+    return state->attributes;
 }
 
-// A settings object that is being read. Most types of settings lack most attributes, and asking in
-// vain takes far longer than asking, so that is done once a type.
+// A settings object that is being read.
 struct reader {
     const struct vkb_module_state *state;
     PyObject *object;
-    PyObject *lacking;  // bytes: by attribute, whether the object's type is known to lack it
-    bool learning;
 };
 
-static bool begin_reading(const struct vkb_module_state *state, PyObject *object,
-                          struct reader *reader)
-{
-    PyObject *type = (PyObject *)Py_TYPE(object);
-    const Py_ssize_t count = PyTuple_Size(state->attributes);
-    PyObject *known = PyDict_GetItemWithError(state->lacking, type);
-
-    *reader = (struct reader){.state = state, .object = object, .learning = !known};
-    if (known) {
-        reader->lacking = Py_NewRef(known);
-        return true;
-    }
-    if (PyErr_Occurred() || !(reader->lacking = PyBytes_FromStringAndSize(NULL, count)))
-        return false;
-    memset(PyBytes_AsString(reader->lacking), 0, (size_t)count);
-    return true;
-}
-
-static bool end_reading(struct reader *reader, bool done)
-{
-    if (done && reader->learning)
-        done = PyDict_SetItem(reader->state->lacking, (PyObject *)Py_TYPE(reader->object),
-                              reader->lacking)
-            == 0;
-    Py_DECREF(reader->lacking);
-    return done;
-}
-
-// The attribute, or NULL: without an exception where the object lacks it.
+// The attribute, or NULL: without an exception where the object lacks it. One that its type has,
+// such as a property, is not lacking, whatever reading it raises.
 static PyObject *optional_attribute(const struct reader *reader, size_t attribute)
 {
-    char *lacking = PyBytes_AsString(reader->lacking) + attribute;
-
-    if (*lacking)
-        return NULL;
     PyObject *name = PyTuple_GetItem(reader->state->attributes, (Py_ssize_t)attribute);
     PyObject *value = PyObject_GetAttr(reader->object, name);
-    if (!value && PyErr_ExceptionMatches(PyExc_AttributeError)) {
-        PyErr_Clear();
-        *lacking = 1;
+
+    if (value || !PyErr_ExceptionMatches(PyExc_AttributeError))
+        return value;
+    PyObject *type, *error, *traceback;
+    PyErr_Fetch(&type, &error, &traceback);
+    if (PyObject_HasAttr((PyObject *)Py_TYPE(reader->object), name)) {
+        PyErr_Restore(type, error, traceback);
+        return NULL;
     }
-    return value;
+    Py_XDECREF(type);
+    Py_XDECREF(error);
+    Py_XDECREF(traceback);
+    return NULL;
 }
 
 bool vkb_require_tuple(PyObject *object, const char *what)
@@ -102,6 +76,36 @@ bool vkb_require_tuple(PyObject *object, const char *what)
     if (!PyTuple_Check(object))
         PyErr_Format(PyExc_TypeError, "%s: a tuple is needed, not %R", what, object);
     return PyTuple_Check(object);
+}
+
+int vkb_read_uint32(PyObject *object, void *number)
+{
+    const unsigned long long wide =
+        PyLong_Check(object) ? PyLong_AsUnsignedLongLong(object) : (unsigned long long)-1;
+
+    if (wide <= UINT32_MAX) {
+        *(uint32_t *)number = (uint32_t)wide;
+        return 1;
+    }
+    if (!PyLong_Check(object)) {
+        PyErr_Format(PyExc_TypeError, "%R is not a whole number", object);
+        return 0;
+    }
+    PyErr_Clear();
+    PyErr_Format(PyExc_ValueError, "%R is out of range, 0 to %u", object, UINT32_MAX);
+    return 0;
+}
+
+int vkb_read_serial(PyObject *object, void *number)
+{
+    const unsigned long long serial = PyLong_AsUnsignedLongLong(object);
+
+    if (PyErr_Occurred())
+        return 0;
+    if (serial == 0)
+        PyErr_SetString(PyExc_ValueError, "scene: a serial of 0 stands for no scene");
+    *(uint64_t *)number = serial;
+    return serial != 0;
 }
 
 static void store_value(struct vkb_values *values, const struct vkb_value_row *row, double number)
@@ -202,8 +206,8 @@ static bool read_size(const struct reader *reader, struct vkb_settings *settings
         return !PyErr_Occurred();
     if (value != Py_None) {
         done = vkb_require_tuple(value, "bloom_size")
-            && PyArg_ParseTuple(value, "II;bloom_size must be (width, height)",
-                                &settings->bloom_width, &settings->bloom_height);
+            && PyArg_ParseTuple(value, "O&O&;bloom_size must be (width, height)", vkb_read_uint32,
+                                &settings->bloom_width, vkb_read_uint32, &settings->bloom_height);
         if (done && (settings->bloom_width == 0 || settings->bloom_height == 0)) {
             PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, 1 a side at least",
                          value);
@@ -251,13 +255,22 @@ static bool read_weights(const struct reader *reader, struct vkb_settings *setti
     }
     for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
         PyObject *item = PySequence_GetItem(value, i);
-        if (item)
-            settings->weights[i] = (float)PyFloat_AsDouble(item);
+        const double weight = item ? PyFloat_AsDouble(item) : 0.0;
+        if (!PyErr_Occurred() && !(fabs(weight) <= FLT_MAX))
+            out_of_range("weights", item, -FLT_MAX, FLT_MAX);
+        else
+            settings->weights[i] = (float)weight;
         Py_XDECREF(item);
     }
     settings->weight_count = (uint32_t)count;
     Py_DECREF(value);
     return !PyErr_Occurred();
+}
+
+// What a kernel's taps are found by must be neither negative nor NaN.
+static bool is_layer_number(float number)
+{
+    return number >= 0.0f && number <= (float)LAYER_LIMIT;
 }
 
 static bool read_layers(const struct reader *reader, struct vkb_settings *settings)
@@ -280,13 +293,24 @@ static bool read_layers(const struct reader *reader, struct vkb_settings *settin
         if (item && vkb_require_tuple(item, "layers")
             && PyArg_ParseTuple(item, "ff;layers must hold (scale, strength)", &layer->scale,
                                 &layer->strength)
-            && !(isfinite(layer->scale) && isfinite(layer->strength)))
-            PyErr_Format(PyExc_ValueError, "layers: %R is not finite", item);
+            && !(is_layer_number(layer->scale) && is_layer_number(layer->strength)))
+            out_of_range("layers", item, 0.0, LAYER_LIMIT);
         Py_XDECREF(item);
     }
     settings->layer_count = (uint32_t)count;
     Py_DECREF(value);
     return !PyErr_Occurred();
+}
+
+// A separable blur has a kernel and a layer; whatever else the object lacks has a default.
+static bool require_kernel(const struct vkb_settings *settings)
+{
+    if (settings->method != VKB_METHOD_SEPARABLE
+        || (settings->weight_count > 0 && settings->layer_count > 0))
+        return true;
+    PyErr_Format(PyExc_ValueError, "%s: a separable blur needs them",
+                 settings->weight_count ? "layers" : "weights");
+    return false;
 }
 
 static bool read_all(const struct reader *reader, struct vkb_settings *settings)
@@ -304,16 +328,14 @@ static bool read_all(const struct reader *reader, struct vkb_settings *settings)
     Py_XDECREF(threshold);
     return !PyErr_Occurred() && read_method(reader, &settings->method)
         && read_format(reader, &settings->format) && read_size(reader, settings)
-        && read_weights(reader, settings) && read_layers(reader, settings);
+        && read_weights(reader, settings) && read_layers(reader, settings)
+        && require_kernel(settings);
 }
 
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings)
 {
-    struct reader reader;
-
-    return begin_reading(state, object, &reader)
-        && end_reading(&reader, read_all(&reader, settings));
+    return read_all(&(struct reader){.state = state, .object = object}, settings);
 }
 
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)

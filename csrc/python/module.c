@@ -253,7 +253,6 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->submission_type);
     Py_VISIT(state->pages_type);
     Py_VISIT(state->attributes);
-    Py_VISIT(state->lacking);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
     return 0;
@@ -269,7 +268,6 @@ static int clear(PyObject *module)
     Py_CLEAR(state->submission_type);
     Py_CLEAR(state->pages_type);
     Py_CLEAR(state->attributes);
-    Py_CLEAR(state->lacking);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);
     return 0;

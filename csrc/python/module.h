@@ -17,7 +17,6 @@ struct vkb_module_state {
     PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
-    PyObject *lacking;  // dict of type to bytes: which of those its objects lack
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);
@@ -72,6 +71,11 @@ bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *err
 bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
 void vkb_renderer_leave(struct vkb_renderer *renderer);
 
+// Whether what was `done` is so without a validation message either: such a message says more than
+// the failure that it led to. After an interruption, whose exception is set, the messages wait for
+// the next call. With the lock.
+bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struct vkb_error *error);
+
 // Whether this is the process that opened the renderer.
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Takes over what nobody waits for any more. With the GIL.
@@ -87,13 +91,18 @@ int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, voi
 // Makes what vkb_read_settings keeps in the state; false with an exception set.
 bool vkb_make_attributes(struct vkb_module_state *state);
 
-// A settings object's attributes; one that it lacks keeps its default. Objects of one type have the
-// same attributes. False with an exception set.
+// A settings object's attributes; one that it lacks keeps its default. False with an
+// exception set.
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 
 // Whether it is a tuple, as PyArg_ParseTuple must have it; else with a TypeError set.
 bool vkb_require_tuple(PyObject *object, const char *what);
+
+// Converters of PyArg_ParseTuple ("O&"), whose own codes for whole numbers without a sign take any
+// number modulo 2^32. 0 with an exception set.
+int vkb_read_uint32(PyObject *object, void *number);
+int vkb_read_serial(PyObject *object, void *number);  // 64 bits, not 0
 
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);

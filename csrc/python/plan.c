@@ -252,7 +252,7 @@ static bool *mark_alone(PyObject *object)
     struct vkb_error error = {0};
     bool *ran = vkb_alloc(&error, plan->graph.pass_count, sizeof *ran);
 
-    if (!ran || !vkb_dry_run_step(&dry_run, plan, plan, ran, &error)) {
+    if (!ran || !vkb_dry_run_step(&dry_run, plan, 0, ran, &error)) {
         vkb_free(ran);
         ran = NULL;
         vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
@@ -346,6 +346,16 @@ static PyObject *names_of(const struct vkb_graph *graph, const bool *ran)
     return list;
 }
 
+// Scenes know each other by their serials, whatever the frame's time is; images are compared by
+// their pixels when they come to the device, and here taken for different ones.
+static uint64_t source_number(PyObject *object)
+{
+    const struct vkb_source_object *source = (const struct vkb_source_object *)object;
+
+    return source->source.kind == VKB_SOURCE_SCENE ? source->scene.data.serial
+                                                   : (uint64_t)(uintptr_t)source;
+}
+
 static PyObject *dry_step(const struct vkb_module_state *state, struct vkb_dry_run *dry_run,
                           PyObject *step)
 {
@@ -358,7 +368,7 @@ static PyObject *dry_step(const struct vkb_module_state *state, struct vkb_dry_r
         return NULL;
     const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
     bool *ran = vkb_alloc(&error, plan->graph.pass_count, sizeof *ran);
-    PyObject *names = ran && vkb_dry_run_step(dry_run, plan, source, ran, &error)
+    PyObject *names = ran && vkb_dry_run_step(dry_run, plan, source_number(source), ran, &error)
                         ? names_of(&plan->graph, ran)
                         : vkb_raise(state, &error);
     vkb_free(ran);

@@ -128,6 +128,13 @@ void vkb_renderer_leave(struct vkb_renderer *self)
     release_all(over);
 }
 
+bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vkb_error *error)
+{
+    if (!self->open || (!done && error->kind == VKB_ERROR_INTERRUPTED))
+        return done;
+    return vkb_instance_check(&self->device.instance, error) && done;
+}
+
 // create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
 // earlier run's pipeline cache, or None.
 static bool create(struct vkb_renderer *self, const char *adapter, bool validation,
@@ -183,6 +190,10 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     if (!PyArg_ParseTuple(arguments, "spsdO:Renderer", &adapter, &validation, &forms,
                           &frame_seconds, &read_cache))
         return NULL;
+    if (!(frame_seconds > 0.0)) {
+        PyErr_SetString(PyExc_ValueError, "frame_seconds: a number above 0 is needed");
+        return NULL;
+    }
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
     if (!self)

@@ -190,9 +190,7 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
                                  pending->count, &pending->flight, error);
     if (done && data.input)
         pending->specials = renderer->frame.upload.specials;
-    // A validation message says more than what it led to.
-    if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, error) && done;
+    done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
 }
@@ -278,8 +276,7 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
     bool done = renderer->open ? vkb_frame_collect(&renderer->device, &renderer->frame,
                                                    pending->flight, &over, &error)
                                : vkb_require_open(renderer, &error);
-    if (renderer->open)
-        done = vkb_instance_check(&renderer->device.instance, &error) && done;
+    done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
     if (!over) {
         vkb_renderer_abandon(renderer, pending);

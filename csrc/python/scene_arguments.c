@@ -56,8 +56,9 @@ static bool read_surfaces(PyObject *tuple, uint32_t texture_count, struct vkb_me
     for (Py_ssize_t i = 0; i < count; ++i) {
         struct vkb_surface *surface = &mesh->surfaces[i];
         if (!vkb_require_tuple(PyTuple_GetItem(tuple, i), "scene: surface")
-            || !PyArg_ParseTuple(PyTuple_GetItem(tuple, i), "III", &surface->index_count,
-                                 &surface->base, &surface->emission))
+            || !PyArg_ParseTuple(PyTuple_GetItem(tuple, i), "O&O&O&", vkb_read_uint32,
+                                 &surface->index_count, vkb_read_uint32, &surface->base,
+                                 vkb_read_uint32, &surface->emission))
             return false;
         taken += surface->index_count;
         if (surface->base >= texture_count || surface->emission >= texture_count
@@ -145,7 +146,10 @@ static bool read_picture(struct vkb_held_scene *scene, PyObject *levels, const c
         const uint32_t width = picture->width >> i ? picture->width >> i : 1;
         const uint32_t height = picture->height >> i ? picture->height >> i : 1;
         const size_t expected = (size_t)layers * width * height * vkb_pixel_size(picture->format);
-        if (picture->width == 0 || (size_t)view->len != expected
+        // A level after one of 1 x 1 is none of the picture's.
+        const bool beyond = i > 0 && picture->width >> i == 0 && picture->height >> i == 0;
+        const bool uneven = layers > 1 && picture->width != picture->height;
+        if (picture->width == 0 || beyond || uneven || (size_t)view->len != expected
             || vkb_pixel_format(vkb_element_code(view)) != picture->format) {
             PyErr_Format(PyExc_ValueError, "%s: level %zd is not %u times %u x %u", what, i, layers,
                          width, height);
@@ -238,13 +242,11 @@ static bool read_textures(struct vkb_held_scene *scene, PyObject *textures)
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene)
 {
     enum { MESHES = 2, MESH_ARRAYS = 4 };
-    unsigned long long serial;
     PyObject *body, *glow, *sky, *textures;
 
-    if (!PyArg_ParseTuple(tuple, "KOOO!O!", &serial, &body, &glow, &PyTuple_Type, &sky,
-                          &PyTuple_Type, &textures))
+    if (!PyArg_ParseTuple(tuple, "O&OOO!O!", vkb_read_serial, &scene->data.serial, &body, &glow,
+                          &PyTuple_Type, &sky, &PyTuple_Type, &textures))
         return false;
-    scene->data.serial = serial;
     // The most that there can be: views must not move once they are held.
     scene->views =
         allocate(MESHES * MESH_ARRAYS + (1 + (size_t)PyTuple_Size(textures)) * VKB_MAX_MIP_LEVELS,

@@ -50,9 +50,10 @@ PyObject *vkb_scene_source(PyObject *module, PyObject *arguments)
     struct vkb_source source = {.kind = VKB_SOURCE_SCENE};
     struct vkb_scene_source *scene = &source.scene;
 
-    if (!PyArg_ParseTuple(arguments, "O!O!(II)Odd:scene_source", &PyTuple_Type, &scene_tuple,
-                          &PyTuple_Type, &camera, &scene->size.width, &scene->size.height, &shading,
-                          &scene->time, &scene->glow_intensity)
+    if (!PyArg_ParseTuple(arguments, "O!O!(O&O&)Odd:scene_source", &PyTuple_Type, &scene_tuple,
+                          &PyTuple_Type, &camera, vkb_read_uint32, &scene->size.width,
+                          vkb_read_uint32, &scene->size.height, &shading, &scene->time,
+                          &scene->glow_intensity)
         || !vkb_read_camera(camera, &scene->camera) || !read_shading(shading, &source))
         return NULL;
     struct vkb_source_object *self = new_source(module);

@@ -41,7 +41,7 @@ struct vkb_mesh_data {
 };
 
 struct vkb_scene_data {
-    uint64_t serial;  // differs between any two scenes; never 0
+    uint64_t serial;  // differs between any two scenes but by camera or intensity; never 0
     struct vkb_mesh_data body, glow;
     struct vkb_picture_data sky;
     struct vkb_texture_data *textures;

@@ -91,7 +91,7 @@ static bool doubles(const struct vkb_graph *graph, const struct vkb_pass_row *pa
 
     *radius = kernel == UPSAMPLE_TENT ? params->step_x : 0.0;
     return pass->shader == VKB_SHADER_pyramid_up_frag && kernel != UPSAMPLE_CUBIC
-        && is_twice(graph, pass->targets[0], pass->reads[0]) && *radius <= 1.0
+        && is_twice(graph, pass->targets[0], pass->reads[0]) && fabs(*radius) <= 1.0
         && (kernel != UPSAMPLE_TENT || params->step_x == params->step_y);
 }
 

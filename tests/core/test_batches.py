@@ -374,13 +374,13 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
 def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) -> None:
     wrong: Any = [[0.0]]
     with pytest.raises(TypeError, match="image"):
-        next(renderer.apply_many(wrong, [Separable()]))
+        renderer.apply_many(wrong, [Separable()])
     with pytest.raises(TypeError, match="attachments"):
-        next(renderer.apply_many(picture(4, 4, 3, 19), [Separable()], attachments=wrong))
+        renderer.apply_many(picture(4, 4, 3, 19), [Separable()], attachments=wrong)
     with pytest.raises(ValueError, match="shading"):
-        next(renderer.render_many(scene, [Separable()], shading=wrong))
+        renderer.render_many(scene, [Separable()], shading=wrong)
     with pytest.raises(TypeError):
-        next(renderer.apply_many(picture(4, 4, 3, 19), Separable()))  # type: ignore[arg-type]
+        renderer.apply_many(picture(4, 4, 3, 19), Separable())  # type: ignore[arg-type]
 
 
 # The core's errors: from a device that fails where it is told to

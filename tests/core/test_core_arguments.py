@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +14,18 @@ import pytest
 from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom.renderer import _render_arguments
 
+METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "unreal")
+
+
+class Given:
+    """Settings as far as an object has them; objects of this type have different attributes."""
+
 
 def settings_with(**fields: Any) -> object:
-    """Return settings of a type of their own: the core keeps in mind what a type lacks."""
-    return type("Given", (), {"method": "separable", **fields})()
+    given = Given()
+    complete = {"method": "separable", "weights": (1.0,), "layers": ((1.0, 1.0),)}
+    vars(given).update({**complete, **fields})
+    return given
 
 
 @pytest.mark.parametrize(
@@ -38,7 +48,15 @@ def settings_with(**fields: Any) -> object:
         ({"weights": 5}, "len|sequence"),
         ({"weights": ("a",)}, "real number"),
         ({"layers": ()}, "layers: 0 layers are out of range, 1 to"),
-        ({"layers": ((1.0, float("inf")),)}, "layers: .* is not finite"),
+        ({"weights": (1.0, float("nan"))}, "weights: nan is out of range"),
+        ({"weights": (float("inf"),)}, "weights: inf is out of range"),
+        ({"weights": (-1e39,)}, "weights: -1e\\+39 is out of range"),
+        ({"layers": ((1.0, float("inf")),)}, r"layers: \(1.0, inf\) is out of range, 0.0 to 16.0"),
+        ({"layers": ((float("nan"), 1.0),)}, "layers: .* is out of range, 0.0 to 16.0"),
+        ({"layers": ((-1.0, 1.0),)}, "layers: .* is out of range, 0.0 to 16.0"),
+        ({"layers": ((16.5, 1.0),)}, "layers: .* is out of range, 0.0 to 16.0"),
+        ({"layers": ((1.0, 1.0), (1.0, -0.5))}, "layers: .* is out of range, 0.0 to 16.0"),
+        ({"layers": ((1.0, 1.0),) * 9}, "layers: 9 layers are out of range, 1 to 8"),
         ({"layers": (1.0,)}, "layers: a tuple is needed, not 1.0"),
         ({"layers": 5}, "len|sequence"),
     ],
@@ -46,6 +64,66 @@ def settings_with(**fields: Any) -> object:
 def test_settings(fields: dict[str, Any], message: str) -> None:
     with pytest.raises((TypeError, ValueError), match=message):
         _core.describe(settings_with(**fields), (16, 16), True, "forward")
+
+
+@pytest.mark.parametrize("name", sorted(_core.VALUES))
+def test_every_number_has_a_range(name: str) -> None:
+    _, low, high = _core.VALUES[name]
+    for wrong in (low - 1, high + 1, np.nextafter(low, -np.inf), np.inf, -np.inf, np.nan, 1e300):
+        with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
+            _core.describe(settings_with(**{name: float(wrong)}), (16, 16), True, "forward")
+
+
+@pytest.mark.parametrize("method", ["pyramid", "dual_kawase", *METHODS])
+@pytest.mark.parametrize("side", [1, 16, 32768])
+def test_the_ends_of_all_ranges_together(method: str, side: int) -> None:
+    """Every number at its least or its most: no index or size follows that is out of bounds."""
+    for end in (1, 2):
+        fields = {name: row[end] for name, row in _core.VALUES.items()}
+        settings = settings_with(method=method, **{**fields, "bloom": 1})
+        for size in ((side, side), (side, 1), (1, side)):
+            try:
+                _core.describe(settings, size, True, "deferred")
+            except ValueError as error:
+                assert "out of this adapter's range" in str(error)  # noqa: PT017
+
+
+@pytest.mark.parametrize("missing", ["weights", "layers"])
+def test_a_separable_blur_has_weights_and_layers(missing: str) -> None:
+    settings = settings_with()
+    delattr(settings, missing)
+    with pytest.raises(ValueError, match=f"{missing}: a separable blur needs them"):
+        _core.describe(settings, (16, 16), True, "forward")
+
+
+def test_objects_of_one_type_may_differ_in_attributes() -> None:
+    """Once the first object of a type settled which attributes were read of all others."""
+    _core.describe(settings_with(), (16, 16), True, "forward")
+    with pytest.raises(ValueError, match="loops: 17 is out of range"):
+        _core.describe(settings_with(loops=17), (16, 16), True, "forward")
+
+
+def test_types_of_settings_are_not_kept() -> None:
+    class Passing(Given):
+        method = "pyramid"
+
+    _core.describe(Passing(), (16, 16), True, "forward")
+    kept = weakref.ref(Passing)
+    del Passing
+    gc.collect()
+    assert kept() is None
+
+
+def test_an_error_in_a_property_is_not_hidden() -> None:
+    class Failing(Given):
+        method = "pyramid"
+
+        @property
+        def levels(self) -> int:
+            return self.nowhere  # type: ignore[attr-defined,no-any-return]
+
+    with pytest.raises(AttributeError, match="nowhere"):
+        _core.describe(Failing(), (16, 16), True, "forward")
 
 
 def test_settings_that_raise() -> None:
@@ -60,6 +138,41 @@ def test_settings_that_raise() -> None:
         _core.describe(Given(), (16, 16), True, "forward")
     with pytest.raises(AttributeError, match="method"):
         _core.describe(object(), (16, 16), True, "forward")
+
+
+BEYOND_32_BITS = [2**32, 2**32 + 16, 2**64 + 16, 2**128, -1, -(2**32) + 16]
+
+
+@pytest.mark.parametrize("side", BEYOND_32_BITS)
+def test_sizes_are_not_taken_modulo_2_to_the_32(
+    renderer: Renderer, scene: Scene, side: int
+) -> None:
+    """Once 2**32 + 16 was a side of 16."""
+    arrays, camera, _, *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+    for size in ((side, 16), (16, side)):
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            _core.describe(Separable(), size, True, "forward")
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            _core.describe(settings_with(bloom_size=size), (16, 16), True, "forward")
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            renderer._core.render(arrays, camera, size, *rest)
+    serial, body, *others = arrays
+    for surface in ((side, 0, 0), (0, side, 0), (0, 0, side)):
+        wrong = (serial, (*body[:4], (surface,)), *others)
+        with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
+            renderer._core.render(wrong, camera, (8, 8), *rest)
+
+
+def test_sides_that_are_no_whole_numbers() -> None:
+    with pytest.raises(TypeError, match="is not a whole number"):
+        _core.describe(Separable(), (16.5, 16), True, "forward")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("serial", [0, -1, 2**64, 2**64 + 1])
+def test_serials_have_64_bits(renderer: Renderer, scene: Scene, serial: int) -> None:
+    (_, *others), *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+    with pytest.raises((ValueError, OverflowError)):
+        renderer._core.render((serial, *others), *rest)
 
 
 def test_shadings_and_sizes() -> None:
@@ -130,7 +243,7 @@ def test_settings_that_submit_the_batch(renderer: Renderer) -> None:
     batch.add(Separable(), _filled)
 
     class Given:
-        method = "separable"
+        method = "pyramid"
 
         @property
         def exposure(self) -> float:
@@ -177,6 +290,8 @@ def test_scenes(renderer: Renderer, scene: Scene) -> None:
         (serial, (*body[:4], ((3, 0, 0),)), glow, sky, textures),
         (serial, body, glow, sky[:1] * 20, textures),
         (serial, body, glow, sky[:1] * 2, textures),
+        (serial, body, glow, (np.zeros((6, 2, 4, 4), np.uint8),), textures),
+        (serial, body, glow, (np.zeros((6, 1, 1, 4), np.uint8),) * 2, textures),
         (serial, body, glow, sky, (((), "repeat", "repeat", "linear", "linear", "linear"),)),
         (serial, body, glow, sky, ((sky, "repeat", "tile", "linear", "linear", "linear"),)),
         (serial, body, glow, sky),
@@ -202,6 +317,9 @@ def test_a_renderer_takes_no_keywords() -> None:
     make: Any = _core.Renderer
     with pytest.raises(TypeError, match="keyword"):
         make("auto", validation=True)
+    for seconds in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="frame_seconds: a number above 0 is needed"):
+            _core.Renderer("auto", True, "auto", seconds, _no_cache)
     with pytest.raises(OSError, match="no cache"):
         _core.Renderer("auto", True, "auto", 1.0, _no_cache)
     with pytest.raises(TypeError):

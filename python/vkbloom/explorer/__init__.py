@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vkbloom.explorer.widget import Explorer
-    from vkbloom.renderer import Renderer, Shading
+    from vkbloom.renderer import Renderer
     from vkbloom.scene import Scene
     from vkbloom.settings import Settings
+    from vkbloom.sources import Shading
 
 __all__ = ["explore"]
 

@@ -30,13 +30,14 @@ from vkbloom import _core
 from vkbloom.checks import check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
-from vkbloom.renderer import SHADINGS, Renderer, _check_image, _check_settings
+from vkbloom.renderer import Renderer, _check_settings
+from vkbloom.sources import SHADINGS, check_image
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
-    from vkbloom.renderer import Shading
     from vkbloom.scene import Scene
     from vkbloom.settings import Settings
+    from vkbloom.sources import Shading
 
 __all__ = ["SIDES", "Viewer"]
 
@@ -100,7 +101,7 @@ class Viewer:
         else:
             self._scene = None
             # A copy, since the page may ask for it long after the caller has changed it.
-            self._image = np.array(_check_image(source), order="C")
+            self._image = np.array(check_image(source), order="C")
             self._own_size = (source.shape[1], source.shape[0])
             self._reduced = (self._own_size, self._image)
         if renderer is not None and renderer.closed:
@@ -207,10 +208,11 @@ class Viewer:
         """Return one framebuffer, the one of that name or else `final`, and the names of all."""
         if self._scene is None:
             image = self._image_of(size)
-            names = list(self.renderer._survey_apply(image, settings))
+            names = list(self.renderer.plan(image, settings).outputs)
             chosen = str(name) if name in names else "final"
             return self.renderer.apply(image, settings, attachments=[chosen]), names
-        names = list(self.renderer._survey_render(self._scene, settings, size, self._shading))
+        plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
+        names = list(plan.outputs)
         chosen = str(name) if name in names else "final"
         frames = self.renderer.render(
             self._scene,

@@ -12,25 +12,25 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vkbloom import _core
 from vkbloom.checks import check_size, check_time
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
 from vkbloom.settings import Settings
+from vkbloom.sources import SHADINGS, check_image, image_source, scene_source
 
 if TYPE_CHECKING:
-    from vkbloom.renderer import Renderer, Shading
+    from numpy.typing import NDArray
+
+    from vkbloom.plans import Plan
+    from vkbloom.renderer import Renderer
     from vkbloom.scene import Scene
+    from vkbloom.sources import Shading
 
 __all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
 
-#: Name to shape and dtype.
-Framebuffers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
-
 _SCENE_SIZE = (1280, 720)
-# Pixels of a side; enough for every pass to have a target.
-_SMALL = 24
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,6 @@ class ImageSource:
     """One image or several of one shape."""
 
     has_time = False
-    shading = "image"
     #: Of points where no axis gives another.
     place = 0.0
 
@@ -98,24 +97,13 @@ class ImageSource:
         """Yield the frames of some settings on one image."""
         return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
 
-    def survey(self, renderer: Renderer, settings: Settings, place: float) -> Framebuffers:
-        """Tell the shapes and dtypes of all framebuffers, without rendering."""
-        return renderer._survey_apply(self.images[int(place)], settings)
+    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+        """Tell what would be made of an image, without rendering."""
+        return renderer.plan(self.images[int(place)], settings)
 
-    def small(self) -> ImageSource:
-        """Return the images with few pixels."""
-        height, width = self.images[0].shape[:2]
-        rows, columns = -(-height // _SMALL), -(-width // _SMALL)
-        thinned = [np.ascontiguousarray(image[::rows, ::columns]) for image in self.images[:2]]
-        # Two images must differ for a change of the image to be one.
-        thinned[-1] = thinned[-1].copy()
-        thinned[-1][0, 0, 0] = 0 if len(thinned) == 1 or thinned[0][0, 0, 0] != 0 else 1
-        return ImageSource((thinned * len(self.images))[: len(self.images)], self.labels)
-
-    def size_at(self, place: float) -> tuple[int, int]:
-        """Return (width, height) of an image."""
-        height, width = self.images[int(place)].shape[:2]
-        return width, height
+    def for_core(self, place: float) -> _core.Source:
+        """Return an image as the core takes it."""
+        return image_source(self.images[int(place)])
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
@@ -160,17 +148,13 @@ class SceneSource:
             attachments=attachments,
         )
 
-    def survey(self, renderer: Renderer, settings: Settings, place: float) -> Framebuffers:
-        """Tell the shapes and dtypes of all framebuffers, without rendering."""
-        return renderer._survey_render(self.scene, settings, self.size, self.shading)
+    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+        """Tell what would be made of the scene, without rendering."""
+        return renderer.plan(self.scene, settings, self.size, shading=self.shading)
 
-    def small(self) -> SceneSource:
-        """Return the scene in few pixels."""
-        return SceneSource(self.scene, (_SMALL, _SMALL), self.shading, self.place)
-
-    def size_at(self, place: float) -> tuple[int, int]:
-        """Return (width, height) of the frame."""
-        return self.size
+    def for_core(self, place: float) -> _core.Source:
+        """Return the scene at a time as the core takes it."""
+        return scene_source(self.scene, self.size, self.shading, place)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
@@ -210,7 +194,6 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     TypeError, ValueError
         The source is none of these, or an argument does not belong to it.
     """
-    from vkbloom.renderer import SHADINGS, _check_image  # noqa: PLC0415  it imports the grids
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     if isinstance(source, Scene):
@@ -226,7 +209,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         if is_given:
             raise ValueError(f"{name}: only scenes have one, an image is given")
     if isinstance(source, np.ndarray):
-        return ImageSource([_check_image(source)])
+        return ImageSource([check_image(source)])
     labels: list[Any]
     if isinstance(source, Mapping):
         images, labels = list(source.values()), [str(label) for label in source]
@@ -238,7 +221,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         )
     if not images:
         raise ValueError("source: the list of images is empty")
-    return ImageSource([_check_image(image) for image in images], tuple(labels))
+    return ImageSource([check_image(image) for image in images], tuple(labels))
 
 
 def digest(value: object) -> str:
