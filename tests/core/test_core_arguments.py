@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.planned import scene_plan, scene_source
 from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom.sources import scene_arguments
 
@@ -145,7 +146,7 @@ BEYOND_32_BITS = [2**32, 2**32 + 16, 2**64 + 16, 2**128, -1, -(2**32) + 16]
 
 @pytest.mark.parametrize("side", BEYOND_32_BITS)
 def test_sizes_are_not_taken_modulo_2_to_the_32(
-    renderer: Renderer, scene: Scene, side: int
+    scene: Scene, side: int
 ) -> None:
     """Once 2**32 + 16 was a side of 16."""
     arrays, camera, _, *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
@@ -169,7 +170,7 @@ def test_sides_that_are_no_whole_numbers() -> None:
 
 
 @pytest.mark.parametrize("serial", [0, -1, 2**64, 2**64 + 1])
-def test_serials_have_64_bits(renderer: Renderer, scene: Scene, serial: int) -> None:
+def test_serials_have_64_bits(scene: Scene, serial: int) -> None:
     (_, *others), *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     with pytest.raises((ValueError, OverflowError)):
         _core.scene_source((serial, *others), *rest)
@@ -194,7 +195,7 @@ def test_shadings_and_sizes() -> None:
     ],
     ids=str,
 )
-def test_images(renderer: Renderer, array: Any) -> None:
+def test_images(array: Any) -> None:
     with pytest.raises((TypeError, ValueError)):
         _core.image_source(array)
 
@@ -346,7 +347,7 @@ def test_a_submission_is_waited_for_by_one_thread(renderer: Renderer) -> None:
         assert sorted(counts) == [0, 0, 1]
 
 
-def test_scenes(renderer: Renderer, scene: Scene) -> None:
+def test_scenes(scene: Scene) -> None:
     arrays, *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     serial, body, glow, sky, textures = arrays
     wrong = [
@@ -370,7 +371,7 @@ def test_scenes(renderer: Renderer, scene: Scene) -> None:
             _core.scene_source(given, *rest)
 
 
-def test_more_indices_than_32_bits_count(renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
+def test_more_indices_than_32_bits_count(scene: Scene, tmp_path: Path) -> None:
     arrays, *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     serial, body, glow, sky, textures = arrays
     # A file of a hole takes no room. In 32 bits there would be three indices.
