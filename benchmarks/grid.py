@@ -108,7 +108,9 @@ def points() -> None:
         with vkbloom.Renderer(ADAPTER) as renderer:
             spots = random.Random(1).sample(list(np.ndindex(*made["done"].shape)), 50)
             for spot in spots:
-                chosen = {n: float(v[i]) for (n, v), i in zip(values.items(), spot, strict=True)}
+                chosen: dict[str, Any] = {
+                    n: float(v[i]) for (n, v), i in zip(values.items(), spot, strict=True)
+                }
                 alone = renderer.apply(image, vkbloom.Separable(**chosen), attachments="final")
                 assert np.array_equal(made["final"][spot].values, alone["final"]), spot
             print(f"  {len(spots)} points equal to single renders")
@@ -124,7 +126,7 @@ def points() -> None:
 def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) -> None:
     """Single calls: nested loops in the order of the axes, and with every pass of every point."""
     names = list(values)
-    every = [dict(zip(names, map(float, point), strict=True))
+    every: list[dict[str, Any]] = [dict(zip(names, map(float, point), strict=True))
              for point in itertools.product(*values.values())]  # fmt: skip
     with vkbloom.Renderer(ADAPTER) as renderer:
         start = time.perf_counter()
@@ -187,10 +189,10 @@ def tiny() -> None:
     }
     with (
         folder() as path,
-        distributed.LocalCluster(
+        distributed.LocalCluster(  # type: ignore[no-untyped-call]
             n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", protocol="tcp"
         ) as cluster,
-        distributed.Client(cluster) as client,
+        distributed.Client(cluster) as client,  # type: ignore[no-untyped-call]
     ):
         most, tasks, workers = [0], [0], list(client.run(os.getpid).values())
         before = set(client.run_on_scheduler(lambda dask_scheduler: set(dask_scheduler.tasks)))
@@ -241,10 +243,10 @@ def workers() -> None:
         for count in (1, 2):
             with (
                 folder() as path,
-                distributed.LocalCluster(
+                distributed.LocalCluster(  # type: ignore[no-untyped-call]
                     n_workers=count, threads_per_worker=1, dashboard_address="127.0.0.1:0"
                 ) as cluster,
-                distributed.Client(cluster) as client,
+                distributed.Client(cluster) as client,  # type: ignore[no-untyped-call]
             ):
                 warm = {name: value[:2] for name, value in values.items()}
                 vkbloom.grid_to_zarr(image, None, warm, path / "w.zarr", client=client,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,3 +29,25 @@ def scene_plan(
     """Return the plan of all framebuffers of a frame, each pass as its method has it."""
     source = scene_source(size, has_sky=has_sky, shading=shading)
     return _core.plan(source, settings, None, "fragment")
+
+
+class Row(NamedTuple):
+    """A pass as the core describes it."""
+
+    name: str
+    shader: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    variant: str
+    render_pass: int
+
+
+def rows(plan: _core.Plan) -> list[Row]:
+    """Return the passes of a plan."""
+    return [Row(*row) for row in plan.passes]
+
+
+def dependencies(plan: _core.Plan, name: str) -> list[tuple[int, ...]]:
+    """Return those of the render pass that is timed under that name."""
+    (number,) = {row.render_pass for row in rows(plan) if row.name == name}
+    return list(plan.dependencies[number])

@@ -1,6 +1,6 @@
 """Hold other people's blurs and blooms, and our own, against the laws of `vkbloom.testing`.
 
-``python tools/laws.py`` writes docs/laws.md. It needs the packages of benchmarks/peers.txt and a
+``python -m tools.laws`` writes docs/laws.md. It needs the packages of benchmarks/peers.txt and a
 Vulkan driver, as pygfx's bloom runs through wgpu.
 """
 
@@ -118,7 +118,7 @@ def skimage() -> Iterator[Subject]:
 
 def pygfx(adapter: str) -> Iterator[Subject]:
     """Yield pygfx's bloom alone, and the picture with it as it is by default."""
-    from vkbloom.bench.peers.pygfx import Bloom as Peer
+    from benchmarks.peers.pygfx import Bloom as Peer
 
     name = f"pygfx {version('pygfx')} `PhysicalBasedBloomPass`"
     levels = 4

@@ -10,6 +10,7 @@
 #include "methods/source.h"
 #include "run/frame.h"
 #include "variants/forms.h"
+#include "vulkan/process.h"
 
 #include <stdatomic.h>
 
@@ -51,11 +52,13 @@ struct vkb_renderer {
     unsigned long holder;     // the thread that holds it, 0: none; read and written with the GIL
     PyThreadState *thread;    // that thread's, while it has given the GIL back
     struct vkb_pending *abandoned;  // touched with the GIL
-    long process;             // that opened it: the device is no other's, not even a forked one's
-    atomic_bool open;         // changed with the lock, looked at without
-    uint64_t serial;          // by which plans know it; never 0
-    struct vkb_pages *pages;  // of large arrays; NULL: closed
-    size_t pipeline_count;    // made so far; read and written with the GIL
+    long process;      // that opened it: the device is no other's, not even a forked one's
+    atomic_bool open;  // changed with the lock, looked at without
+    const struct vkb_messages *before;  // whose the messages are when the holder leaves
+    uint64_t serial;                    // by which plans know it; never 0
+    struct vkb_pages *pages;            // of large arrays; NULL: closed
+    size_t pipeline_count;              // made so far; read and written with the GIL
+    struct vkb_cached cached;           // read and written with the GIL
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -80,9 +83,6 @@ bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struc
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Takes over what nobody waits for any more. With the GIL.
 void vkb_renderer_abandon(struct vkb_renderer *renderer, struct vkb_pending *pending);
-
-// Whose the device is: this process's number, whatever it was forked from.
-long vkb_current_process(void);
 
 // With the GIL; the device must be done with it.
 void vkb_pending_release(struct vkb_pending *pending);
@@ -172,6 +172,7 @@ PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);
 PyObject *vkb_fault_state(PyObject *module, PyObject *unused);
+PyObject *vkb_fault_forget(PyObject *module, PyObject *unused);
 #endif
 
 #endif

@@ -173,19 +173,21 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     const struct vkb_module_state *state = vkb_module_state(module);
     PyObject *source, *settings_object, *names;
     struct vkb_settings settings;
+    struct vkb_device device = any_device;
+    struct vkb_error error = {0};
+    enum vkb_forms forms;
     const char *variants;
 
     if (!PyArg_ParseTuple(arguments, "O!OOs:plan", state->source_type, &source, &settings_object,
                           &names, &variants)
         || !vkb_read_settings(state, settings_object, &settings))
         return NULL;
-    const enum vkb_forms forms = vkb_forms_by_name(variants, &any_device);
-    if (forms == VKB_FORMS_COUNT) {
-        PyErr_Format(PyExc_ValueError, "variants: %s is not one of auto, fragment, cpu, gpu",
-                     variants);
-        return NULL;
-    }
-    return new_plan(state, &any_device, forms, 0, source, &settings, names);
+    if (!vkb_forms_by_name(variants, &device, &forms, &error))
+        return vkb_raise(state, &error);
+    // What the variant is for.
+    device.adapter.device_type =
+        forms == VKB_FORMS_CPU ? VK_PHYSICAL_DEVICE_TYPE_CPU : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    return new_plan(state, &device, forms, 0, source, &settings, names);
 }
 
 static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)

@@ -15,11 +15,6 @@ static void destroy_flight(const struct vkb_device *device, struct vkb_flight *f
 void vkb_flights_destroy(const struct vkb_device *device, struct vkb_flights *flights)
 {
     for (size_t i = 0; i < flights->count; ++i)
-        if (flights->flights[i]->airborne) {
-            device->vk.vkDeviceWaitIdle(device->handle);
-            break;
-        }
-    for (size_t i = 0; i < flights->count; ++i)
         destroy_flight(device, flights->flights[i]);
     vkb_free(flights->flights);
     *flights = (struct vkb_flights){0};
@@ -88,6 +83,16 @@ bool vkb_flight_submit(struct vkb_device *device, struct vkb_flight *flight,
     return flight->airborne;
 }
 
+uint64_t vkb_flights_pending(const struct vkb_flights *flights, uint64_t now)
+{
+    uint64_t first = now;
+
+    for (size_t i = 0; i < flights->count; ++i)
+        if (flights->flights[i]->airborne && flights->flights[i]->number < first)
+            first = flights->flights[i]->number;
+    return first;
+}
+
 bool vkb_flight_over(const struct vkb_device *device, const struct vkb_flight *flight)
 {
     return !flight->airborne || vkb_commands_over(device, &flight->commands);
@@ -120,5 +125,23 @@ bool vkb_flights_land(struct vkb_device *device, struct vkb_flights *flights,
     for (size_t i = 0; i < flights->count; ++i)
         if (!vkb_flight_wait(device, flights, flights->flights[i], error))
             return false;
+    return true;
+}
+
+bool vkb_flights_end(struct vkb_device *device, struct vkb_flights *flights,
+                     struct vkb_error *error)
+{
+    for (size_t i = 0; i < flights->count; ++i) {
+        struct vkb_flight *flight = flights->flights[i];
+        if (vkb_flight_wait(device, flights, flight, error))
+            continue;
+        if (error->kind == VKB_ERROR_INTERRUPTED || error->result == VK_TIMEOUT)
+            return false;
+        // A wait for which there was no memory tells nothing; one that says twice that the device
+        // is lost does, and what is on a lost device can be destroyed.
+        if (!vkb_flight_wait(device, flights, flight, error)
+            && error->result != VK_ERROR_DEVICE_LOST)
+            return false;
+    }
     return true;
 }

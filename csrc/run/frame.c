@@ -243,6 +243,29 @@ static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb
     return true;
 }
 
+// Begins a submission: what no submission has used for long, and none may still use, goes.
+static void trim(const struct vkb_device *device, struct vkb_frame *frame,
+                 struct vkb_flight *flight)
+{
+    flight->number = ++frame->submissions;
+    const struct vkb_age age = {
+        .now = flight->number,
+        .pending = vkb_flights_pending(&frame->flights, flight->number),
+    };
+
+    vkb_pipelines_trim(device, &frame->pipelines, &age);
+    vkb_slots_trim(device, &frame->slots, &age);
+}
+
+struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
+{
+    return (struct vkb_cached){
+        .pipelines = frame->pipelines.entry_count,
+        .framebuffers = frame->slots.framebuffer_count,
+        .image_bytes = vkb_slots_size(&frame->slots),
+    };
+}
+
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
                       const struct vkb_frame_source *source, struct vkb_request *requests,
                       uint32_t request_count, struct vkb_flight **flight, struct vkb_error *error)
@@ -255,6 +278,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     if (!renew(device, frame, error)
         || !vkb_flights_take(device, &frame->flights, &run.flight, error))
         return false;
+    trim(device, frame, run.flight);
     done = (run.slots = vkb_alloc(error, image_count, sizeof *run.slots))
         && (run.contents = vkb_alloc(error, image_count, sizeof *run.contents))
         && submit(&run, source, requests, request_count, error);
@@ -329,7 +353,7 @@ bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct v
     return true;
 }
 
-bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
+bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
 {
-    return vkb_flights_land(device, &frame->flights, error);
+    return vkb_flights_end(device, &frame->flights, error);
 }

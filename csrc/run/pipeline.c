@@ -41,6 +41,7 @@ _Static_assert(sizeof(struct pipeline_key)
 struct vkb_pipeline_entry {
     struct pipeline_key key;
     VkPipeline handle;
+    uint64_t used;  // by which submission last
 };
 
 static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
@@ -179,6 +180,25 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
     vkb_free(pipelines->entries);
     vkb_free(pipelines->render_passes);
     *pipelines = (struct vkb_pipelines){0};
+}
+
+void vkb_pipelines_trim(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                        const struct vkb_age *age)
+{
+    const size_t left = pipelines->entry_count > VKB_KEPT_PIPELINES ? VKB_KEPT_PIPELINES / 2
+                                                                    : pipelines->entry_count;
+
+    pipelines->now = age->now;
+    while (pipelines->entry_count > left) {
+        struct vkb_pipeline_entry *oldest = &pipelines->entries[0];
+        for (size_t i = 1; i < pipelines->entry_count; ++i)
+            if (pipelines->entries[i].used < oldest->used)
+                oldest = &pipelines->entries[i];
+        if (!vkb_is_old(oldest->used, age))
+            return;
+        device->vk.vkDestroyPipeline(device->handle, oldest->handle, NULL);
+        *oldest = pipelines->entries[--pipelines->entry_count];
+    }
 }
 
 bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
@@ -511,6 +531,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     for (size_t i = 0; i < pipelines->entry_count; ++i)
         if (memcmp(&pipelines->entries[i].key, &key, sizeof key) == 0) {
             *pipeline = pipelines->entries[i].handle;
+            pipelines->entries[i].used = pipelines->now;
             return true;
         }
     if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
@@ -520,6 +541,8 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];
     memcpy(&entry->key, &key, sizeof key);
     entry->handle = *pipeline;
+    entry->used = pipelines->now;
+    ++pipelines->created;
     return true;
 }
 

@@ -1,9 +1,11 @@
 // From a pass row to Vulkan's objects: shader modules, layouts, render pass, pipeline. Each is made
-// once for its key and kept until the device goes.
+// once for its key. Pipelines that are old are destroyed where there are many; of the others there
+// are a few at the most.
 #ifndef VKB_PIPELINE_H
 #define VKB_PIPELINE_H
 
 #include "graph/graph.h"
+#include "run/age.h"
 
 struct vkb_render_pass_entry;
 struct vkb_pipeline_entry;
@@ -28,6 +30,8 @@ struct vkb_pipelines {
     struct vkb_pipeline_entry *entries;
     size_t render_pass_count, render_pass_capacity;
     size_t entry_count, entry_capacity;
+    size_t created;  // pipelines, so far
+    uint64_t now;    // the number of the submission that uses them
 };
 
 // `cache_data` may be NULL; what the driver does not know it ignores.
@@ -39,6 +43,12 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
 // What the driver wants kept for the next time; the caller frees *data with vkb_free.
 bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
                         void **data, size_t *size, struct vkb_error *error);
+
+// Begins a submission. Where there are more than VKB_KEPT_PIPELINES, the old ones are destroyed,
+// the oldest first, until half of that is left.
+enum { VKB_KEPT_PIPELINES = 256 };
+void vkb_pipelines_trim(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                        const struct vkb_age *age);
 
 // The render pass of the passes first..end-1, with the dependencies that follow from their rows.
 bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipelines *pipelines,

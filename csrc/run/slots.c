@@ -43,7 +43,50 @@ void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots)
     vkb_free(slots->slots);
     vkb_free(slots->framebuffers);
     // The clock goes on: nothing made later may be taken for something made before.
-    *slots = (struct vkb_slots){.clock = slots->clock};
+    *slots = (struct vkb_slots){.clock = slots->clock, .now = slots->now};
+}
+
+// The image goes, the slot stays: of names there are a few.
+static void destroy_image(const struct vkb_device *device, struct vkb_slots *slots,
+                          struct vkb_slot *slot)
+{
+    slot->content.valid = false;
+    destroy_framebuffers(device, slots, slot->image_id);
+    vkb_image_destroy(device, &slot->image);
+}
+
+static uint64_t image_size(const struct vkb_image *image)
+{
+    return image->handle ? (uint64_t)image->width * image->height * vkb_pixel_size(image->format)
+                         : 0;
+}
+
+uint64_t vkb_slots_size(const struct vkb_slots *slots)
+{
+    uint64_t size = 0;
+
+    for (size_t i = 0; i < slots->count; ++i)
+        size += image_size(&slots->slots[i]->image);
+    return size;
+}
+
+void vkb_slots_trim(const struct vkb_device *device, struct vkb_slots *slots,
+                    const struct vkb_age *age)
+{
+    uint64_t size = vkb_slots_size(slots);
+    const uint64_t left = size > VKB_KEPT_IMAGE_BYTES ? VKB_KEPT_IMAGE_BYTES / 2 : size;
+
+    slots->now = age->now;
+    while (size > left) {
+        struct vkb_slot *oldest = NULL;
+        for (size_t i = 0; i < slots->count; ++i)
+            if (slots->slots[i]->image.handle && (!oldest || slots->slots[i]->used < oldest->used))
+                oldest = slots->slots[i];
+        if (!oldest || !vkb_is_old(oldest->used, age))
+            return;
+        size -= image_size(&oldest->image);
+        destroy_image(device, slots, oldest);
+    }
 }
 
 static VkImageUsageFlags image_usage(enum vkb_format format)
@@ -148,12 +191,11 @@ bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
     if (!slot && !(slot = add_slot(slots, row->name, error)))
         return false;
     *resolved = slot;
+    slot->used = slots->now;
     if (fits(&slot->image, row))
         return true;
-    slot->content.valid = false;
-    destroy_framebuffers(device, slots, slot->image_id);
+    destroy_image(device, slots, slot);
     slot->image_id = ++slots->clock;
-    vkb_image_destroy(device, &slot->image);
     return vkb_image_create(device,
                             &(struct vkb_image_spec){
                                 .format = row->format,

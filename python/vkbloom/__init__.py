@@ -9,7 +9,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from vkbloom import reference
 from vkbloom._core import (
     AdapterNotFoundError,
     DeviceLostError,
@@ -25,22 +24,31 @@ from vkbloom.plans import Pass, Plan
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
-from vkbloom.scene import Camera, Scene
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
+from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
+    from vkbloom import reference
     from vkbloom.grid import reductions
     from vkbloom.grid.checking import GridReport, check_grid
     from vkbloom.grid.curves import response_curves
     from vkbloom.grid.sheet import contact_sheet
     from vkbloom.grid.zarr_grid import grid_to_zarr
+    from vkbloom.scene import Camera, Scene
 
 #: Of the installed package; looked up when it is asked for.
 __version__: str
 
-# Imported when they are asked for: who renders one frame shall not wait for grids.
+# Imported at the first use, because a program that gives images bloom needs none of them.
+_LATE_MODULES = {
+    "reductions": "vkbloom.grid.reductions",
+    "reference": "vkbloom.reference",
+    "scene": "vkbloom.scene",
+}
 _LATE = {
+    "Camera": "vkbloom.scene",
     "GridReport": "vkbloom.grid.checking",
+    "Scene": "vkbloom.scene",
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
@@ -88,13 +96,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        # A sixth of the time of the import is spared whoever does not ask.
-        from importlib.metadata import version  # noqa: PLC0415
-
-        globals()[name] = version("vkbloom")
-        return globals()[name]
-    if name == "reductions":
-        return import_module("vkbloom.grid.reductions")
+        return installed_version()
+    if name in _LATE_MODULES:
+        return import_module(_LATE_MODULES[name])
     if name in _LATE:
         return getattr(import_module(_LATE[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

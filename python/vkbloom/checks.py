@@ -8,16 +8,19 @@ from __future__ import annotations
 import importlib
 import math
 import operator
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 __all__ = [
     "FLT_MAX",
     "as_float",
+    "check_attachments",
     "check_floats",
+    "check_image",
     "check_index",
     "check_number",
     "check_size",
@@ -27,6 +30,9 @@ __all__ = [
 
 #: The largest float of 32 bits, which is what the device computes with.
 FLT_MAX = (2 - 2**-23) * 2.0**127
+
+# Fast path for native byte order.
+_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 
 
 def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
@@ -128,3 +134,36 @@ def check_index(field: str, value: int, low: int, high: int) -> int:
     if not low <= index <= high:
         raise ValueError(f"{field}: {index} is outside {low} to {high}")
     return index
+
+
+def check_image(image: object) -> NDArray[Any]:
+    """Return the image, in this machine's byte order, if the core can take it."""
+    if not isinstance(image, np.ndarray):
+        raise TypeError(f"image: an array is needed, not {type(image).__name__}")
+    if type(image) is not np.ndarray and np.ma.is_masked(image):
+        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
+    if image.dtype not in _DTYPES:
+        if image.dtype.name not in ("uint8", "float16", "float32"):
+            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
+        image = image.astype(image.dtype.newbyteorder("="), copy=False)
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
+        raise ValueError(
+            f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+        )
+    return image
+
+
+def check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
+    """Return the wanted names, None for all."""
+    if attachments == "all":
+        return None
+    if isinstance(attachments, str):
+        return (attachments,)
+    try:
+        names = tuple(attachments)
+    except TypeError:
+        raise TypeError(f"attachments: names are needed, not {attachments!r}") from None
+    for name in names:
+        if not isinstance(name, str):
+            raise TypeError(f"attachments: names are needed, not {name!r}")
+    return names

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
-from vkbloom.io import files
-from vkbloom.views import pictures
-from vkbloom.views.dimensions import dimensions
+from vkbloom.framebuffers import dimensions
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray
 
     from vkbloom.settings import Settings
@@ -131,6 +129,8 @@ class Frames(Mapping[str, NDArray[Any]]):
         ModuleNotFoundError
             If xarray is missing: ``pip install vkbloom[grid]``.
         """
+        import json  # noqa: PLC0415  costs start-up time
+
         xr = import_extra("xarray", "grid", "Frames.to_xarray")
         dims = dimensions(self)
         channels = {
@@ -197,14 +197,20 @@ class Frames(Mapping[str, NDArray[Any]]):
         ModuleNotFoundError
             If OpenImageIO is missing: ``pip install vkbloom[images]``.
         """
+        from vkbloom.io import files  # noqa: PLC0415  costs start-up time
+
         return files.save(self, path)
 
     def _repr_png_(self) -> bytes | None:
         """Return the picture of `pictures.leading_png`; None without framebuffers."""
+        from vkbloom.views import pictures  # noqa: PLC0415  costs start-up time
+
         return pictures.leading_png(self) if self else None
 
     def _repr_html_(self) -> str:
         """Return the page of `pictures.contact_sheet_html`."""
+        from vkbloom.views import pictures  # noqa: PLC0415  costs start-up time
+
         return pictures.contact_sheet_html(self)
 
 

@@ -13,7 +13,7 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom.checks import check_number
-from vkbloom.settings import BloomFormat, Composite, Settings, _flag, _number
+from vkbloom.settings import BloomFormat, Composite, Settings, flag_field, number_field
 
 __all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UnrealBloom", "UrpBloom"]
 
@@ -86,12 +86,12 @@ class BevyBloom(Settings):
     method: ClassVar[str] = "bevy"
 
     composite: Composite = "mix"
-    intensity: float = _number("intensity", default=0.15)
+    intensity: float = number_field("intensity", default=0.15)
     format: BloomFormat | None = "rgba16float"
-    low_frequency_boost: float = _number("low_frequency_boost")
-    low_frequency_boost_curvature: float = _number("low_frequency_boost_curvature")
-    high_pass_frequency: float = _number("high_pass_frequency")
-    max_mip_dimension: int = _number("max_mip_dimension", unit="pixel")
+    low_frequency_boost: float = number_field("low_frequency_boost")
+    low_frequency_boost_curvature: float = number_field("low_frequency_boost_curvature")
+    high_pass_frequency: float = number_field("high_pass_frequency")
+    max_mip_dimension: int = number_field("max_mip_dimension", unit="pixel")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -134,11 +134,11 @@ class KinoBloom(Settings):
     method: ClassVar[str] = "kino"
 
     threshold: float | None = _linear(0.8)
-    knee: float = _number("knee", default=0.5)
-    intensity: float = _number("intensity", default=0.8)
+    knee: float = number_field("knee", default=0.5)
+    intensity: float = number_field("intensity", default=0.8)
     format: BloomFormat | None = "rgba16float"
-    radius: float = _number("radius", default=2.5)
-    anti_flicker: bool = _flag("anti_flicker")
+    radius: float = number_field("radius", default=2.5)
+    anti_flicker: bool = flag_field("anti_flicker")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -187,11 +187,11 @@ class FilamentBloom(Settings):
     method: ClassVar[str] = "filament"
 
     threshold: float | None = 1.0
-    intensity: float = _number("intensity", default=0.1)
+    intensity: float = number_field("intensity", default=0.1)
     format: BloomFormat | None = "rgba16float"
-    levels: int = _number("levels")
-    resolution: int = _number("resolution", unit="pixel")
-    highlight: float = _number("highlight")
+    levels: int = number_field("levels")
+    resolution: int = number_field("resolution", unit="pixel")
+    highlight: float = number_field("highlight")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -242,11 +242,11 @@ class UrpBloom(Settings):
     method: ClassVar[str] = "urp"
 
     threshold: float | None = _linear(0.9)
-    knee: float = _number("knee", default=0.5)
+    knee: float = number_field("knee", default=0.5)
     format: BloomFormat | None = "rgba16float"
-    scatter: float = _number("scatter")
-    iterations: int = _number("iterations")
-    clamp_max: float = _number("clamp_max")
+    scatter: float = number_field("scatter")
+    iterations: int = number_field("iterations")
+    clamp_max: float = number_field("clamp_max")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -292,10 +292,10 @@ class HdrpBloom(Settings):
     method: ClassVar[str] = "hdrp"
 
     composite: Composite = "mix"
-    intensity: float = _number("intensity", default=2**0.2 - 1)
+    intensity: float = number_field("intensity", default=2**0.2 - 1)
     format: BloomFormat | None = "rgba16float"
-    scatter: float = _number("scatter")
-    high_quality_filtering: bool = _flag("high_quality_filtering")
+    scatter: float = number_field("scatter")
+    high_quality_filtering: bool = flag_field("high_quality_filtering")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -346,10 +346,10 @@ class UnrealBloom(Settings):
     method: ClassVar[str] = "unreal"
 
     threshold: float | None = 0.0
-    intensity: float = _number("intensity", default=3.0)
+    intensity: float = number_field("intensity", default=3.0)
     format: BloomFormat | None = "rgba16float"
-    radius: float = _number("radius", default=0.0)
-    smooth_width: float = _number("smooth_width")
+    radius: float = number_field("radius", default=0.0)
+    smooth_width: float = number_field("smooth_width")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -6,19 +6,18 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
-from vkbloom.checks import check_size
+from vkbloom.checks import check_attachments, check_image, check_size
 from vkbloom.frames import Frames
-from vkbloom.io import pipeline_cache
 from vkbloom.plans import Pass, Plan, framebuffers
-from vkbloom.settings import Separable, Settings
-from vkbloom.sources import check_image, image_source, scene_source
+from vkbloom.settings import Settings, Shading, check_settings
+from vkbloom.sources import image_source, scene_source
+from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -28,15 +27,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vkbloom.scene import Scene
-    from vkbloom.sources import Shading
 
 _SCENE_SIZE = (1280, 720)
-
-
-def _version() -> str:
-    from vkbloom import __version__  # noqa: PLC0415  the package imports this module
-
-    return __version__
 
 
 def _frame_seconds() -> float:
@@ -49,30 +41,6 @@ def _frame_seconds() -> float:
     if not seconds > 0:
         raise ValueError(f"VKBLOOM_TIMEOUT: {text!r} is not a number of seconds above 0")
     return seconds
-
-
-def _check_settings(settings: Settings | None) -> Settings:
-    if settings is None:
-        return Separable()
-    if not isinstance(settings, Settings):
-        raise TypeError(f"settings: Settings are needed, not {settings!r}")
-    return settings
-
-
-def _check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
-    """Return the wanted names, None for all."""
-    if attachments == "all":
-        return None
-    if isinstance(attachments, str):
-        return (attachments,)
-    try:
-        names = tuple(attachments)
-    except TypeError:
-        raise TypeError(f"attachments: names are needed, not {attachments!r}") from None
-    for name in names:
-        if not isinstance(name, str):
-            raise TypeError(f"attachments: names are needed, not {name!r}")
-    return names
 
 
 def _check_out(array: object, name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
@@ -141,7 +109,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range.
+        `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
+        what the adapter cannot run.
 
     Notes
     -----
@@ -152,37 +121,32 @@ class Renderer:
     be used again; closing waits for what the device is still at work on. A device that takes longer
     than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
     number. After a fork the child opens a renderer of its own, where the driver can; its parent's
-    raise ValueError.
-    """
+    raise ValueError. NVIDIA's driver cannot: start processes by multiprocessing's method "spawn".
 
-    #: The process that opened the last one: any other has been forked from it since.
-    _opened_in: ClassVar[int | None] = None
+    The first renderer, or list of `adapters`, opens the Vulkan loader for the life of the process:
+    drivers that are installed later, and variables such as VK_DRIVER_FILES that are set later, are
+    seen by new processes only.
+    """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
+        if not adapter:
+            raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
-        try:
-            self._core = _core.Renderer(
-                adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
-            )
-        except Error as error:
-            if self._opened_in not in (None, os.getpid()):
-                error.add_note(
-                    "This process was forked from one that had opened a renderer, which some "
-                    "drivers (NVIDIA's among them) refuse to work after; start it by "
-                    'multiprocessing\'s method "spawn" or "forkserver".'
-                )
-            raise
-        Renderer._opened_in = os.getpid()
+        from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
+        self._core = _core.Renderer(
+            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+        )
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._made_by = {
             "adapter": self.info.name,
             "driver": self.info.driver_info or self.info.driver,
-            "version": _version(),
+            "version": installed_version(),
         }
         self._saved_pipelines = 0
 
@@ -222,7 +186,7 @@ class Renderer:
         # Late: notebooks need it, and nothing else.
         from vkbloom.views import display  # noqa: PLC0415
 
-        return display.renderer_html(self)
+        return display.renderer_html(self.info, closed=self.closed)
 
     def render(
         self,
@@ -288,9 +252,9 @@ class Renderer:
         A pass runs only when what it reads, its settings or its size changed since it last ran;
         ``timings`` of the result names the passes that ran.
         """
-        settings = _check_settings(settings)
+        settings = check_settings(settings)
         source = scene_source(scene, size, shading, time)
-        return self._run_one(source, settings, _check_attachments(attachments), out)
+        return self._run_one(source, settings, check_attachments(attachments), out)
 
     def apply(
         self,
@@ -337,9 +301,9 @@ class Renderer:
         The same image again, to the byte, is not sent to the device again, and passes run only
         when what they read or their settings changed.
         """
-        settings = _check_settings(settings)
+        settings = check_settings(settings)
         source = image_source(image)
-        return self._run_one(source, settings, _check_attachments(attachments), out)
+        return self._run_one(source, settings, check_attachments(attachments), out)
 
     def apply_many(
         self,
@@ -370,7 +334,7 @@ class Renderer:
         settings are taken from their iterable before the frames that come before theirs.
         What a wrong one of them raises is raised in its turn, after the frames before it.
         """
-        names = _check_attachments(attachments)
+        names = check_attachments(attachments)
         return self._run_many(image_source(image), settings_seq, names)
 
     def render_many(
@@ -401,7 +365,7 @@ class Renderer:
         -----
         As for `apply_many`.
         """
-        names = _check_attachments(attachments)
+        names = check_attachments(attachments)
         return self._run_many(scene_source(scene, size, shading, time), settings_seq, names)
 
     def plan(
@@ -461,8 +425,8 @@ class Renderer:
         >>> {name: shape for name, (shape, _) in plan.outputs.items() if name.startswith("down")}
         {'down_0': (128, 128, 4), 'down_1': (64, 64, 4)}
         """
-        settings = _check_settings(settings)
-        names = _check_attachments(attachments)
+        settings = check_settings(settings)
+        names = check_attachments(attachments)
         kind: str = shading
         dtype = channels = None
         if isinstance(source, np.ndarray):
@@ -547,7 +511,7 @@ class Renderer:
         Points are visited in the order that runs the fewest passes, whatever the order of the
         axes. For grids that outgrow memory see `vkbloom.grid_to_zarr`.
         """
-        from vkbloom.grid.memory import in_memory  # noqa: PLC0415  it imports this module
+        from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
         from vkbloom.grid.plan import ask  # noqa: PLC0415
 
         asked = ask(
@@ -582,7 +546,7 @@ class Renderer:
         # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
-        checked = map(_check_settings, settings_seq)
+        checked = map(check_settings, settings_seq)
         results = requests.run(checked, self._core, source, names)
         return (self._frames(settings, result) for settings, result in results)
 
@@ -596,6 +560,8 @@ class Renderer:
         """Keep the driver's pipeline cache on disk when new pipelines came into it."""
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
+            from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
             # Without the cache the next start is slower: no reason to lose a frame that is there.
             # A ValueError: another thread has closed the renderer.
             with contextlib.suppress(_core.Error, ValueError):

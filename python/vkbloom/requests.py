@@ -64,7 +64,8 @@ def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArr
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < LARGE_BYTES:
         return np.empty(shape, dtype)
-    return np.ndarray(shape, dtype, buffer=core.pages(size))
+    # NumPy's types know the standard library's buffers only.
+    return np.ndarray(shape, dtype, buffer=core.pages(size))  # type: ignore[arg-type]
 
 
 def new_arrays(core: _core.Renderer, plan: _core.Plan) -> tuple[NDArray[Any], ...]:

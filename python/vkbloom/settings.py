@@ -9,24 +9,26 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, get_args
 
 from vkbloom import _core
 from vkbloom.checks import as_float, check_floats, check_number, check_size
 
+Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 Encoding = Literal["none", "gamma22", "srgb"]
 Texel = Literal["own", "x"]
 BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float"]
 
+SHADINGS: tuple[Shading, ...] = get_args(Shading)
 BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
 
 #: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
 
 
-def _number(name: str, default: float | None = None, unit: str = "1") -> Any:
+def number_field(name: str, default: float | None = None, unit: str = "1") -> Any:
     """Declare a field that is a number in the core's table, which gives its default and range."""
     initial, _, _ = _core.VALUES[name]
     return dataclasses.field(
@@ -34,12 +36,12 @@ def _number(name: str, default: float | None = None, unit: str = "1") -> Any:
     )
 
 
-def _flag(name: str) -> Any:
+def flag_field(name: str) -> Any:
     """Declare a field that is 0 or 1 in the core's table and a bool in Python."""
     return dataclasses.field(default=bool(_core.VALUES[name][0]))
 
 
-def _choice(name: str) -> Any:
+def choice_field(name: str) -> Any:
     """Declare a field that is one of the core's names; the first is the default."""
     return dataclasses.field(default=_core.CHOICES[name][0])
 
@@ -99,18 +101,18 @@ class Settings:
 
     method: ClassVar[str]
 
-    bloom: bool = _flag("bloom")
+    bloom: bool = flag_field("bloom")
     threshold: float | None = None
-    knee: float = _number("knee")
-    composite: Composite = _choice("composite")
-    intensity: float = _number("intensity")
-    tonemap: ToneMap = _choice("tonemap")
-    exposure: float = _number("exposure", unit="stop")
-    encoding: Encoding = _choice("encoding")
-    dither: bool = _flag("dither")
-    dither_seed: int = _number("dither_seed")
+    knee: float = number_field("knee")
+    composite: Composite = choice_field("composite")
+    intensity: float = number_field("intensity")
+    tonemap: ToneMap = choice_field("tonemap")
+    exposure: float = number_field("exposure", unit="stop")
+    encoding: Encoding = choice_field("encoding")
+    dither: bool = flag_field("dither")
+    dither_seed: int = number_field("dither_seed")
     bloom_size: tuple[int, int] | None = dataclasses.field(default=None, metadata={"unit": "pixel"})
-    bloom_scale: float = _number("bloom_scale")
+    bloom_scale: float = number_field("bloom_scale")
     format: BloomFormat | None = None
 
     def __post_init__(self) -> None:
@@ -182,11 +184,11 @@ class Settings:
         return {"method": self.method, **dataclasses.asdict(self)}
 
     def _repr_html_(self) -> str:
-        """Return the table of `display.settings_html`."""
-        # Late, because pictures of frames are made there, and frames have settings.
+        """Return the table of `display.fields_html`."""
+        # Late: notebooks need it, and nothing else.
         from vkbloom.views import display  # noqa: PLC0415
 
-        return display.settings_html(self)
+        return display.fields_html(self)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -227,14 +229,14 @@ class Separable(Settings):
 
     method: ClassVar[str] = "separable"
 
-    blur_scale: float = _number("blur_scale", unit="texel")
-    blur_strength: float = _number("blur_strength")
+    blur_scale: float = number_field("blur_scale", unit="texel")
+    blur_strength: float = number_field("blur_strength")
     weights: tuple[float, ...] = TUTORIAL
-    loops: int = _number("loops")
+    loops: int = number_field("loops")
     layers: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
-    first_tap: int = _number("first_tap")
-    texel: Texel = _choice("texel")
-    direct: bool = _flag("direct")
+    first_tap: int = number_field("first_tap")
+    texel: Texel = choice_field("texel")
+    direct: bool = flag_field("direct")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -293,9 +295,9 @@ class Pyramid(Settings):
 
     method: ClassVar[str] = "pyramid"
 
-    levels: int = _number("levels")
-    radius: float = _number("radius", unit="texel")
-    firefly_filter: bool = _flag("firefly_filter")
+    levels: int = number_field("levels")
+    radius: float = number_field("radius", unit="texel")
+    firefly_filter: bool = flag_field("firefly_filter")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -321,8 +323,8 @@ class DualKawase(Settings):
 
     method: ClassVar[str] = "dual_kawase"
 
-    levels: int = _number("levels", default=4)
-    offset: float = _number("offset")
+    levels: int = number_field("levels", default=4)
+    offset: float = number_field("offset")
 
 
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
@@ -365,3 +367,12 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     weights = [math.exp(-0.5 * distance * distance) for distance in distances]
     total = weights[0] + 2 * sum(weights[1:])
     return tuple(weight / total for weight in weights)
+
+
+def check_settings(settings: Settings | None) -> Settings:
+    """Return the settings, by default `Separable()`; else raise TypeError."""
+    if settings is None:
+        return Separable()
+    if not isinstance(settings, Settings):
+        raise TypeError(f"settings: Settings are needed, not {settings!r}")
+    return settings

@@ -3,54 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal, get_args
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from vkbloom import _core
-from vkbloom.checks import check_size, check_time
+from vkbloom.checks import check_image, check_size, check_time
+from vkbloom.settings import SHADINGS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from vkbloom.scene import Mesh, Scene
     from vkbloom.scene.textures import Texture
+    from vkbloom.settings import Shading
 
-__all__ = ["SHADINGS", "Shading", "check_image", "image_source", "scene_source"]
-
-Shading = Literal["forward", "deferred"]
-SHADINGS: tuple[Shading, ...] = get_args(Shading)
-
-# Fast path for native byte order.
-_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
-
-
-def check_image(image: object) -> NDArray[Any]:
-    """Return an image, in this machine's byte order, if the core can take it.
-
-    Parameters
-    ----------
-    image : ndarray, shape (H, W, 3) or (H, W, 4)
-        uint8, float16 or float32.
-
-    Raises
-    ------
-    TypeError, ValueError
-        It is something else, or some of it is masked.
-    """
-    if not isinstance(image, np.ndarray):
-        raise TypeError(f"image: an array is needed, not {type(image).__name__}")
-    if type(image) is not np.ndarray and np.ma.is_masked(image):
-        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
-    if image.dtype not in _DTYPES:
-        if image.dtype.name not in ("uint8", "float16", "float32"):
-            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
-        image = image.astype(image.dtype.newbyteorder("="), copy=False)
-    if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
-        raise ValueError(
-            f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
-        )
-    return image
+__all__ = ["image_source", "scene_arguments", "scene_source"]
 
 
 def image_source(image: object) -> _core.Source:
@@ -122,7 +86,7 @@ def _scene_arrays(scene: Scene) -> Any:
         )
         for texture in numbers
     )
-    return scene.serial, body, glow, sky, textures
+    return scene.contents_serial, body, glow, sky, textures
 
 
 def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:

@@ -2,9 +2,9 @@
 
 A small frame, and one whose array is in pages of the renderer's.
 
-CPython's tests can tell its allocators to fail from the n-th request on. A frame is planned, run and
-waited for with one request refused: it raises MemoryError or does without, no block of the core is
-left, and the next frame is exact. Runs over a core built with VKBLOOM_FAULTS.
+CPython's tests can tell its allocators to fail from the n-th request on. A frame is planned, run
+and waited for with one request refused: it raises MemoryError or does without, no block of the core
+is left, and the next frame is exact. Runs over a core built with VKBLOOM_FAULTS.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.core.fault_walk import SIZE, core, open_renderer, picture
+from tests.core.fault_walk import SIZE, core, open_renderer
+from tests.images import picture
 from vkbloom import Renderer, Separable
 from vkbloom.requests import new_arrays, run_one
 
@@ -70,7 +71,7 @@ def walk(image: NDArray[Any]) -> tuple[int, int]:
 
 def main() -> None:
     """Walk both frames, and print the counts of both together."""
-    walks = [walk(picture(SIZE)), walk(picture((512, 300)))]
+    walks = [walk(picture(*SIZE)), walk(picture(512, 300))]
     requests, refused = (sum(counts) for counts in zip(*walks, strict=True))
     print(f"{requests} requests of memory, {refused} raised MemoryError")
 

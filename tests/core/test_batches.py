@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.framebuffers import assert_same
+from tests.images import picture
 from vkbloom import (
     DualKawase,
-    Frames,
     Pyramid,
     Renderer,
     Scene,
@@ -27,17 +28,6 @@ from vkbloom.requests import new_arrays
 from vkbloom.sources import scene_arguments
 
 SIZE = (64, 36)
-
-
-def picture(width: int, height: int, channels: int, seed: int) -> Any:
-    return np.random.default_rng(seed).random((height, width, channels), dtype=np.float32)
-
-
-def assert_same(frames: Frames, expected: Frames) -> None:
-    assert frames.settings == expected.settings
-    assert list(frames) == list(expected)
-    for name in expected:
-        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
 
 
 #: Changes of one pass, of all, of the images' number, sizes and formats; more than one batch.
@@ -64,7 +54,7 @@ SEQUENCE: list[Settings] = [
 def test_images_one_by_one_and_many(
     new_renderer: Callable[[], Renderer], attachments: str | Sequence[str]
 ) -> None:
-    image = picture(40, 30, 3, 1)
+    image = picture(40, 30, 3, seed=1)
     alone, together = new_renderer(), new_renderer()
     sequence = [settings for settings in SEQUENCE if settings.bloom or "bloom" not in attachments]
     expected = [alone.apply(image, s, attachments=attachments) for s in sequence]
@@ -114,7 +104,7 @@ class CountingCore:
 def test_frames_that_fill_a_submission_alone(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, frames: int
 ) -> None:
-    image = picture(33, 21, 4, 2)
+    image = picture(33, 21, 4, seed=2)
     monkeypatch.setattr(requests, "BYTES", frames * image.nbytes)
     monkeypatch.setattr(requests, "SECONDS", 1e6)
     counting: Any = CountingCore(renderer._core)
@@ -130,7 +120,7 @@ def test_frames_that_fill_a_submission_alone(
 def test_a_submission_is_as_long_as_a_wait_may_be(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
 ) -> None:
-    image = picture(33, 21, 4, 2)
+    image = picture(33, 21, 4, seed=2)
     monkeypatch.setattr(requests, "SECONDS", seconds)
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=step / 8) for step in range(100)]
@@ -141,7 +131,7 @@ def test_a_submission_is_as_long_as_a_wait_may_be(
 
 
 def test_arrays_are_the_takers(renderer: Renderer) -> None:
-    image = picture(20, 10, 4, 3)
+    image = picture(20, 10, 4, seed=3)
     frames = list(renderer.apply_many(image, [Separable()] * 10))
     kept = frames[0]["final"].copy()
     for one in frames:
@@ -153,7 +143,7 @@ def test_arrays_are_the_takers(renderer: Renderer) -> None:
 
 
 def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
-    image = picture(20, 10, 4, 4)
+    image = picture(20, 10, 4, seed=4)
     image[3, 4] = (np.nan, np.inf, 0.0, -np.inf)
     frames = list(renderer.apply_many(image, [Separable(), Pyramid(), Separable()]))
     assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
@@ -162,11 +152,11 @@ def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
 def test_settings_that_are_no_sequence(renderer: Renderer) -> None:
     wrong: Any = Separable()
     with pytest.raises(TypeError, match=r"^settings_seq: "):
-        list(renderer.apply_many(picture(4, 4, 3, 5), wrong))
+        list(renderer.apply_many(picture(4, 4, 3, seed=5), wrong))
 
 
 def test_no_settings(renderer: Renderer, scene: Scene) -> None:
-    assert list(renderer.apply_many(picture(4, 4, 3, 5), [])) == []
+    assert list(renderer.apply_many(picture(4, 4, 3, seed=5), [])) == []
     assert list(renderer.render_many(scene, [], SIZE)) == []
 
 
@@ -194,7 +184,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
             taken += 1
             yield Separable(exposure=taken % 7 / 7)
 
-    frames = renderer.apply_many(picture(8, 8, 4, 6), endless(), attachments=("final",))
+    frames = renderer.apply_many(picture(8, 8, 4, seed=6), endless(), attachments=("final",))
     assert taken == 0
     next(frames)
     assert taken == 1
@@ -211,7 +201,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
 
 
 def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> None:
-    image, other = picture(40, 30, 3, 7), picture(25, 50, 4, 8)
+    image, other = picture(40, 30, 3, seed=7), picture(25, 50, 4, seed=8)
     settings = [Separable(blur_strength=strength / 8) for strength in range(24)]
     expected = [renderer.apply(image, s) for s in settings]
     of_other, of_scene = renderer.apply(other), renderer.render(scene, None, SIZE)
@@ -229,7 +219,7 @@ def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> Non
 
 
 def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
-    image = picture(40, 30, 3, 9)
+    image = picture(40, 30, 3, seed=9)
     settings = [Separable(exposure=exposure / 8, loops=1 + exposure % 2) for exposure in range(24)]
     expected = [(renderer.apply(image, s), renderer.render(scene, s, SIZE)) for s in settings]
     both = zip(
@@ -243,7 +233,7 @@ def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
 
 
 def test_threads(renderer: Renderer, scene: Scene) -> None:
-    images = [picture(30, 20, 3, 10), picture(30, 20, 4, 11), picture(17, 40, 4, 12)]
+    images = [picture(30, 20, 3, seed=10), picture(30, 20, 4, seed=11), picture(17, 40, 4, seed=12)]
     settings = [Separable(blur_strength=strength / 8) for strength in range(20)]
     many = [[renderer.apply(image, s) for s in settings] for image in images]
     single = renderer.render(scene, None, SIZE)
@@ -276,7 +266,7 @@ def test_threads(renderer: Renderer, scene: Scene) -> None:
 
 
 def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
-    image = picture(30, 20, 3, 13)
+    image = picture(30, 20, 3, seed=13)
     settings = [Separable(blur_strength=strength / 8) for strength in range(12)]
     expected = [renderer.apply(image, s) for s in settings]
     frames = renderer.apply_many(image, settings)
@@ -291,7 +281,7 @@ def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
 @pytest.mark.parametrize("taken", [0, 1, 2, 5])
 @pytest.mark.parametrize("end", ["close", "forget"])
 def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> None:
-    image = picture(40, 30, 3, 14)
+    image = picture(40, 30, 3, seed=14)
     right = renderer.apply(image)
     for _ in range(3):
         frames = renderer.apply_many(image, SEQUENCE)
@@ -306,7 +296,7 @@ def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> N
 
 def test_a_sequence_forgotten_with_its_renderer() -> None:
     renderer = Renderer(validation=True)
-    frames = renderer.apply_many(picture(40, 30, 3, 15), SEQUENCE)
+    frames = renderer.apply_many(picture(40, 30, 3, seed=15), SEQUENCE)
     for _ in range(4):
         next(frames)
     del renderer, frames
@@ -314,7 +304,7 @@ def test_a_sequence_forgotten_with_its_renderer() -> None:
 
 
 def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Renderer]) -> None:
-    image = picture(40, 30, 3, 16)
+    image = picture(40, 30, 3, seed=16)
     renderer = new_renderer()
     expected = [renderer.apply(image, settings) for settings in SEQUENCE]
     frames = renderer.apply_many(image, SEQUENCE)
@@ -346,7 +336,7 @@ def wrong_ones() -> list[tuple[Any, type[Exception], str]]:
 def test_an_error_comes_in_its_turn(
     renderer: Renderer, place: int, wrong: Any, kind: type[Exception], words: str
 ) -> None:
-    image = picture(20, 30, 4, 17)
+    image = picture(20, 30, 4, seed=17)
     right = [Separable(blur_strength=strength / 8) for strength in range(20)]
     sequence = [*right[:place], wrong, *right[place:]]
     frames = renderer.apply_many(image, sequence, attachments=("bloom", "final"))
@@ -365,7 +355,7 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
             yield Separable(exposure=exposure)
         raise KeyError("mine")
 
-    frames = renderer.apply_many(picture(4, 4, 3, 18), broken())
+    frames = renderer.apply_many(picture(4, 4, 3, seed=18), broken())
     for _ in range(place):
         next(frames)
     with pytest.raises(KeyError, match="mine"):
@@ -377,11 +367,11 @@ def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) 
     with pytest.raises(TypeError, match="image"):
         renderer.apply_many(wrong, [Separable()])
     with pytest.raises(TypeError, match="attachments"):
-        renderer.apply_many(picture(4, 4, 3, 19), [Separable()], attachments=wrong)
+        renderer.apply_many(picture(4, 4, 3, seed=19), [Separable()], attachments=wrong)
     with pytest.raises(ValueError, match="shading"):
         renderer.render_many(scene, [Separable()], shading=wrong)
     with pytest.raises(TypeError):
-        renderer.apply_many(picture(4, 4, 3, 19), Separable())  # type: ignore[arg-type]
+        renderer.apply_many(picture(4, 4, 3, seed=19), Separable())  # type: ignore[arg-type]
 
 
 # The core's errors: from a device that fails where it is told to
@@ -491,7 +481,7 @@ def submitted(
 
 
 def test_a_submission_is_waited_for_once(renderer: Renderer) -> None:
-    source = _core.image_source(picture(8, 8, 4, 20))
+    source = _core.image_source(picture(8, 8, 4, seed=20))
     both = [Separable(), Separable(blur_strength=1.0)]
     submission, _ = submitted(renderer, source, both)
     assert len(submission.wait()[0]) == 2
@@ -500,7 +490,7 @@ def test_a_submission_is_waited_for_once(renderer: Renderer) -> None:
 
 
 def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
-    image = picture(8, 8, 4, 22)
+    image = picture(8, 8, 4, seed=22)
     source, core = _core.image_source(image), renderer._core
     plan = core.plan(source, Separable(), ("final",))
     first, second = new_arrays(core, plan), new_arrays(core, plan)
@@ -527,7 +517,7 @@ def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
 
 def test_a_submission_of_a_closed_renderer() -> None:
     renderer = vkbloom.Renderer(validation=True)
-    core, source = renderer._core, _core.image_source(picture(8, 8, 4, 21))
+    core, source = renderer._core, _core.image_source(picture(8, 8, 4, seed=21))
     plan = core.plan(source, Separable(), None)
     arrays = new_arrays(core, plan)
     submission, _ = submitted(renderer, source, [Separable()])

@@ -145,9 +145,7 @@ BEYOND_32_BITS = [2**32, 2**32 + 16, 2**64 + 16, 2**128, -1, -(2**32) + 16]
 
 
 @pytest.mark.parametrize("side", BEYOND_32_BITS)
-def test_sizes_are_not_taken_modulo_2_to_the_32(
-    scene: Scene, side: int
-) -> None:
+def test_sizes_are_not_taken_modulo_2_to_the_32(scene: Scene, side: int) -> None:
     """Once 2**32 + 16 was a side of 16."""
     arrays, camera, _, *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     for size in ((side, 16), (16, side)):

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.framebuffers import assert_same
 from tests.screens import noise, screen
 from vkbloom import Camera, Frames, Renderer, Scene, Separable
+from vkbloom.settings import Shading
 
 SIZE = (160, 90)
 ALL = ["glow", "blur_vertical", "bloom", "scene", "final"]
@@ -34,12 +36,6 @@ def fresh(*arguments: Any, **more: Any) -> Frames:
 @pytest.fixture(scope="module")
 def default(scene: Scene) -> Frames:
     return fresh(scene, None, SIZE)
-
-
-def assert_same(frames: Frames, expected: Frames) -> None:
-    assert list(frames) == list(expected)
-    for name in expected:
-        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
 
 
 # What runs after one change
@@ -248,3 +244,23 @@ def test_a_walk_through_many_settings(opened: Renderer, scene: Scene) -> None:
                 frames,
                 fresh(scene, settings, size, time=time, attachments=wanted),
             )
+
+
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_another_camera_or_intensity_gives_the_picture_of_a_new_scene(
+    new_renderer: Callable[[], Renderer], scene: Scene, shading: Shading
+) -> None:
+    """The contents stay on the device; what draws them runs."""
+    renderer, other = new_renderer(), new_renderer()
+    for camera in (Camera(), Camera(rotation=(3.0, 40.0, 0.0)), Camera(fov=60.0), Camera()):
+        for intensity in (1.0, 2.5):
+            seen = dataclasses.replace(scene, camera=camera, glow_intensity=intensity)
+            assert seen.contents_serial == scene.contents_serial
+            frames = renderer.render(seen, size=(32, 20), shading=shading)
+            expected = other.render(
+                dataclasses.replace(Scene.ufo(), camera=camera, glow_intensity=intensity),
+                size=(32, 20),
+                shading=shading,
+            )
+            for name, array in expected.items():
+                np.testing.assert_array_equal(frames[name], array)

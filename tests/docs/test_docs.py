@@ -27,7 +27,7 @@ PAGES = [
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 # Commands of `sh` blocks that do not end, or take long, or want a cluster: only their arguments
 # are read.
-ENDLESS = ("explore", "bench")
+ENDLESS = ("explore",)
 
 
 def blocks(page: Path, language: str) -> list[str]:

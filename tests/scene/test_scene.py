@@ -239,3 +239,23 @@ def test_a_scene_of_one_file_has_neither_glow_nor_sky() -> None:
     assert (loaded.glow, loaded.skybox, loaded.camera) == (None, None, Camera())
     with pytest.raises(FileNotFoundError, match=r"gone\.gltf"):
         Scene.from_gltf(folder / "cube.gltf", glow=folder / "gone.gltf")
+
+
+def test_scenes_that_differ_in_the_camera_alone_share_their_contents() -> None:
+    first = Scene.ufo()
+    turned = first.with_camera(Camera(rotation=(1.0, 2.0, 3.0)))
+    brighter = dataclasses.replace(first, glow_intensity=2.0)
+    other = dataclasses.replace(first, glow=None)
+    serials = [scene.contents_serial for scene in (first, turned, brighter, other, Scene.ufo())]
+    assert serials[0] == serials[1] == serials[2]
+    assert len(set(serials)) == 3
+
+
+def test_contents_that_are_gone_are_not_taken_for_new_ones() -> None:
+    body = Scene.ufo().body
+    serials = set()
+    for _ in range(50):
+        # Each sky may lie where the one before lay.
+        sky = Cubemap((np.zeros((6, 1, 1, 4), np.uint8),))
+        serials.add(Scene(body, skybox=sky).contents_serial)
+    assert len(serials) == 50

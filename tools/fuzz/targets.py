@@ -162,15 +162,15 @@ def _pipelines(data: bytes) -> None:
     path = FOLDER / "cache" / f"pipelines-{DRIVER.hex()}.bin"
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(data)
-    found = pipeline_cache._unwrap(path.read_bytes(), DRIVER)
+    found = pipeline_cache.unwrap(path.read_bytes(), DRIVER)
     # Only what was written as a whole is taken for what the driver wrote.
-    header = pipeline_cache.MAGIC + pipeline_cache._digest(DRIVER, found or b"")
+    header = pipeline_cache.MAGIC + pipeline_cache.digest(DRIVER, found or b"")
     assert found is None or data == header + found
 
 
 def _pipeline_seeds() -> list[bytes]:
     kept = struct.pack("<IIII", 32, 1, 0x10005, 0) + bytes(16) + b"pipelines"
-    return [pipeline_cache.MAGIC + pipeline_cache._digest(DRIVER, kept) + kept]
+    return [pipeline_cache.MAGIC + pipeline_cache.digest(DRIVER, kept) + kept]
 
 
 @functools.cache

@@ -21,7 +21,7 @@ from vkbloom.cli.program import blaming_the_call, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.explorer.viewer import Viewer
-from vkbloom.sources import SHADINGS, Shading
+from vkbloom.settings import SHADINGS, Shading
 
 _LARGEST_PORT: Final = 65535
 

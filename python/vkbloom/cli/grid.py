@@ -35,7 +35,7 @@ from vkbloom.grid.plan import Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.io import image_writing, safe_writing
 from vkbloom.io.images import Colour, Picture
-from vkbloom.sources import Shading
+from vkbloom.settings import Shading
 
 _SHADINGS: Final = typing.get_args(Shading)
 _STORE: Final = ".zarr"

@@ -14,7 +14,7 @@ from click.core import ParameterSource
 import vkbloom
 
 #: Each is a module of this package with a click command called `command`.
-COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", "doctor", "bench")
+COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", "doctor")
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 

@@ -21,7 +21,7 @@ from vkbloom.cli.program import blaming_the_call
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.cli.terminal import show
-from vkbloom.sources import Shading
+from vkbloom.settings import Shading
 
 _SHADINGS: Final = typing.get_args(Shading)
 

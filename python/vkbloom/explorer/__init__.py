@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from vkbloom.explorer.widget import Explorer
     from vkbloom.renderer import Renderer
     from vkbloom.scene import Scene
-    from vkbloom.settings import Settings
-    from vkbloom.sources import Shading
+    from vkbloom.settings import Settings, Shading
 
 __all__ = ["explore"]
 

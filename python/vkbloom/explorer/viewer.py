@@ -27,17 +27,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom.checks import check_number, check_size
+from vkbloom.checks import check_image, check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
-from vkbloom.renderer import Renderer, _check_settings
-from vkbloom.sources import SHADINGS, check_image
+from vkbloom.renderer import Renderer
+from vkbloom.settings import SHADINGS, check_settings
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
     from vkbloom.scene import Scene
-    from vkbloom.settings import Settings
-    from vkbloom.sources import Shading
+    from vkbloom.settings import Settings, Shading
 
 __all__ = ["SIDES", "Viewer"]
 
@@ -87,10 +86,10 @@ class Viewer:
     ) -> None:
         from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
-        begun = _check_settings(settings)
+        begun = check_settings(settings)
         self.settings: dict[str, Settings] = {
             "a": begun,
-            "b": begun.replace(bloom=False) if against is None else _check_settings(against),
+            "b": begun.replace(bloom=False) if against is None else check_settings(against),
         }
         if shading not in SHADINGS:
             raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import anywidget
 
-from vkbloom.renderer import _check_settings
+from vkbloom.settings import check_settings
 
 if TYPE_CHECKING:
     from vkbloom.explorer.viewer import Viewer
@@ -65,7 +65,7 @@ class Explorer(anywidget.AnyWidget):
         self._set("b", settings)
 
     def _set(self, side: str, settings: Settings) -> None:
-        self._viewer.settings[side] = _check_settings(settings)
+        self._viewer.settings[side] = check_settings(settings)
         self.send({"kind": "settings", "sides": {side: settings.as_dict()}}, [])
 
     @property

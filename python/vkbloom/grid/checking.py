@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from vkbloom.checks import import_extra
 from vkbloom.grid.axes import Axis
-from vkbloom.grid.chunks import check_numbers, check_summed, check_text
+from vkbloom.grid.chunks import check_summed
 from vkbloom.grid.identity import FORMAT, chunk_in, short
 from vkbloom.grid.keys import Keys, open_keys
 from vkbloom.grid.order import Block, Index, blocks
 from vkbloom.grid.plan import Variable
 from vkbloom.grid.store import (
+    DIGESTS,
     DONE,
     ROOT,
-    add_array,
-    add_coordinate,
     chunk_key,
     describe,
-    done_chunk,
-    read_array,
+    digest,
     read_json,
     read_marks,
     reason,
@@ -39,28 +35,9 @@ __all__ = ["GridReport", "check_grid"]
 _PURPOSE: Final = "Grids on disk"
 # Each is a byte of memory, whatever the file's size.
 _MOST_POINTS: Final = 1 << 28
-# Of a coordinate that is no axis; of a chunk, before it is compressed.
-_MOST_VALUES: Final = 1 << 20
+# Of a chunk, before it is compressed.
 _MOST_BYTES: Final = 1 << 40
 _DAMAGE: Final = (ValueError, OSError)
-# The data types of coordinates, as Zarr's JSON has them.
-_NUMBERS: Final = (
-    *("bool", "float16", "float32", "float64"),
-    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
-)
-_COORDINATES: Final = {'"string"': "U1", **{f'"{name}"': name for name in _NUMBERS}}
-# What an array's metadata say of its shape and its chunks.
-_DECISIVE: Final = (
-    "zarr_format",
-    "node_type",
-    "shape",
-    "data_type",
-    "chunk_grid",
-    "chunk_key_encoding",
-    "codecs",
-    "fill_value",
-    "storage_transformers",
-)
 
 
 @dataclass(frozen=True)
@@ -150,22 +127,16 @@ def _told(key: str, content: bytes | None) -> str:
 
 @dataclass(frozen=True)
 class _Stored:
-    """What the group's metadata tell of a grid: axes, a block, variables, other coordinates."""
+    """What the group's metadata tell of a grid: axes, a block, variables, digests by key."""
 
     axes: tuple[Axis, ...]
     chunk: Index
     variables: Mapping[str, Variable]
-    coordinates: tuple[str, ...]
+    digests: Mapping[str, str]
 
     @property
     def shape(self) -> Index:
         return tuple(len(axis) for axis in self.axes)
-
-    @property
-    def lengths(self) -> set[int]:
-        """What coordinates can have."""
-        inner = (size for variable in self.variables.values() for size in variable.shape)
-        return {*self.shape, *(size for size in inner if size <= _MOST_VALUES)}
 
 
 def _read_stored(own: Mapping[str, Any], root: Mapping[str, Any]) -> _Stored:
@@ -184,88 +155,41 @@ def _read_stored(own: Mapping[str, Any], root: Mapping[str, Any]) -> _Stored:
         if dtype.kind not in "biuf" or size > _MOST_BYTES or min(shape, default=0) < 0:
             raise ValueError
         variables[name] = Variable(("",) * len(shape), shape, dtype, {})
-    arrays = root["consolidated_metadata"]["metadata"]
-    names = [*arrays, *variables, *(axis.name for axis in axes)]
+    digests = root["attributes"][DIGESTS]
+    names = [DONE, *variables, *(axis.name for axis in axes)]
     # Keys are paths.
-    if not all(isinstance(name, str) and re.fullmatch(r"\w[\w.-]*", name) for name in names):
+    if not all(re.fullmatch(r"\w[\w.-]*/[\w.]+", key) for key in digests):
         raise ValueError
-    return _Stored(axes, chunk, variables, tuple(sorted({*arrays} - {*variables, DONE})))
+    if not all(f"{name}/{ROOT}" in digests for name in names):
+        raise ValueError
+    return _Stored(axes, chunk, variables, digests)
 
 
 def _looked_through(keys: Keys, held: set[str], stored: _Stored) -> GridReport:
-    zarr = import_extra("zarr", "grid", _PURPOSE)
     problems: list[str] = []
-    sound: dict[str, Variable] = {}
-    marks = Variable((), (), np.dtype(np.bool_), {})
-    for name in stored.coordinates:
-        problems += _coordinate_problems(zarr, keys, held, stored, name)
-    for name, variable in {DONE: marks, **stored.variables}.items():
-        chunk = done_chunk(stored.shape) if name == DONE else stored.chunk
-        dims = tuple(axis.name for axis in stored.axes)
-        expected = _made(zarr, add_array, name, variable, (dims, stored.shape, chunk))
-        content = keys.read(f"{name}/{ROOT}")
-        if _decisive(content) == expected:
-            sound[name] = variable
-        else:
-            problems.append(f"{_told(f'{name}/{ROOT}', content)}, of all points")
+    damaged = set()
+    for key, expected in stored.digests.items():
+        name, _, rest = key.partition("/")
+        # The marks change; their own checksum covers them.
+        if name == DONE and rest != ROOT:
+            continue
+        content = keys.read(key)
+        if digest(key, content) == expected:
+            continue
+        damaged.add(name)
+        problems.append(f"{_told(key, content)}, of all points")
     done = np.zeros(stored.shape, np.bool_)
-    if sound.pop(DONE, None):
+    if DONE not in damaged:
         try:
             done = read_marks(keys, stored.shape)
         except _DAMAGE as error:
             problems.append(f"the marks in {DONE} are damaged ({reason(error)}), of all points")
+    sound = {name: held for name, held in stored.variables.items() if name not in damaged}
     for block in blocks(stored.shape, stored.chunk, range(done.ndim)) if done.any() else ():
         if done[block.slices].all():
             found = _block_problems(keys, held, block, stored.chunk, sound)
             problems += [f"{text}, of {describe(stored.axes, block)}" for text in found]
     return GridReport(done.size, int(done.sum()), tuple(problems))
-
-
-def _made(zarr: Any, add: Callable[..., None], name: str, *arguments: Any) -> dict[str, str] | None:
-    """Return what decides how an array is read that is made with some arguments."""
-    memory = zarr.storage.MemoryStore()
-    add(zarr.open_group(memory, mode="w", zarr_format=3), name, *arguments)
-    return _decisive(Keys(memory).read(f"{name}/{ROOT}"))
-
-
-def _decisive(content: bytes | None) -> dict[str, str] | None:
-    """Return what decides how an array is read, None where its metadata are damaged.
-
-    As text, since 3.0 and true are equal to numbers that they cannot stand for.
-    """
-    metadata = read_json(content)
-    if metadata is None or not isinstance(metadata.get("attributes"), dict):
-        return None
-    try:
-        return {key: json.dumps(metadata.get(key), sort_keys=True) for key in _DECISIVE}
-    except RecursionError:
-        return None
-
-
-def _coordinate_problems(
-    zarr: Any, keys: Keys, held: set[str], stored: _Stored, name: str
-) -> list[str]:
-    content = keys.read(f"{name}/{ROOT}")
-    found = _decisive(content)
-    # Any other length than these is none of the grid's.
-    sizes = {f"[{size}]": size for size in stored.lengths}
-    size = sizes.get(found["shape"]) if found else None
-    kind = _COORDINATES.get(found["data_type"]) if found else None
-    values = None if size is None or kind is None else np.zeros(size, kind)
-    if values is None or found != _made(zarr, add_coordinate, name, values, {}):
-        return [f"{_told(f'{name}/{ROOT}', content)}, of all points"]
-    if f"{name}/c.0" not in held:
-        return [f"the coordinate {name} is missing, of all points"]
-    try:
-        chunk = keys.read(f"{name}/c.0") or b""
-        if values.dtype.kind == "U":
-            check_text(chunk, len(values))
-        else:
-            check_numbers(chunk, values.nbytes)
-        read_array(keys, name)
-    except _DAMAGE as error:
-        return [f"the coordinate {name} is damaged ({reason(error)}), of all points"]
-    return []
 
 
 def _block_problems(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,7 @@ from vkbloom.frames import Frames
 from vkbloom.grid.order import Block, Index, points
 from vkbloom.grid.plan import Grid, Layout, PassCounter, checked_value
 from vkbloom.grid.reductions import Comparing
-from vkbloom.grid.sources import visit
-
-if TYPE_CHECKING:
-    from vkbloom.renderer import Renderer
+from vkbloom.grid.sources import FrameRenderer, visit
 
 __all__ = ["Filler", "Tally"]
 
@@ -58,10 +55,10 @@ class Filler:
     ----------
     grid : Grid
     layout : Layout
-    renderer : Renderer
+    renderer : FrameRenderer
     """
 
-    def __init__(self, grid: Grid, layout: Layout, renderer: Renderer) -> None:
+    def __init__(self, grid: Grid, layout: Layout, renderer: FrameRenderer) -> None:
         self._grid = grid
         self._layout = layout
         self._renderer = renderer

@@ -17,7 +17,7 @@ from vkbloom.grid.sources import digest
 __all__ = ["FORMAT", "chunk_in", "differences", "identity", "short"]
 
 #: Of the stores' own layout; another number cannot be read.
-FORMAT: Final = 1
+FORMAT: Final = 2
 
 _LONGEST: Final = 60  # letters of a value in a message
 

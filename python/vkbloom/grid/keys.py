@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
+import functools
 import os
-from collections.abc import Iterable, Iterator
+import threading
+from collections.abc import Coroutine, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
 
 from vkbloom.checks import import_extra
 
@@ -14,6 +17,38 @@ if TYPE_CHECKING:
     from zarr.abc.store import Store
 
 __all__ = ["Keys", "open_keys"]
+
+_PURPOSE: Final = "Grids on disk"
+_T = TypeVar("_T")
+
+
+def _buffers() -> Any:
+    return import_extra("zarr.buffer", "grid", _PURPOSE).default_buffer_prototype()
+
+
+@functools.cache
+def _event_loop(process: int) -> asyncio.AbstractEventLoop:
+    """Return a loop that runs in a thread: the caller's may be running, as in a notebook."""
+    del process
+    loop = asyncio.new_event_loop()
+    threading.Thread(target=loop.run_forever, name="vkbloom-grid", daemon=True).start()
+    return loop
+
+
+def _run(coroutine: Coroutine[Any, Any, _T]) -> _T:
+    # One loop per process, because a forked child has no threads of its parent.
+    return asyncio.run_coroutine_threadsafe(coroutine, _event_loop(os.getpid())).result()
+
+
+def _for_own_loop(store: Store) -> Store:
+    """Return the store, with connections of its own where they belong to an event loop."""
+    zarr = import_extra("zarr", "grid", _PURPOSE)
+    if not isinstance(store, zarr.storage.FsspecStore) or hasattr(store.fs, "sync_fs"):
+        return store
+    system = type(store.fs)(
+        *store.fs.storage_args, **store.fs.storage_options, skip_instance_cache=True
+    )
+    return cast("Store", zarr.storage.FsspecStore(fs=system, path=store.path))
 
 
 class Keys:
@@ -26,6 +61,8 @@ class Keys:
 
     def __init__(self, store: Store) -> None:
         self.store = store
+        # Zarr runs a store's coroutines on a loop of its own, which it does not make public.
+        self._coroutines = _for_own_loop(store)
 
     @property
     def _root(self) -> Path | None:
@@ -41,21 +78,18 @@ class Keys:
     @property
     def is_shared(self) -> bool:
         """Whether other processes can open it."""
-        zarr = import_extra("zarr", "grid", "Grids on disk")
+        zarr = import_extra("zarr", "grid", _PURPOSE)
         return not isinstance(self.store, zarr.storage.MemoryStore)
 
     def read(self, key: str) -> bytes | None:
         """Return the bytes of a key, None where there is none."""
-        prototype = import_extra("zarr.core.buffer", "grid", "Grids on disk")
-        found = _sync(self.store.get(key, prototype.default_buffer_prototype()))
+        found = _run(self._coroutines.get(key, _buffers()))
         return None if found is None else bytes(found.to_bytes())
 
     def write(self, key: str, content: bytes) -> None:
         """Write a key; on disk another reader sees all of it or what was there before."""
-        prototype = import_extra("zarr.core.buffer", "grid", "Grids on disk")
-        buffer = prototype.default_buffer_prototype().buffer.from_bytes(content)
         with self.named(key):
-            _sync(self.store.set(key, buffer))
+            _run(self._coroutines.set(key, _buffers().buffer.from_bytes(content)))
 
     @contextmanager
     def named(self, key: str) -> Iterator[None]:
@@ -71,10 +105,9 @@ class Keys:
         """Return all keys."""
 
         async def listed() -> set[str]:
-            return {key async for key in self.store.list()}
+            return {key async for key in self._coroutines.list()}
 
-        found: set[str] = _sync(listed())
-        return found
+        return _run(listed())
 
     def flush(self, keys: Iterable[str]) -> None:
         """Wait until keys that were written are on the disk.
@@ -98,10 +131,6 @@ class Keys:
         root = self._root
         for path in root.glob("**/*.partial") if root else ():
             path.unlink(missing_ok=True)
-
-
-def _sync(coroutine: Any) -> Any:
-    return import_extra("zarr.core.sync", "grid", "Grids on disk").sync(coroutine)
 
 
 def _flush(path: Path) -> None:
@@ -129,12 +158,12 @@ def open_keys(store: Any) -> Keys:
     TypeError
         It is something else.
     """
-    zarr = import_extra("zarr", "grid", "Grids on disk")
+    zarr = import_extra("zarr", "grid", _PURPOSE)
     if isinstance(store, zarr.abc.store.Store):
         return Keys(store)
     if isinstance(store, str) and "://" in store:
-        system, path = import_extra("fsspec.core", "grid", "Grids on disk").url_to_fs(store)
-        local = import_extra("fsspec.implementations.local", "grid", "Grids on disk")
+        system, path = import_extra("fsspec.core", "grid", _PURPOSE).url_to_fs(store)
+        local = import_extra("fsspec.implementations.local", "grid", _PURPOSE)
         if not isinstance(system, local.LocalFileSystem):
             return Keys(zarr.storage.FsspecStore.from_url(store))
         # A folder of this machine: what is promised of those holds for it, too.

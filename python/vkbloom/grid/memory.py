@@ -12,11 +12,11 @@ from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import blocks, default_chunk
 from vkbloom.grid.plan import Grid, Layout, attributes_of, lay_out
 from vkbloom.grid.progress import Progress
+from vkbloom.grid.sources import FrameRenderer
 
 if TYPE_CHECKING:
     import xarray
 
-    from vkbloom.renderer import Renderer
 
 __all__ = ["BLOCK_BYTES", "BLOCK_POINTS", "chunk_of", "in_memory"]
 
@@ -38,13 +38,13 @@ def chunk_of(grid: Grid, layout: Layout) -> tuple[int, ...]:
     return default_chunk(grid.shape, layout.ranking, max(most, 1))
 
 
-def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.Dataset:
+def in_memory(grid: Grid, renderer: FrameRenderer, progress: bool | None) -> xarray.Dataset:
     """Render a grid into a Dataset.
 
     Parameters
     ----------
     grid : Grid
-    renderer : Renderer
+    renderer : FrameRenderer
     progress : bool or None
         As for `vkbloom.Renderer.grid`.
 

@@ -7,23 +7,22 @@ import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
+from vkbloom.checks import check_attachments
+from vkbloom.framebuffers import dimensions, leading
 from vkbloom.frames import Frames
 from vkbloom.grid.axes import Axis, image_axis, read_axes
 from vkbloom.grid.order import Index, ranking_of, walk
 from vkbloom.grid.reductions import Comparing, Reduction
-from vkbloom.grid.sources import Point, Source, read_source, visit
+from vkbloom.grid.sources import FrameRenderer, Point, Source, read_source, visit
 from vkbloom.plans import Framebuffer
-from vkbloom.settings import Settings
-from vkbloom.views.dimensions import dimensions, leading
-
-if TYPE_CHECKING:
-    from vkbloom.renderer import Renderer
+from vkbloom.settings import Settings, check_settings
+from vkbloom.version import installed_version
 
 __all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out"]
 
@@ -188,14 +187,12 @@ def ask(
     TypeError, ValueError
         One of them is wrong.
     """
-    from vkbloom.renderer import _check_attachments, _check_settings  # noqa: PLC0415  it imports us
-
-    settings = _check_settings(settings)
+    settings = check_settings(settings)
     checked = read_source(source, size, shading, time)
     found = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     if checked.labels:
         found = (image_axis(checked.labels), *found)
-    names = _check_attachments(attachments)
+    names = check_attachments(attachments)
     reductions = {} if reduce is None else dict(reduce)
     taken = {"y", "x", "channel", "done", *(axis.name for axis in found), *(names or ())}
     for name, reduction in reductions.items():
@@ -210,13 +207,13 @@ def ask(
     return grid
 
 
-def lay_out(grid: Grid, renderer: Renderer) -> Layout:
+def lay_out(grid: Grid, renderer: FrameRenderer) -> Layout:
     """Ask a renderer for all that has to be known of a grid before its points are rendered.
 
     Parameters
     ----------
     grid : Grid
-    renderer : Renderer
+    renderer : FrameRenderer
 
     Returns
     -------
@@ -254,7 +251,7 @@ def lay_out(grid: Grid, renderer: Renderer) -> Layout:
         ran=ran,
         adapter=renderer.info.name,
         driver=renderer.info.driver_info or renderer.info.driver,
-        version=_version(),
+        version=installed_version(),
     )
 
 
@@ -298,12 +295,6 @@ def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.P
     )
 
 
-def _version() -> str:
-    from vkbloom import __version__  # noqa: PLC0415  the package imports this module
-
-    return __version__
-
-
 class PassCounter:
     """Counts what the points of a grid would cost alone.
 
@@ -311,10 +302,10 @@ class PassCounter:
     ----------
     grid : Grid
     layout : Layout
-    renderer : Renderer
+    renderer : FrameRenderer
     """
 
-    def __init__(self, grid: Grid, layout: Layout, renderer: Renderer) -> None:
+    def __init__(self, grid: Grid, layout: Layout, renderer: FrameRenderer) -> None:
         self._grid = grid
         self._structural = layout.structural
         self._renderer = renderer
@@ -332,7 +323,7 @@ class PassCounter:
 
 
 def _graph_of(
-    grid: Grid, renderer: Renderer, index: Index
+    grid: Grid, renderer: FrameRenderer, index: Index
 ) -> tuple[Mapping[str, Framebuffer], int]:
     """Return the framebuffers of a point, and its passes alone."""
     point = grid.point(index)
@@ -344,7 +335,9 @@ def _graph_of(
     return found, len({name for name, *_ in alone.passes})
 
 
-def _survey(grid: Grid, renderer: Renderer) -> tuple[Mapping[str, Framebuffer], tuple[int, ...]]:
+def _survey(
+    grid: Grid, renderer: FrameRenderer
+) -> tuple[Mapping[str, Framebuffer], tuple[int, ...]]:
     """Return the framebuffers to keep, and the axes that change what there is.
 
     Every value of every axis is looked at from the first and from the last corner of the grid, and
@@ -418,7 +411,7 @@ def _frame_variables(
     return found
 
 
-def _sample(grid: Grid, renderer: Renderer) -> Frames:
+def _sample(grid: Grid, renderer: FrameRenderer) -> Frames:
     """Render the first point."""
     first = tuple(0 for _ in grid.axes)
     ((_, frames),) = visit(renderer, grid.source, [grid.point(first)], grid.wanted)

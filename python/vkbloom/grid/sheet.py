@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_index
+from vkbloom.framebuffers import leading
 from vkbloom.grid import views
 from vkbloom.views import pictures
-from vkbloom.views.dimensions import leading
 
 if TYPE_CHECKING:
     import xarray

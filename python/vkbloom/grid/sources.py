@@ -9,24 +9,24 @@ import itertools
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
 from vkbloom import _core
-from vkbloom.checks import check_size, check_time
+from vkbloom.checks import check_image, check_size, check_time
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
-from vkbloom.settings import Settings
-from vkbloom.sources import SHADINGS, check_image, image_source, scene_source
+from vkbloom.settings import SHADINGS, Settings
+from vkbloom.sources import image_source, scene_source
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from vkbloom.adapter import AdapterInfo
     from vkbloom.plans import Plan
-    from vkbloom.renderer import Renderer
     from vkbloom.scene import Scene
-    from vkbloom.sources import Shading
+    from vkbloom.settings import Shading
 
 __all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
 
@@ -42,8 +42,50 @@ class Point:
     place: float
 
 
+class FrameRenderer(Protocol):
+    """The part of a `Renderer` that grids use.
+
+    A renderer imports the grids for `Renderer.grid`, so that they do not import it.
+    """
+
+    @property
+    def info(self) -> AdapterInfo:
+        """The adapter."""
+
+    def apply_many(
+        self,
+        image: NDArray[Any],
+        settings_seq: Iterable[Settings],
+        *,
+        attachments: str | Sequence[str],
+    ) -> Iterator[Frames]:
+        """Give an image bloom with one settings after the other."""
+
+    def render_many(
+        self,
+        scene: Scene,
+        settings_seq: Iterable[Settings],
+        size: tuple[int, int],
+        *,
+        shading: Shading,
+        time: float,
+        attachments: str | Sequence[str],
+    ) -> Iterator[Frames]:
+        """Render a scene with one settings after the other."""
+
+    def plan(
+        self,
+        source: Scene | NDArray[Any],
+        settings: Settings,
+        size: tuple[int, int] | None = None,
+        *,
+        shading: Shading = "forward",
+    ) -> Plan:
+        """Tell what a call would do, without rendering anything."""
+
+
 def visit(
-    renderer: Renderer,
+    renderer: FrameRenderer,
     source: ImageSource | SceneSource,
     points: Iterable[Point],
     attachments: str | Sequence[str],
@@ -52,7 +94,7 @@ def visit(
 
     Parameters
     ----------
-    renderer : Renderer
+    renderer : FrameRenderer
     source : Source
     points : iterable of Point
         Drawn as they are needed, some ahead.
@@ -89,7 +131,7 @@ class ImageSource:
 
     def many(
         self,
-        renderer: Renderer,
+        renderer: FrameRenderer,
         settings: Iterable[Settings],
         place: float,
         attachments: str | Sequence[str],
@@ -97,7 +139,7 @@ class ImageSource:
         """Yield the frames of some settings on one image."""
         return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
 
-    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+    def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
         """Tell what would be made of an image, without rendering."""
         return renderer.plan(self.images[int(place)], settings)
 
@@ -133,7 +175,7 @@ class SceneSource:
 
     def many(
         self,
-        renderer: Renderer,
+        renderer: FrameRenderer,
         settings: Iterable[Settings],
         place: float,
         attachments: str | Sequence[str],
@@ -148,7 +190,7 @@ class SceneSource:
             attachments=attachments,
         )
 
-    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+    def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
         """Tell what would be made of the scene, without rendering."""
         return renderer.plan(self.scene, settings, self.size, shading=self.shading)
 

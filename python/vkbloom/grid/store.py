@@ -33,17 +33,16 @@ from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of
 from vkbloom.grid.running import Writer
 
 __all__ = [
+    "DIGESTS",
     "DONE",
     "IDENTITY",
     "ROOT",
     "GridStore",
     "GridWriter",
-    "add_array",
-    "add_coordinate",
     "chunk_key",
     "describe",
+    "digest",
     "done_chunk",
-    "read_array",
     "read_json",
     "read_marks",
     "reason",
@@ -52,6 +51,7 @@ __all__ = [
 
 ROOT: Final = "zarr.json"
 IDENTITY: Final = "vkbloom_grid"
+DIGESTS: Final = "vkbloom_digests"
 DONE: Final = "done"
 
 _PURPOSE: Final = "Grids on disk"
@@ -101,10 +101,10 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     dims = tuple(axis.name for axis in grid.axes)
     mark = {"grid": hashlib.sha256(json.dumps(own).encode()).hexdigest()}
     for axis in grid.axes:
-        add_coordinate(group, axis.name, axis.coordinate, axis.attributes)
+        _add_coordinate(group, axis.name, axis.coordinate, axis.attributes)
     for name, (values, attrs) in layout.coordinates.items():
-        add_coordinate(group, name, values, attrs)
-    add_array(
+        _add_coordinate(group, name, values, attrs)
+    _add_array(
         group,
         DONE,
         Variable((), (), np.dtype(np.bool_), {"description": "Whether the point is there", **mark}),
@@ -114,14 +114,32 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
         marked = Variable(
             variable.dims, variable.shape, variable.dtype, {**variable.attributes, **mark}
         )
-        add_array(group, name, marked, (dims, grid.shape, chunk))
+        _add_array(group, name, marked, (dims, grid.shape, chunk))
+    keys = Keys(memory)
+    group.attrs[DIGESTS] = {key: digest(key, keys.read(key)) for key in sorted(keys.all() - {ROOT})}
     with warnings.catch_warnings():
         # Format 3 does not define consolidated metadata yet, and xarray wants it all the same.
         warnings.filterwarnings("ignore", message="Consolidated metadata")
         zarr.consolidate_metadata(memory)
-    keys = Keys(memory)
     names = sorted(keys.all(), key=lambda key: (key != ROOT, key))
     return {key: keys.read(key) or b"" for key in names}
+
+
+def digest(key: str, content: bytes | None) -> str | None:
+    """Return the SHA-256 of what a key holds, None where it is missing or damaged.
+
+    JSON counts by its values: spaces and the order of its names make no difference.
+    """
+    if content is None:
+        return None
+    if key.endswith(ROOT):
+        found = read_json(content)
+        try:
+            # As text: 3.0 and true are equal to numbers that they cannot stand for.
+            content = None if found is None else json.dumps(found, sort_keys=True).encode()
+        except RecursionError:
+            content = None
+    return None if content is None else hashlib.sha256(content).hexdigest()
 
 
 def done_chunk(shape: Index) -> Index:
@@ -129,7 +147,7 @@ def done_chunk(shape: Index) -> Index:
     return default_chunk(shape, range(len(shape)), _DONE_POINTS)
 
 
-def add_coordinate(
+def _add_coordinate(
     group: Any, name: str, values: NDArray[Any], attributes: Mapping[str, str]
 ) -> None:
     """Add an array of one chunk, the values along a dimension, to a Zarr group."""
@@ -147,7 +165,7 @@ def add_coordinate(
     array[...] = values.astype(object) if is_text else values
 
 
-def add_array(
+def _add_array(
     group: Any, name: str, variable: Variable, lattice: tuple[tuple[str, ...], Index, Index]
 ) -> None:
     """Add a variable without its chunks to a Zarr group.
@@ -315,8 +333,7 @@ class GridStore:
         mended = []
         for key, content in expected.items():
             found = self.keys.read(key)
-            # The same in other letters is no damage.
-            if found != content and not (key.endswith(ROOT) and _is_same_json(found, content)):
+            if digest(key, found) != digest(key, content):
                 self.keys.write(key, content)
                 mended.append(f"{key} was {'missing' if found is None else 'damaged'}")
         self.keys.flush(expected)
@@ -390,26 +407,18 @@ def read_marks(keys: Keys, shape: Index) -> NDArray[np.bool_]:
         content = keys.read(chunk_key(DONE, part, chunk, 0))
         if content is not None:
             check_summed(content, math.prod(chunk))
-    return read_array(keys, DONE)
-
-
-def read_array(keys: Keys, name: str) -> NDArray[Any]:
-    """Read an array whose chunks are known to be whole.
-
-    Raises
-    ------
-    ValueError, OSError
-        Its metadata are damaged.
-    """
     zarr = import_extra("zarr", "grid", _PURPOSE)
     try:
-        values: NDArray[Any] = zarr.open_array(keys.store, path=name, mode="r")[...]
+        array = zarr.open_array(keys.store, path=DONE, mode="r")
+        if (array.shape, array.chunks, array.dtype) != (shape, chunk, np.bool_):
+            raise ValueError("the array has another shape or type")
+        marks: NDArray[np.bool_] = array[...]
     except (MemoryError, OSError):
         raise
     except Exception as error:
-        # Zarr promises no class for what it cannot use.
+        # Zarr documents no class for metadata that it cannot use.
         raise ValueError(reason(error)) from error
-    return values
+    return marks
 
 
 def describe(axes: Iterable[Axis], block: Block) -> str:
@@ -433,15 +442,6 @@ def read_json(content: bytes | None) -> dict[str, Any] | None:
     except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
-
-
-def _is_same_json(found: bytes | None, expected: bytes) -> bool:
-    # As text: 3.0 and true are equal to numbers that they cannot stand for.
-    try:
-        texts = [json.dumps(read_json(content), sort_keys=True) for content in (found, expected)]
-    except RecursionError:
-        return False
-    return texts[0] == texts[1]
 
 
 def stored_identity(root: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -17,8 +17,7 @@ from vkbloom.grid.order import Index
 from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.store import IDENTITY, ROOT, GridStore, read_json, stored_identity
-from vkbloom.settings import Settings
-from vkbloom.sources import Shading
+from vkbloom.settings import Settings, Shading
 
 if TYPE_CHECKING:
     import xarray

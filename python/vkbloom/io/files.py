@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io import safe_writing
 from vkbloom.io.images import check_name
-from vkbloom.views.dimensions import leading
 
 if TYPE_CHECKING:
     import OpenImageIO
 
-    from vkbloom.frames import Frames
 
 __all__ = ["save"]
 
@@ -28,12 +27,12 @@ __all__ = ["save"]
 _PIXEL_TYPES = {"uint8": "uint8", "float16": "half", "float32": "float"}
 
 
-def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
+def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
     """Write framebuffers to image files: what `Frames.save` does and describes.
 
     Parameters
     ----------
-    frames : Frames
+    frames : Framebuffers
         One framebuffer at least.
     path : str or path-like
         A file name with an extension that OpenImageIO writes, or a folder.
@@ -76,14 +75,14 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
     files: list[tuple[Path, Path]] = []
     try:
         for file, names in plan.items():
-            arrays = [frames[name] for name in names]
-            files.append((safe_writing.reserve(file, arrays), file))
+            size = sum(frames[name].nbytes for name in names)
+            files.append((safe_writing.reserve(file, size), file))
             if not _is_exr(file):
                 if _write_image(oiio, frames, names[0], *files[-1]):
                     continue
                 files.pop()[0].unlink()
                 beside = file.with_suffix(".exr")
-                files.append((safe_writing.reserve(beside, arrays), beside))
+                files.append((safe_writing.reserve(beside, size), beside))
             _write_exr(oiio, frames, names, *files[-1])
         for temporary, file in files:
             safe_writing.put_in_place(temporary, file)
@@ -93,7 +92,9 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
     return [file for _, file in files]
 
 
-def _write_image(oiio: ModuleType, frames: Frames, name: str, temporary: Path, file: Path) -> bool:
+def _write_image(
+    oiio: ModuleType, frames: Framebuffers, name: str, temporary: Path, file: Path
+) -> bool:
     """Write one framebuffer to a file of any format; False if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
     writer = oiio.ImageOutput.create(str(temporary))
@@ -118,7 +119,7 @@ def _write_image(oiio: ModuleType, frames: Frames, name: str, temporary: Path, f
 
 
 def _write_exr(
-    oiio: ModuleType, frames: Frames, names: Iterable[str], temporary: Path, file: Path
+    oiio: ModuleType, frames: Framebuffers, names: Iterable[str], temporary: Path, file: Path
 ) -> None:
     parts: list[NDArray[Any]] = []
     specs: list[Any] = []
@@ -149,7 +150,7 @@ def _write_exr(
         raise safe_writing.write_error(writer, temporary, file)
 
 
-def _spec(oiio: ModuleType, frames: Frames, pixels: NDArray[Any]) -> OpenImageIO.ImageSpec:
+def _spec(oiio: ModuleType, frames: Framebuffers, pixels: NDArray[Any]) -> OpenImageIO.ImageSpec:
     """Describe an (H, W, C) array to OpenImageIO, with what the frames came from."""
     height, width, channels = pixels.shape
     spec: OpenImageIO.ImageSpec = oiio.ImageSpec(

@@ -51,17 +51,19 @@ def read(driver_uuid: bytes) -> bytes | None:
         content = file.read_bytes()
     except OSError:
         return None
-    return _unwrap(content, driver_uuid)
+    return unwrap(content, driver_uuid)
 
 
-def _digest(driver_uuid: bytes, data: bytes) -> bytes:
+def digest(driver_uuid: bytes, data: bytes) -> bytes:
+    """Return the checksum that the file of a driver holds."""
     return hashlib.sha256(driver_uuid + data).digest()
 
 
-def _unwrap(content: bytes, driver_uuid: bytes) -> bytes | None:
+def unwrap(content: bytes, driver_uuid: bytes) -> bytes | None:
+    """Return the driver's data of a whole file; None for a damaged or a foreign one."""
     header = len(MAGIC) + _DIGEST_SIZE
     data = content[header:]
-    if content[:header] != MAGIC + _digest(driver_uuid, data):
+    if content[:header] != MAGIC + digest(driver_uuid, data):
         return None
     return data
 
@@ -79,7 +81,7 @@ def write(driver_uuid: bytes, data: bytes) -> None:
         handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.name)
         try:
             with os.fdopen(handle, "wb") as stream:
-                stream.write(MAGIC + _digest(driver_uuid, data) + data)
+                stream.write(MAGIC + digest(driver_uuid, data) + data)
             os.replace(temporary, file)
         except BaseException:
             os.unlink(temporary)

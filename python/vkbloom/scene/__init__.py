@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from vkbloom.scene.scene import Camera, Mesh, Scene
+from vkbloom.scene.mesh import Mesh
+from vkbloom.scene.scene import Camera, Scene
 from vkbloom.scene.skybox import Cubemap
 
 __all__ = ["Camera", "Cubemap", "Mesh", "Scene"]

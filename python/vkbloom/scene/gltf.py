@@ -26,7 +26,7 @@ from vkbloom.scene.gltf_file import (
     Parsed,
 )
 from vkbloom.scene.gltf_textures import TextureReader, TextureUse
-from vkbloom.scene.scene import Mesh
+from vkbloom.scene.mesh import Mesh
 from vkbloom.scene.textures import WHITE, Surface, Texture
 
 _LINE_MODES: Final = {0: "points", 1: "lines", 2: "line loops", 3: "line strips"}

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import __version__
 from vkbloom.frames import Frames
 from vkbloom.testing import report_parts
-from vkbloom.testing.judging import Tolerances, Verdict, first_failure, judge
+from vkbloom.testing.judging import Verdict, first_failure, judge
 from vkbloom.testing.records import Record
 from vkbloom.testing.references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
+from vkbloom.version import installed_version
+from vkbloom.views.tolerances import Tolerances
 
 __all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
 
@@ -353,7 +354,7 @@ def _origin(frames: object, info: Mapping[str, str] | None) -> Origin:
         adapter=known.get("adapter"),
         driver=known.get("driver"),
         cpu_vendor=cpu_vendor(),
-        version=__version__,
+        version=installed_version(),
     )
 
 

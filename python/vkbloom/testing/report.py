@@ -11,9 +11,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
-from vkbloom import __version__
 from vkbloom.testing.records import Figures, Record
 from vkbloom.testing.report_parts import Histogram, Part, Shown
+from vkbloom.version import installed_version
 
 __all__ = ["write_report"]
 
@@ -81,7 +81,7 @@ def _plain(records: Iterable[Record]) -> dict[str, Any]:
         return value
 
     checks = [finite(dict(record)) for record in records]
-    return {"format": _FORMAT, "version": __version__, "checks": checks}
+    return {"format": _FORMAT, "version": installed_version(), "checks": checks}
 
 
 def _page(records: Sequence[Record], parts: Path) -> Iterable[str]:
@@ -98,7 +98,7 @@ def _page(records: Sequence[Record], parts: Path) -> Iterable[str]:
         f"<title>{_title(records, failed)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
         '<a class="skip" href="#checks">To the list of all checks</a>\n'
         f"<header><h1>Bloom checks</h1>\n<p>{_title(records, failed)}, vkbloom "
-        f"{_text(__version__)}</p></header>\n<main>\n"
+        f"{_text(installed_version())}</p></header>\n<main>\n"
     )
     if failed:
         yield '<section aria-labelledby="first"><h2 id="first">First to differ</h2>\n<ul>\n'

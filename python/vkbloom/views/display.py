@@ -18,11 +18,12 @@ import numpy as np
 from vkbloom.views import pictures
 
 if TYPE_CHECKING:
-    from vkbloom.renderer import Renderer
-    from vkbloom.scene import Scene
-    from vkbloom.settings import Settings
+    from _typeshed import DataclassInstance
+    from numpy.typing import NDArray
 
-__all__ = ["renderer_html", "scene_html", "settings_html"]
+    from vkbloom.adapter import AdapterInfo
+
+__all__ = ["fields_html", "renderer_html", "scene_html"]
 
 _CELL: Final = "padding:1px 12px 1px 0;text-align:left;vertical-align:top"
 _FACE_SIDE: Final = 72  # pixels
@@ -31,12 +32,12 @@ _FACE_SIDE: Final = 72  # pixels
 _CROSS: Final = ("2 / 3", "2 / 1", "3 / 2", "1 / 2", "2 / 2", "2 / 4")
 
 
-def settings_html(settings: Settings) -> str:
+def fields_html(settings: DataclassInstance) -> str:
     """Return settings as a table: the fields that are not the default, then, folded, all others.
 
     Parameters
     ----------
-    settings : Settings
+    settings : dataclass instance
 
     Returns
     -------
@@ -56,40 +57,44 @@ def settings_html(settings: Settings) -> str:
     return _block(type(settings).__name__, (_table(changed) if changed else "") + rest)
 
 
-def scene_html(scene: Scene) -> str:
+def scene_html(rows: Iterable[tuple[str, str]], faces: NDArray[Any] | None) -> str:
     """Return a scene as a table, with the faces of its sky as a cross.
 
     Parameters
     ----------
-    scene : Scene
+    rows : iterable of (str, str)
+        What the scene has, by name.
+    faces : ndarray, shape (6, N, N, C), or None
+        Of the sky: +x, -x, +y, -y, +z, -z.
 
     Returns
     -------
     str
     """
-    return _block("Scene", _table(scene._rows()) + ("" if scene.skybox is None else _cross(scene)))
+    return _block("Scene", _table(rows) + ("" if faces is None else _cross(faces)))
 
 
-def renderer_html(renderer: Renderer) -> str:
+def renderer_html(info: AdapterInfo, *, closed: bool) -> str:
     """Return a renderer's adapter as a table.
 
     Parameters
     ----------
-    renderer : Renderer
-        Open or closed.
+    info : AdapterInfo
+        Of the renderer.
+    closed : bool
+        Whether the renderer is closed.
 
     Returns
     -------
     str
     """
-    info = renderer.info
     driver = " ".join(part for part in (info.driver, info.driver_info) if part)
     rows = [
         ("adapter", info.name),
         ("type", info.type),
         ("driver", driver or "unnamed"),
         ("Vulkan", info.api_version),
-        ("state", "closed" if renderer.closed else "open"),
+        ("state", "closed" if closed else "open"),
     ]
     return _block("Renderer", _table(rows))
 
@@ -114,9 +119,7 @@ def _table(rows: Iterable[tuple[str, str]]) -> str:
     )
 
 
-def _cross(scene: Scene) -> str:
-    assert scene.skybox is not None
-    faces: Any = scene.skybox.levels[0]
+def _cross(faces: NDArray[Any]) -> str:
     step = max(1, faces.shape[1] // _FACE_SIDE)
     small = faces[:, ::step, ::step, :3]
     if small.dtype != np.uint8:

@@ -8,18 +8,15 @@ import math
 import struct
 import warnings
 import zlib
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_index, import_extra
+from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io.srgb import encode_srgb
-from vkbloom.views.dimensions import leading
-
-if TYPE_CHECKING:
-    from vkbloom.frames import Frames
 
 __all__ = [
     "contact_sheet_html",
@@ -35,7 +32,7 @@ __all__ = [
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
 
 
-def leading_png(frames: Frames) -> bytes:
+def leading_png(frames: Framebuffers) -> bytes:
     """Return the picture of `final`, or else the last image, or else the last framebuffer.
 
     8-bit images are shown as stored. Float images are clipped to 0..1 and shown with
@@ -45,7 +42,7 @@ def leading_png(frames: Frames) -> bytes:
 
     Parameters
     ----------
-    frames : Frames
+    frames : Framebuffers
         One framebuffer at least.
 
     Returns
@@ -56,7 +53,7 @@ def leading_png(frames: Frames) -> bytes:
     return png(_picture(frames, leading(frames)))
 
 
-def contact_sheet_html(frames: Frames) -> str:
+def contact_sheet_html(frames: Framebuffers) -> str:
     """Return a contact sheet of all framebuffers, with the pass times, as HTML.
 
     Pictures are as in `leading_png`, without alpha, so that nothing is hidden, and
@@ -66,7 +63,7 @@ def contact_sheet_html(frames: Frames) -> str:
 
     Parameters
     ----------
-    frames : Frames
+    frames : Framebuffers
         Any number of framebuffers.
 
     Returns
@@ -111,7 +108,7 @@ def contact_sheet_html(frames: Frames) -> str:
     return "".join(page)
 
 
-def _timings_html(frames: Frames) -> str:
+def _timings_html(frames: Framebuffers) -> str:
     longest = max((t for t in frames.timings.values() if math.isfinite(t)), default=0.0)
     adapter = html.escape(str(frames.info.get("adapter", "the device")))
     rows = [
@@ -131,7 +128,7 @@ def _timings_html(frames: Frames) -> str:
     return "".join(rows)
 
 
-def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> bytes:
+def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) -> bytes:
     """Return a labelled contact sheet of all framebuffers as PNG.
 
     Pictures are shown as in a notebook, without alpha, fitted into cells that have the
@@ -140,7 +137,7 @@ def contact_sheet_png(frames: Frames, columns: int = 3, width: int = 320) -> byt
 
     Parameters
     ----------
-    frames : Frames
+    frames : Framebuffers
         One framebuffer at least.
     columns : int, default 3
         Pictures in a row, 1 to 32.
@@ -221,7 +218,7 @@ def labelled(
 
 
 def _picture(
-    frames: Frames, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
+    frames: Framebuffers, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
 ) -> NDArray[np.uint8]:
     """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
     encoded = name == "final" and frames.settings.encoding != "none"
@@ -282,7 +279,7 @@ def picture(
     return pixels
 
 
-def _viewing_stops(frames: Frames, name: str) -> float:
+def _viewing_stops(frames: Framebuffers, name: str) -> float:
     """Return the exposure, 0 or negative in half stops, that leaves 99 % of the pixels below 1."""
     array = frames[name]
     is_light = array.ndim == 3 and array.dtype != np.uint8 and name not in ("normal", "position")
@@ -309,7 +306,7 @@ def _ranged(array: NDArray[Any]) -> str:
     return f", {low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
 
 
-def _aspect(arrays: Mapping[str, NDArray[Any]]) -> float:
+def _aspect(arrays: Framebuffers) -> float:
     """Width by height of the cells of a contact sheet: that of the leading framebuffer.
 
     Bounded, so that a strip of one pixel still leaves room to look at the others.

@@ -1,0 +1,120 @@
+"""``python -m benchmarks``: how fast vkbloom is here, beside its peers."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from benchmarks import BENCHMARKS, Plan, run, write
+from benchmarks.plan import usable_cores
+from vkbloom.cli.device_options import adapter_option
+from vkbloom.cli.program import blaming_the_call
+
+
+def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted and not context.resilient_parsing:
+        for name, what in BENCHMARKS.items():
+            click.echo(f"{name:<10} {what}")
+        context.exit()
+
+
+@click.command()
+@click.option(
+    "--list",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_ids,
+    help="List the benchmarks and exit.",
+)
+@click.option(
+    "--only",
+    type=click.Choice(list(BENCHMARKS)),
+    multiple=True,
+    help="Run this benchmark; may be given several times.  [default: all]",
+)
+@click.option(
+    "-o",
+    "--out",
+    metavar="FILE.md",
+    default="bench.md",
+    show_default=True,
+    type=click.Path(dir_okay=False),
+    help="The table; beside it go FILE.json and, with matplotlib, the curves.",
+)
+@click.option("--quick", is_flag=True, help="Small and few: shows that all runs, measures nothing.")
+@click.option("--rounds", type=int, help="How often each contender is timed, 3 or more.")
+@click.option(
+    "--points",
+    type=int,
+    default=Plan.points,
+    show_default=True,
+    help="Settings of the benchmark points.",
+)
+@click.option(
+    "--threads",
+    type=int,
+    help="Of the peers.  [default: the cores that this process may use]",
+)
+@adapter_option
+def command(
+    *,
+    only: tuple[str, ...],
+    out: str,
+    quick: bool,
+    rounds: int | None,
+    points: int,
+    threads: int | None,
+    adapter: str,
+) -> None:
+    """Time vkbloom beside its peers and write a table.
+
+    Peers (OpenCV, SciPy, scikit-image, PyTorch, CuPy, pygfx) take part where they are installed,
+    and are listed as missing where they are not. Pictures are compared before they are timed; all
+    are timed in turn, A B A B. All of it takes a quarter of an hour on two cores, which should have
+    nothing else to do.
+
+    The exit status is 1 if pictures differ that should be the same; the times of those are left
+    out.
+    """
+    target = Path(out)
+    if target.suffix != ".md":
+        raise click.UsageError(f"--out: {out!r} does not end in .md")
+    # Before a quarter of an hour is spent.
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=target.parent):
+        pass
+    with Console(stderr=True).status("") as status:
+        with blaming_the_call():
+            plan = Plan(
+                adapter=adapter,
+                quick=quick,
+                rounds=rounds,
+                points=points,
+                threads=usable_cores() if threads is None else threads,
+                only=tuple(dict.fromkeys(only)),
+                tell=lambda text: status.update(f"Timing {text}"),
+            )
+        # After each benchmark, so that an interrupted run keeps what it has.
+        for report in run(plan):
+            written = write(report, target)
+    for path in written:
+        click.echo(f"wrote {path}")
+    for section in report.sections:
+        for goal in section.goals:
+            limit = f"{'at most' if goal.at_most else 'at least'} {goal.wanted:.3g}"
+            click.echo(f"{goal.what}: {goal.ratio:.3g} ({limit} wanted)")
+    for found in report.disagreements:
+        click.echo(
+            f"{found.what}: pictures differ by {found.largest:.3g}, {found.allowed:g} is allowed",
+            err=True,
+        )
+    if report.disagreements:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    command(prog_name="python -m benchmarks")

@@ -1,0 +1,73 @@
+"""The benchmarks by id, and how they are run one after the other."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Final
+
+import vkbloom
+from benchmarks.machine import describe
+from benchmarks.plan import Plan
+from benchmarks.results import Report, Section
+
+__all__ = ["BENCHMARKS", "run"]
+
+#: What each benchmark times, by its id. Each is a module of this package, - being _ in its name,
+#: with a function ``run(plan) -> Section``.
+BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "image": "an image's bloom, NumPy in and out, against image libraries",
+        "pyramid": "a pyramid of five levels against pygfx and a Gaussian of the same spread",
+        "forward": "what bloom adds to a forward frame, against the source's form",
+        "points": "many settings of one image, against single calls",
+        "cost": "cost against pixels, kernel length and levels",
+        "overhead": "what a call costs whatever its size",
+        "startup": "import, renderer, first frame, each in processes of their own",
+        "separable": "two passes of N taps against one of N x N",
+        "image-gpu": "an image's bloom at 4K on a GPU, against CUDA",
+    }
+)
+
+
+def run(plan: Plan) -> Iterator[Report]:
+    """Run the benchmarks of a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Yields
+    ------
+    Report
+        One after each benchmark, with all that was found so far: the last is the whole, and
+        nothing is lost when a later benchmark fails.
+
+    Raises
+    ------
+    ValueError
+        `plan.only` names a benchmark that there is not.
+    AdapterNotFoundError, Error
+        The adapter cannot be used.
+    """
+    for name in plan.only:
+        if name not in BENCHMARKS:
+            raise ValueError(f"only: {name!r} is not one of {', '.join(BENCHMARKS)}")
+    # OpenMP's threads, of which torch makes use, else go on spinning into the next contender's
+    # time. Read when the library is loaded.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    with vkbloom.Renderer(plan.adapter) as renderer:
+        adapter = renderer.info
+    machine = describe(plan, adapter)
+    report = Report(machine, ())
+    for name in plan.only or BENCHMARKS:
+        plan.tell(name)
+        module = importlib.import_module(f"benchmarks.{name.replace('-', '_')}")
+        section: Section = module.run(plan)
+        if plan.quick:
+            # Its figures mean nothing.
+            section.goals.clear()
+        report = Report(machine, (*report.sections, section))
+        yield report

@@ -1,0 +1,83 @@
+"""What bloom adds to a forward frame: frames with it minus frames without it."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import Final
+
+import vkbloom
+from benchmarks.plan import Plan
+from benchmarks.results import Goal, Section, Table, agreement, side_by_side
+from benchmarks.timing import Contender, alternate
+
+__all__ = ["run"]
+
+SIZE: Final = (1280, 720)
+ROUNDS: Final = 25
+NAMES: Final = {"auto": "vkbloom", "fragment": "the source's form"}
+
+
+def run(plan: Plan) -> Section:
+    """Time frames of the built-in scene with all defaults, bloom on and off."""
+    size = plan.size(*SIZE)
+    section = Section(
+        "forward",
+        f"A forward frame at {size[0]} x {size[1]}, all defaults",
+        [
+            "The built-in scene at another time in each round, so that every pass runs; `final` "
+            "is read back, by the wall clock. What bloom costs is the difference of a frame with "
+            "it and the frame of the same round without it (which has no glow mesh either).",
+        ],
+    )
+    scene = vkbloom.Scene.ufo()
+    with ExitStack() as stack:
+        # Each has a renderer of its own: one that has drawn the scene with bloom would not draw it
+        # again without.
+        renderers = {
+            (form, bloom): stack.enter_context(plan.renderer(form))
+            for form in NAMES
+            for bloom in (True, False)
+        }
+
+        def frame(form: str, turn: int, *, bloom: bool) -> vkbloom.Frames:
+            return renderers[form, bloom].render(
+                scene,
+                vkbloom.Separable(bloom=bloom),
+                size,
+                time=0.013 * turn,
+                attachments=("final",),
+            )
+
+        for turn in (0, 20, 50):
+            ours, source = (frame(form, turn, bloom=True)["final"] for form in NAMES)
+            what = f"both forms at time {0.013 * turn:g}"
+            section.agreements.append(agreement(what, ours, source, 1.0, "one level of 8 bits"))
+        contenders = [
+            Contender(
+                f"{name}, bloom {'on' if bloom else 'off'}",
+                lambda turn, form=form, bloom=bloom: frame(form, turn, bloom=bloom),  # type: ignore[misc]
+            )
+            for form, name in NAMES.items()
+            for bloom in (True, False)
+        ]
+        times = alternate(contenders, plan.times(ROUNDS))
+    section.times["frames"] = times
+    section.tables.append(side_by_side("Frames", times, f"{NAMES['auto']}, bloom on"))
+    extra = {
+        name: times[f"{name}, bloom on"].minus(times[f"{name}, bloom off"])
+        for name in NAMES.values()
+    }
+    section.times["bloom alone"] = extra
+    rows = []
+    for name, each in extra.items():
+        low, high = each.quartiles()
+        rows.append((name, f"{1e3 * each.median:.2f}", f"{1e3 * low:.2f} to {1e3 * high:.2f}"))
+    section.tables.append(
+        Table("Bloom alone", ("", "median of the differences, ms", "quartiles"), tuple(rows))
+    )
+    cost, source_cost = (each.median for each in extra.values())
+    ratio = cost / source_cost if source_cost > 0 else float("nan")
+    if all(found.agrees for found in section.agreements):
+        what = "forward frame: bloom's cost / that of the source's form"
+        section.goals.append(Goal(what, ratio, 1 / 3, at_most=True))
+    return section

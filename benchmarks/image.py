@@ -1,0 +1,140 @@
+"""An image's bloom, NumPy in and NumPy out: threshold, the forward system's nine taps, sum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+from benchmarks import peers
+from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.plan import Plan
+from benchmarks.results import Goal, Section, agreement, side_by_side
+from benchmarks.timing import Contender, Times, alternate
+
+__all__ = ["ALLOWED", "SETTINGS", "full_kernel", "run"]
+
+SETTINGS: Final = vkbloom.Separable(threshold=THRESHOLD)
+SIZE: Final = (1920, 1080)
+ROUNDS: Final = 15
+OURS: Final = "vkbloom"
+FRAGMENT: Final = "vkbloom, the source's fragment form"
+UNCHANGED: Final = "vkbloom, same image, other strength"
+
+#: How much pictures may differ by dtype, and why.
+ALLOWED: Final[dict[str, tuple[float, str]]] = {
+    "uint8": (2.0, "levels: the vertical pass, the bloom and the sum are rounded, or the sum only"),
+    "float16": (4e-3, "three roundings to half, of values up to 2 by at most 1e-3 each"),
+    "float32": (1e-4, "lavapipe's linear filter of rgba32float is that exact"),
+}
+
+_PEERS: Final = ("OpenCV", "SciPy", "scikit-image", "PyTorch")
+
+#: Ours over theirs, or theirs over ours where wanted is at least a number; of RGBA images.
+_GOALS: Final[dict[str, tuple[tuple[str, float, bool], ...]]] = {
+    "float16": (
+        ("OpenCV", 3.0, False),
+        ("OpenCV, halves by NumPy", 3.0, False),
+        (FRAGMENT, 6.0, False),
+        ("SciPy", 6.0, False),
+        ("scikit-image", 6.0, False),
+    ),
+    "float32": (("OpenCV", 1.5, True), ("SciPy", 6.0, False), ("scikit-image", 6.0, False)),
+    "uint8": (("OpenCV", 3.0, True), ("SciPy", 6.0, False), ("scikit-image", 6.0, False)),
+}
+
+
+def full_kernel(settings: vkbloom.Separable) -> NDArray[np.float32]:
+    """Return all taps of a pass, strength included, of a blur of whole texels."""
+    one_side = np.array(settings.weights[1:], np.float32) * settings.blur_strength
+    return np.concatenate([one_side[::-1], settings.weights[:1], one_side]).astype(np.float32)
+
+
+def run(plan: Plan) -> Section:
+    """Time the bloom of RGBA and RGB images of each dtype."""
+    size = plan.size(*SIZE)
+    section = Section(
+        "image",
+        f"An image's bloom at {size[0]} x {size[1]}",
+        [
+            "Hard luminance threshold, the nine taps of the forward system (strength 1.5) in both "
+            "directions, sum; NumPy array in, new NumPy array out, by the wall clock. Each round "
+            "gives every contender another image than the round before. Buffers between the steps "
+            "are kept from call to call by all that can; alpha is not asked of the peers.",
+            f'"{UNCHANGED}" has one image and another `blur_strength` in each round, so that the '
+            "image is not sent again and the threshold not run again.",
+        ],
+    )
+    for dtype in ("float16", "float32", "uint8"):
+        for channels in (4, 3):
+            _time_one(plan, section, size, np.dtype(dtype), channels)
+    section.missing = list(dict.fromkeys(section.missing))
+    return section
+
+
+def _time_one(
+    plan: Plan, section: Section, size: tuple[int, int], dtype: np.dtype[Any], channels: int
+) -> None:
+    images = pictures(size, dtype, channels)
+    group = f"{dtype.name}, {'RGBA' if channels == 4 else 'RGB'}"
+    plan.tell(f"image: {group}")
+    kernel = full_kernel(SETTINGS)
+    theirs: dict[str, peers.ImageBloom] = peers.gather(
+        _PEERS,
+        lambda peer: peer.image_bloom(images[0], kernel, THRESHOLD, plan.threads),
+        section.missing,
+    )
+    with ExitStack() as stack:
+        ours, source, unchanged = (
+            stack.enter_context(plan.renderer(form)) for form in ("auto", "fragment", "auto")
+        )
+        blooms: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
+            OURS: _bloom(ours),
+            FRAGMENT: _bloom(source),
+            **theirs,
+        }
+        picture = blooms[OURS](images[0])
+        allowed, reason = ALLOWED[dtype.name]
+        for name in list(blooms)[1:]:
+            found = agreement(f"{group}: {name}", picture, blooms[name](images[0]), allowed, reason)
+            section.agreements.append(found)
+            if not found.agrees:
+                del blooms[name]
+        contenders = [
+            Contender(name, lambda turn, bloom=bloom: bloom(images[turn % COUNT]))  # type: ignore[misc]
+            for name, bloom in blooms.items()
+        ]
+        contenders.insert(1, Contender(UNCHANGED, _other_strength(unchanged, images[0])))
+        times = alternate(contenders, plan.times(ROUNDS))
+    section.times[group] = times
+    section.tables.append(side_by_side(group, times, OURS))
+    if channels == 4:
+        section.goals += _goals(group, dtype.name, times)
+
+
+def _bloom(renderer: vkbloom.Renderer) -> Callable[[NDArray[Any]], NDArray[Any]]:
+    return lambda image: renderer.apply(image, SETTINGS, attachments=("final",))["final"]
+
+
+def _other_strength(
+    renderer: vkbloom.Renderer, image: NDArray[Any]
+) -> Callable[[int], vkbloom.Frames]:
+    def call(turn: int) -> vkbloom.Frames:
+        settings = SETTINGS.replace(blur_strength=1.0 + 0.01 * (turn % 50))
+        return renderer.apply(image, settings, attachments=("final",))
+
+    return call
+
+
+def _goals(group: str, dtype: str, times: dict[str, Times]) -> list[Goal]:
+    goals = []
+    for name, wanted, at_most in _GOALS[dtype]:
+        if name in times:
+            pair = (OURS, name) if at_most else (name, OURS)
+            ratio = times[pair[0]].over(times[pair[1]]).value
+            goals.append(Goal(f"{group}: {pair[0]} / {pair[1]}", ratio, wanted, at_most))
+    return goals

@@ -1,0 +1,153 @@
+"""CuPy: cupyx.scipy.ndimage, a kernel in CUDA written for this very bloom, and plain copies."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.inputs import REC709
+
+#: Outputs of a thread block of fused.cu, and how many rows a thread walks down.
+TILE = (64, 32)
+STRIP = 8
+
+
+def _cupy() -> Any:
+    cupy = importlib.import_module("cupy")
+    if cupy.cuda.runtime.getDeviceCount() == 0:
+        raise RuntimeError("CuPy finds no CUDA device")
+    return cupy
+
+
+def _timed(cupy: Any, work: Any) -> tuple[Any, Any, Any]:
+    """Return call, seconds and fetch of work on the device, as `gpu_bloom` gives them."""
+
+    def call(_: int) -> Any:
+        start, end = cupy.cuda.Event(), cupy.cuda.Event()
+        start.record()
+        result = work()
+        end.record()
+        end.synchronize()
+        return result, start, end
+
+    def seconds(result: Any) -> float:
+        return float(cupy.cuda.get_elapsed_time(result[1], result[2])) * 1e-3
+
+    def fetch(result: Any) -> NDArray[Any]:
+        picture: NDArray[Any] = cupy.asnumpy(result[0])
+        return picture
+
+    return call, seconds, fetch
+
+
+def gpu_bloom(
+    image: NDArray[np.float16], kernel: NDArray[np.float32], threshold: float
+) -> dict[str, tuple[Any, Any, Any]]:
+    """Return blooms of an image (H, W, 4) that lies on the GPU, with their blurs alone.
+
+    Returns
+    -------
+    dict of str to (call, seconds, fetch)
+        `call` takes the round and does it once, `seconds` gives what its result took by CUDA's
+        events, `fetch` gives the picture of a result.
+    """
+    cupy = _cupy()
+    ndimage = importlib.import_module("cupyx.scipy.ndimage")
+    source = cupy.asarray(image)
+    weights = cupy.asarray(kernel)
+    brighter = cupy.ElementwiseKernel(
+        "raw float16 image, float32 threshold",
+        "float16 glow",
+        f"""
+        const auto pixel = i / 4 * 4;
+        const float luminance = {REC709[0]}f * float(image[pixel])
+            + {REC709[1]}f * float(image[pixel + 1]) + {REC709[2]}f * float(image[pixel + 2]);
+        glow = luminance > threshold ? image[i] : float16(0);
+        """,
+        "vkbloom_bench_brighter",
+    )
+    bright = cupy.empty_like(source)
+    columns, rows = cupy.empty_like(source), cupy.empty_like(source)
+
+    # gaussian_filter1d makes its weights and calls correlate1d, which can have others.
+    def blur() -> Any:
+        ndimage.correlate1d(bright, weights, axis=0, output=columns, mode="nearest")
+        ndimage.correlate1d(columns, weights, axis=1, output=rows, mode="nearest")
+        return rows
+
+    def bloom() -> Any:
+        brighter(source, np.float32(threshold), bright)
+        return source + blur()
+
+    brighter(source, np.float32(threshold), bright)
+    fused = _fused(cupy, source, kernel, threshold)
+    return {
+        "cupyx correlate1d twice": _timed(cupy, bloom),
+        "cupyx correlate1d twice, blur alone": _timed(cupy, blur),
+        "a CUDA kernel of our own": _timed(cupy, fused),
+    }
+
+
+def _fused(cupy: Any, source: Any, kernel: NDArray[np.float32], threshold: float) -> Any:
+    """Return the bloom of `source` by fused.cu: one kernel for all of it."""
+    height, width, _ = source.shape
+    radius = len(kernel) // 2
+    options = (f"-DTILE_X={TILE[0]}", f"-DTILE_Y={TILE[1]}", f"-DSTRIP={STRIP}")
+    code = Path(__file__).with_name("fused.cu").read_text(encoding="utf-8")
+    module = cupy.RawModule(code=code, options=("--std=c++14", f"-DRADIUS={radius}", *options))
+    function = module.get_function("bloom")
+    half = np.ascontiguousarray(kernel[radius:], np.float32)
+    weights = module.get_global("weights")
+    weights.copy_from_host(half.ctypes.data, half.nbytes)
+    target = cupy.empty_like(source)
+    grid = (-(-width // TILE[0]), -(-height // TILE[1]))
+    block = ((TILE[0] + 2 * radius) * (TILE[1] // STRIP),)
+    arguments = (source, target, np.int32(width), np.int32(height), np.float32(threshold))
+
+    def run() -> Any:
+        function(grid, block, arguments)
+        return target
+
+    return run
+
+
+def gpu_copy(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
+    """Return a copy of an image's bytes from device memory to device memory, as `gpu_bloom`."""
+    cupy = _cupy()
+    source = cupy.asarray(image)
+    target = cupy.empty_like(source)
+
+    def copy() -> Any:
+        target.data.copy_from_device_async(source.data, source.nbytes, cupy.cuda.Stream.null)
+        return target
+
+    return {"plain copy on the device": _timed(cupy, copy)}
+
+
+def transfer_to_host(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
+    """Return the bare transfer of an image's bytes into pinned memory of the host.
+
+    The memory is allocated once, and nothing is done with it; by the wall clock.
+    """
+    cupy = _cupy()
+    source = cupy.asarray(image)
+    pinned = cupy.cuda.alloc_pinned_memory(source.nbytes)
+
+    def call(_: int) -> float:
+        cupy.cuda.Device().synchronize()
+        start = time.perf_counter()
+        cupy.cuda.runtime.memcpy(
+            pinned.ptr, source.data.ptr, source.nbytes, cupy.cuda.runtime.memcpyDeviceToHost
+        )
+        return time.perf_counter() - start
+
+    def fetch(_: Any) -> NDArray[Any]:
+        held: NDArray[Any] = np.frombuffer(pinned, image.dtype, image.size).reshape(image.shape)
+        return held.copy()
+
+    return {"bare transfer into pinned memory": (call, float, fetch)}

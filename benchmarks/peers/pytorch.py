@@ -1,0 +1,106 @@
+"""PyTorch: depthwise convolutions, on the CPU in 32-bit floats, on a GPU in half floats."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.inputs import REC709
+from benchmarks.peers import ImageBloom, rounded
+
+
+class _Blur:
+    """Threshold, two depthwise convolutions and, where wanted, the sum; images (1, C, H, W)."""
+
+    def __init__(self, kernel: NDArray[np.float32], channels: int, device: str, dtype: Any) -> None:
+        self._torch = importlib.import_module("torch")
+        weights = self._torch.tensor(kernel, device=device).to(dtype)
+        taps = len(kernel)
+        self._columns = weights.reshape(1, 1, taps, 1).repeat(channels, 1, 1, 1)
+        self._rows = weights.reshape(1, 1, 1, taps).repeat(channels, 1, 1, 1)
+        self._radius = taps // 2
+        self._channels = channels
+
+    def glow(self, image: Any, threshold: float) -> Any:
+        luminance = sum(weight * image[:, i : i + 1] for i, weight in enumerate(REC709))
+        return self._torch.where(luminance > threshold, image, 0)
+
+    def blur(self, image: Any) -> Any:
+        functional = self._torch.nn.functional
+        radius, groups = self._radius, self._channels
+        padded = functional.pad(image, (0, 0, radius, radius), mode="replicate")
+        columns = functional.conv2d(padded, self._columns, groups=groups)
+        padded = functional.pad(columns, (radius, radius, 0, 0), mode="replicate")
+        return functional.conv2d(padded, self._rows, groups=groups)
+
+
+def image_bloom(
+    image: NDArray[Any], kernel: NDArray[np.float32], threshold: float, threads: int
+) -> dict[str, ImageBloom]:
+    """Return blooms of images like `image`, on the CPU."""
+    torch = importlib.import_module("torch")
+    torch.set_num_threads(threads)
+    blur = _Blur(kernel, image.shape[2], "cpu", torch.float32)
+    scale = 255 if image.dtype == np.uint8 else 1
+
+    def bloom(picture: NDArray[Any]) -> NDArray[Any]:
+        with torch.inference_mode():
+            # The channels stay last in memory, which spares two transpositions.
+            single = torch.from_numpy(picture).permute(2, 0, 1)[None].float()
+            result = single + blur.blur(blur.glow(single, threshold * scale))
+            values: NDArray[Any] = result[0].permute(1, 2, 0).numpy()
+        return rounded(values, picture.dtype)
+
+    return {"PyTorch": bloom}
+
+
+def gpu_bloom(
+    image: NDArray[Any], kernel: NDArray[np.float32], threshold: float
+) -> dict[str, tuple[Any, Any, Any]]:
+    """Return the bloom and the blur alone of an image that lies on the GPU.
+
+    Returns
+    -------
+    dict of str to (call, seconds, fetch)
+        `call` takes the round and does it once, `seconds` gives what its result took by CUDA's
+        events, `fetch` gives the picture of a result.
+    """
+    torch = importlib.import_module("torch")
+    if not torch.cuda.is_available():
+        raise RuntimeError("torch finds no CUDA device")
+    # Convolutions in the format of the image, the fastest of those that cuDNN has.
+    torch.backends.cudnn.benchmark = True
+    blur = _Blur(kernel, image.shape[2], "cuda", torch.float16)
+    source = torch.tensor(image, device="cuda").permute(2, 0, 1)[None].contiguous()
+    glow = blur.glow(source, threshold)
+
+    def timed(work: Any) -> Any:
+        def call(_: int) -> Any:
+            start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+            with torch.inference_mode():
+                start.record()
+                result = work()
+                end.record()
+            end.synchronize()
+            return result, start, end
+
+        return call
+
+    def seconds(result: Any) -> float:
+        _, start, end = result
+        return float(start.elapsed_time(end)) * 1e-3
+
+    def fetch(result: Any) -> NDArray[Any]:
+        picture: NDArray[Any] = result[0][0].permute(1, 2, 0).contiguous().cpu().numpy()
+        return picture
+
+    def bloom() -> Any:
+        return source + blur.blur(blur.glow(source, threshold))
+
+    return {
+        "PyTorch conv2d": (timed(bloom), seconds, fetch),
+        "PyTorch conv2d, blur alone": (timed(lambda: blur.blur(glow)), seconds, fetch),
+    }

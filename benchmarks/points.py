@@ -1,0 +1,124 @@
+"""Many settings of one image in the best order against single calls."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterable
+from contextlib import ExitStack
+from typing import Final
+
+import numpy as np
+
+import vkbloom
+from benchmarks.inputs import THRESHOLD, picture
+from benchmarks.plan import Plan
+from benchmarks.results import Section, Table, agreement
+from benchmarks.timing import Times
+
+__all__ = ["best_order", "run", "worst_order"]
+
+SIZE: Final = (256, 256)
+BLOCKS: Final = 20
+MANY: Final = "apply_many, best order"
+CALLS: Final = "apply, best order"
+WORST: Final = "apply, worst order"
+
+
+def best_order(count: int) -> list[vkbloom.Separable]:
+    """Return settings over blur_scale x blur_strength x intensity, the last changing fastest.
+
+    So a point in most cases needs the composite only, in fewer the blur too. The axes are as
+    1 : 2 : 5, 10 x 20 x 50 for 10,000 points; with other counts the last points are left out.
+    """
+    side = 1
+    while 10 * side**3 < count:
+        side += 1
+    scales = np.linspace(1.0, 3.0, side)
+    strengths = np.linspace(0.5, 2.0, 2 * side)
+    intensities = np.linspace(0.1, 1.5, 5 * side)
+    grid = itertools.product(scales, strengths, intensities)
+    return [
+        vkbloom.Separable(
+            threshold=THRESHOLD, blur_scale=scale, blur_strength=strength, intensity=intensity
+        )
+        for scale, strength, intensity in itertools.islice(grid, count)
+    ]
+
+
+def worst_order(points: Iterable[vkbloom.Separable]) -> list[vkbloom.Separable]:
+    """Return the same points with blur_scale changing fastest: every point blurs anew."""
+    return sorted(points, key=lambda point: (point.intensity, point.blur_strength))
+
+
+def run(plan: Plan) -> Section:
+    """Time `plan.points` settings of one half-float image, in blocks that alternate."""
+    count = min(plan.points, 60) if plan.quick else plan.points
+    section = Section(
+        "points",
+        f"{count:,} points of {SIZE[0]} x {SIZE[1]}, float16 RGBA",
+        [
+            "A grid over blur_scale x blur_strength x intensity of one image, `final` of each "
+            "point taken as an array, by the wall clock. Best order: intensity changes fastest, "
+            "then blur_strength; worst order: blur_scale does, so that no point can use the blur "
+            f"of the one before. Up to {BLOCKS} blocks of points, the contenders in turn in each.",
+        ],
+    )
+    image = picture(SIZE, np.float16, 4, 0)
+    points = best_order(count)
+    work = {MANY: points, CALLS: points, WORST: worst_order(points)}
+    block = -(-count // BLOCKS)
+    seconds: dict[str, list[float]] = {name: [] for name in work}
+    passes = dict.fromkeys(work, 0)
+    with ExitStack() as stack:
+        renderers = {name: stack.enter_context(plan.renderer()) for name in work}
+        first = renderers[MANY].apply(image, points[0])
+        everything = count * len(first.timings)
+        for name, renderer in renderers.items():
+            alone = renderer.apply(image, work[name][0], attachments=("final",))["final"]
+            many = next(renderers[MANY].apply_many(image, work[name][:1], attachments=("final",)))[
+                "final"
+            ]
+            section.agreements.append(agreement(name, many, alone, 0.0, "the same computation"))
+        for start in range(0, count, block):
+            for name, renderer in renderers.items():
+                settings = work[name][start : start + block]
+                duration, ran = _time_block(renderer, image, settings, many=name == MANY)
+                seconds[name].append(duration)
+                passes[name] += ran
+    times = {name: Times(tuple(durations)) for name, durations in seconds.items()}
+    section.times["blocks of points"] = times
+    rows = []
+    for name, measured in times.items():
+        total = sum(measured.seconds)
+        rows.append(
+            (
+                name,
+                f"{total:.2f}",
+                f"{1e3 * total / count:.3f}",
+                f"{passes[name]:,} of {everything:,}",
+                str(measured.over(times[MANY])),
+            )
+        )
+    header = ("", "all, s", "ms a point", "passes run", f"times as long as {MANY} (quartiles)")
+    section.tables.append(Table("", header, tuple(rows)))
+    return section
+
+
+def _time_block(
+    renderer: vkbloom.Renderer,
+    image: np.ndarray[tuple[int, ...], np.dtype[np.generic]],
+    settings: list[vkbloom.Separable],
+    *,
+    many: bool,
+) -> tuple[float, int]:
+    """Return the seconds that the points take and how many passes ran."""
+    ran = 0
+    start = time.perf_counter()
+    if many:
+        for frames in renderer.apply_many(image, settings, attachments=("final",)):
+            ran += len(frames.timings)
+    else:
+        for point in settings:
+            ran += len(renderer.apply(image, point, attachments=("final",)).timings)
+    return time.perf_counter() - start, ran

@@ -1,0 +1,158 @@
+"""A pyramid of five levels against pygfx's bloom pass and a Gaussian of the same spread."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+from benchmarks import peers
+from benchmarks.inputs import COUNT, pictures
+from benchmarks.plan import Plan
+from benchmarks.results import Agreement, Goal, Section, Table, agreement, side_by_side
+from benchmarks.spread import spread
+from benchmarks.timing import Contender, alternate
+
+__all__ = ["run"]
+
+LEVELS: Final = 5
+SETTINGS: Final = vkbloom.Pyramid(levels=LEVELS)
+SIZE: Final = (1920, 1080)
+ROUNDS: Final = 15
+OURS: Final = "vkbloom"
+FRAGMENT: Final = "vkbloom, fragment form"
+GAUSSIAN: Final = "OpenCV GaussianBlur"
+PYGFX: Final = "pygfx"
+PYGFX_COPY: Final = "pygfx, upload and readback alone"
+
+
+def run(plan: Plan) -> Section:
+    """Time ``Pyramid(levels=5)`` of half-float RGBA images."""
+    size = plan.size(*SIZE)
+    section = Section(
+        "pyramid",
+        f"Pyramid(levels=5) at {size[0]} x {size[1]}, float16 RGBA",
+        [
+            "NumPy array in, new NumPy array out, another image in each round, by the wall clock. "
+            "pygfx runs its `PhysicalBasedBloomPass`, the same chain after Jimenez 2014, with "
+            "five levels on the same adapter at the same number of pixels. Its tent has one "
+            "radius in parts of the width for all levels where ours has one in texels of each, "
+            "so that the pictures differ; it is set so that both spread as far.",
+            "The Gaussian has the spread of ours too. OpenCV converts the halves itself.",
+        ],
+    )
+    images = pictures(size, np.float16)
+    with ExitStack() as stack:
+        ours, source = (stack.enter_context(plan.renderer(form)) for form in ("auto", "fragment"))
+        sigma, gain = spread(lambda image: _bloom_alone(ours, image), size)
+        spreads = {OURS: (sigma, gain)}
+        contenders = [
+            Contender(OURS, lambda turn: _bloom(ours, images[turn % COUNT])),
+            Contender(FRAGMENT, lambda turn: _bloom(source, images[turn % COUNT])),
+        ]
+        section.agreements.append(
+            agreement(
+                FRAGMENT,
+                _bloom(ours, images[0]),
+                _bloom(source, images[0]),
+                8e-3,
+                "nine roundings to half of values up to 2",
+            )
+        )
+        contenders += _pygfx(section, images, size, ours.info.name, spreads)
+        contenders += _gaussian(plan, section, images, spreads)
+        wrong = {found.what.partition(":")[0] for found in section.agreements if not found.agrees}
+        contenders = [each for each in contenders if each.name not in wrong]
+        times = alternate(contenders, plan.times(ROUNDS))
+    section.times["float16, RGBA"] = times
+    section.tables.append(side_by_side("float16, RGBA", times, OURS))
+    rows = tuple((name, f"{sigma:.2f}", f"{gain:.4f}") for name, (sigma, gain) in spreads.items())
+    section.tables.append(
+        Table("Spread: standard deviation of the blur alone", ("", "pixels", "gain"), rows)
+    )
+    for name, wanted in ((PYGFX, 10.0), (GAUSSIAN, 8.0)):
+        if name in times:
+            ratio = times[name].over(times[OURS]).value
+            section.goals.append(Goal(f"pyramid: {name} / {OURS}", ratio, wanted))
+    return section
+
+
+def _bloom(renderer: vkbloom.Renderer, image: NDArray[Any]) -> NDArray[Any]:
+    return renderer.apply(image, SETTINGS, attachments=("final",))["final"]
+
+
+def _bloom_alone(renderer: vkbloom.Renderer, image: NDArray[Any]) -> NDArray[Any]:
+    return renderer.apply(image, SETTINGS, attachments=("bloom",))["bloom"]
+
+
+def _pygfx(
+    section: Section,
+    images: list[NDArray[Any]],
+    size: tuple[int, int],
+    adapter: str,
+    spreads: dict[str, tuple[float, float]],
+) -> list[Contender]:
+    """Return pygfx's contenders, having set its radius to our spread."""
+    made = peers.gather(
+        (PYGFX,), lambda peer: {PYGFX: peer.Bloom(size, LEVELS, adapter)}, section.missing
+    )
+    if PYGFX not in made:
+        return []
+    peer = made[PYGFX]
+    sigma, _ = spreads[OURS]
+    peer.radius = radius = _fitting_radius(peer, size, sigma)
+    found, gain = spread(peer.bloom, size)
+    spreads[f"{PYGFX}, filter_radius {radius:.5f}"] = (found, gain)
+    reason = "the radius is found to a third of a pixel"
+    section.agreements += [
+        Agreement(f"{PYGFX}: spread, relative", abs(found / sigma - 1), 0.02, reason),
+        # pygfx adds its levels up and leaves their number to the strength.
+        Agreement(f"{PYGFX}: gain, relative", abs(gain / LEVELS - 1), 0.01, "sums of small halves"),
+    ]
+    return [
+        Contender(PYGFX, lambda turn: peer.bloom(images[turn % COUNT], 1 / LEVELS)),
+        Contender(PYGFX_COPY, lambda turn: peer.copy(images[turn % COUNT])),
+    ]
+
+
+def _fitting_radius(peer: Any, size: tuple[int, int], sigma: float) -> float:
+    """Return the radius at which pygfx's bloom has that spread, which grows with it."""
+    # In parts of the width; 40 pixels are more than twice the distance of ours at the last level.
+    low, high = 0.0, 40 / size[0]
+    for _ in range(7):
+        peer.radius = middle = (low + high) / 2
+        if spread(peer.bloom, size)[0] < sigma:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+def _gaussian(
+    plan: Plan,
+    section: Section,
+    images: list[NDArray[Any]],
+    spreads: dict[str, tuple[float, float]],
+) -> list[Contender]:
+    sigma, _ = spreads[OURS]
+    made = peers.gather(
+        ("OpenCV",),
+        lambda peer: peer.gaussian_bloom(images[0], sigma, plan.threads),
+        section.missing,
+    )
+    if GAUSSIAN not in made:
+        return []
+    bloom = made[GAUSSIAN]
+    size = (images[0].shape[1], images[0].shape[0])
+    found, gain = spread(lambda image: bloom(image).astype(np.float32) - image, size)
+    spreads[f"{GAUSSIAN}, sigma {sigma:.2f}"] = (found, gain)
+    section.agreements += [
+        Agreement(
+            f"{GAUSSIAN}: spread, relative", abs(found / sigma - 1), 0.02, "its ends are cut off"
+        ),
+        Agreement(f"{GAUSSIAN}: gain, relative", abs(gain - 1), 0.01, "sums of small halves"),
+    ]
+    return [Contender(GAUSSIAN, lambda turn: bloom(images[turn % COUNT]))]

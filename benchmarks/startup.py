@@ -1,0 +1,197 @@
+"""Import, renderer and first frame, each in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks import peers
+from benchmarks.plan import Plan
+from benchmarks.results import Section, Table
+from benchmarks.timing import Times, alternate_seconds
+
+__all__ = ["run"]
+
+ROUNDS: Final = 9
+SIZE: Final = (1280, 720)
+LONGEST: Final = 120
+
+_FIRST_FRAMES: Final = """
+import json, sys, time
+start = time.perf_counter()
+import vkbloom
+steps = {"import vkbloom": time.perf_counter() - start}
+
+def step(name, work):
+    start = time.perf_counter()
+    result = work()
+    steps[name] = time.perf_counter() - start
+    return result
+
+renderer = step("Renderer()", lambda: vkbloom.Renderer(sys.argv[1]))
+scene = step("Scene.ufo()", vkbloom.Scene.ufo)
+size = json.loads(sys.argv[2])
+for turn, name in enumerate(("first frame", "second frame")):
+    step(name, lambda: renderer.render(scene, size=size, time=0.1 * turn, attachments=("final",)))
+print(json.dumps(steps))
+"""
+
+#: How the caches of pipelines are before a process starts.
+_CACHES: Final = (
+    "no caches",
+    "vkbloom's pipeline cache",
+    "vkbloom's and the driver's caches",
+)
+
+#: Of packages whose modules are loaded when they are asked for.
+_IMPORTS: Final = {"scikit-image": "from skimage.filters import correlate_sparse"}
+
+
+def run(plan: Plan) -> Section:
+    """Time fresh processes: what they import, and how soon the first frame is there."""
+    size = plan.size(*SIZE)
+    section = Section(
+        "startup",
+        "Start-up, in fresh processes",
+        [
+            f"Forward frame of the built-in scene, {size[0]} x {size[1]}, all defaults, `final` "
+            "read back. Without caches the folder of vkbloom's pipeline cache is empty and the "
+            "driver's own shader cache is turned off; files are in the system's page cache, so "
+            "that the disk is not measured.",
+        ],
+    )
+    rounds = 1 if plan.quick else plan.times(ROUNDS)
+    _imports(plan, section, rounds)
+    _frames(plan, section, rounds, size)
+    return section
+
+
+def _child(arguments: list[str], environment: dict[str, str] | None = None) -> Any:
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"a child process failed: {done.stderr.strip()[-500:]}")
+    return done
+
+
+def _imports(plan: Plan, section: Section, rounds: int) -> None:
+    """Add how long imports take, as whole processes, and what of ours is spent where."""
+    plan.tell("startup: imports")
+    statements = {
+        "Python alone": "pass",
+        "import numpy": "import numpy",
+        "import vkbloom": "import vkbloom",
+    }
+    versions = peers.versions()
+    for name in ("OpenCV", "scikit-image", "PyTorch", "pygfx"):
+        if versions[name] is None:
+            section.missing.append(f"{name} is not installed")
+        else:
+            statement = _IMPORTS.get(name, f"import {peers.PEERS[name]}")
+            statements[statement] = statement
+
+    def process(statement: str) -> Any:
+        def once(_: int) -> float:
+            start = time.perf_counter()
+            _child(["-c", statement])
+            return time.perf_counter() - start
+
+        return once
+
+    times = alternate_seconds(
+        {name: process(statement) for name, statement in statements.items()}, rounds, warm_up=1
+    )
+    section.times["processes"] = times
+    bare = times["Python alone"]
+    rows = tuple(
+        (
+            name,
+            f"{1e3 * measured.median:.1f}",
+            f"{1e3 * measured.least:.1f}",
+            f"{1e3 * (measured.median - bare.median):.1f}",
+        )
+        for name, measured in times.items()
+    )
+    header = ("process", "median, ms", "least, ms", "more than Python alone, ms")
+    section.tables.append(Table("Imports, from start to exit of a process", header, rows))
+    section.tables.append(_import_table())
+
+
+def _import_table() -> Table:
+    """Return the slowest modules of ``import vkbloom`` but numpy's, by ``-X importtime``."""
+    lines = _child(["-X", "importtime", "-c", "import vkbloom"]).stderr.splitlines()
+    own: dict[str, int] = {}
+    whole: dict[str, int] = {}
+    for line in lines:
+        columns = line.removeprefix("import time:").split("|")
+        if len(columns) == 3 and columns[0].strip().isdigit():
+            name = columns[2].strip()
+            own[name], whole[name] = int(columns[0]), int(columns[1])
+    # What comes before `site`, Python imports for itself.
+    names = list(own)
+    later = names[names.index("site") + 1 :] if "site" in names else names
+    others = (name for name in later if name.split(".")[0] != "numpy")
+    slowest = sorted(others, key=lambda name: -own[name])[:8]
+    rows = [("vkbloom, with all it imports", f"{whole['vkbloom'] / 1e3:.1f}", "")]
+    rows.append(("of it numpy", f"{whole.get('numpy', 0) / 1e3:.1f}", ""))
+    rows += [(name, f"{whole[name] / 1e3:.1f}", f"{own[name] / 1e3:.1f}") for name in slowest]
+    header = ("module", "with its imports, ms", "itself, ms")
+    return Table("One `python -X importtime`, which itself slows imports down", header, tuple(rows))
+
+
+def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) -> None:
+    """Add how long renderer and first frames take, by the state of the caches."""
+    plan.tell("startup: first frames")
+    steps: dict[str, dict[str, list[float]]] = {name: {} for name in _CACHES}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in _CACHES[1:]:
+            # Fills the caches.
+            _first_frames(plan, name, Path(folder), size)
+        for turn in range(rounds):
+            for name in _CACHES:
+                place = Path(folder)
+                if name == _CACHES[0]:
+                    place = place / f"round{turn}"
+                for step, seconds in _first_frames(plan, name, place, size).items():
+                    steps[name].setdefault(step, []).append(seconds)
+    columns: dict[str, dict[str, Times]] = {}
+    for name, found in steps.items():
+        measured = {step: Times(tuple(seconds)) for step, seconds in found.items()}
+        until = zip(*(found[step] for step in list(found)[:-1]), strict=True)
+        measured["to the first frame in all"] = Times(tuple(sum(parts) for parts in until))
+        columns[name] = measured
+        section.times[f"first frames, {name}"] = measured
+    rows = tuple(
+        (step, *(f"{1e3 * columns[name][step].median:.1f}" for name in _CACHES))
+        for step in columns[_CACHES[0]]
+    )
+    header = ("median, ms", *_CACHES)
+    section.tables.append(Table("From import to frame", header, rows))
+
+
+def _first_frames(plan: Plan, caches: str, folder: Path, size: tuple[int, int]) -> dict[str, float]:
+    environment = dict(os.environ)
+    ours, drivers = folder / "vkbloom", folder / "driver"
+    environment["VKBLOOM_CACHE_DIR"] = str(ours)
+    # Mesa's and NVIDIA's.
+    for variable in ("MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"):
+        environment[variable] = str(drivers)
+    if caches != _CACHES[2]:
+        environment["MESA_SHADER_CACHE_DISABLE"] = "true"
+        environment["__GL_SHADER_DISK_CACHE"] = "0"
+    drivers.mkdir(parents=True, exist_ok=True)
+    done = _child(["-c", _FIRST_FRAMES, plan.adapter, json.dumps(size)], environment)
+    steps: dict[str, float] = json.loads(done.stdout)
+    return steps

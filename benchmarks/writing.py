@@ -1,0 +1,190 @@
+"""Reports as Markdown, JSON and curves."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import json
+import math
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.results import Curve, Report, Section, Table
+
+__all__ = ["as_json", "as_markdown", "write"]
+
+# From this ratio of the largest to the smallest on, an axis is logarithmic.
+_WIDE: Final = 16
+
+
+def write(report: Report, path: Path) -> list[Path]:
+    """Write a report as Markdown, and beside it as JSON and, with matplotlib, its curves.
+
+    Parameters
+    ----------
+    report : Report
+    path : Path
+        Of the Markdown file, its folder being made where it is missing; the others have its name
+        with other endings.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    charts = _draw_curves(report, path)
+    as_text = path.with_suffix(".json")
+    path.write_text(as_markdown(report, charts), encoding="utf-8")
+    as_text.write_text(json.dumps(as_json(report), indent=1) + "\n", encoding="utf-8")
+    return [path, as_text, *charts]
+
+
+def as_json(report: Report) -> dict[str, Any]:
+    """Return a report as plain values, with the seconds of every round.
+
+    What is not finite, which JSON has not, is None.
+    """
+    sections = []
+    for section in report.sections:
+        values = dataclasses.asdict(section)
+        values["agreements"] = [
+            {**dataclasses.asdict(found), "agrees": found.agrees} for found in section.agreements
+        ]
+        values["goals"] = [{**dataclasses.asdict(goal), "met": goal.met} for goal in section.goals]
+        values["times"] = {
+            group: {
+                name: {
+                    "median": times.median,
+                    "least": times.least,
+                    "quartiles": times.quartiles(),
+                    "seconds": times.seconds,
+                }
+                for name, times in measured.items()
+            }
+            for group, measured in section.times.items()
+        }
+        sections.append(values)
+    plain: dict[str, Any] = _finite({"machine": report.machine, "sections": sections})
+    return plain
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _finite(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def as_markdown(report: Report, charts: list[Path] | None = None) -> str:
+    """Return a report as a page of Markdown, with pictures of the curves where there are any."""
+    machine = report.machine
+    lines = [f"# Benchmarks on {machine['adapter']}", ""]
+    lines += [f"Written by `{machine['command']}`, {machine['date']}.", ""]
+    if machine["adapter type"] == "cpu":
+        lines += [
+            "This adapter is a CPU: all times are wall-clock times of the same cores that the "
+            "peers run on, and say nothing of a GPU.",
+            "",
+        ]
+    lines += _table(_machine_table(machine))
+    goals = [(section.id, goal) for section in report.sections for goal in section.goals]
+    if goals:
+        rows = tuple(
+            (
+                goal.what,
+                f"{'at most' if goal.at_most else 'at least'} {goal.wanted:.3g}",
+                f"{goal.ratio:.3g}",
+                "yes" if goal.met else "no",
+                name,
+            )
+            for name, goal in goals
+        )
+        header = ("ratio of medians", "wanted", "measured", "met", "benchmark")
+        lines += ["## Goals", "", *_table(Table("", header, rows))]
+    for section in report.sections:
+        lines += _section(section)
+    for chart in charts or []:
+        title = chart.stem.rpartition("-")[2]
+        lines += [f"![Cost against {title}]({chart.name})", ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _machine_table(machine: dict[str, Any]) -> Table:
+    rows = [
+        (name, "none" if value is None else str(value))
+        for name, value in machine.items()
+        if name not in ("date", "command", "peers")
+    ]
+    rows += [(name, version or "not installed") for name, version in machine["peers"].items()]
+    return Table("", ("", ""), tuple(rows))
+
+
+def _section(section: Section) -> list[str]:
+    lines = [f"## {section.title} (`{section.id}`)", ""]
+    for paragraph in section.about:
+        lines += [paragraph, ""]
+    for table in section.tables:
+        lines += _table(table)
+    if section.agreements:
+        rows = tuple(
+            (
+                found.what,
+                f"{found.largest:.3g}",
+                f"{found.allowed:.3g}",
+                "yes" if found.agrees else "**no**",
+            )
+            for found in section.agreements
+        )
+        header = ("same picture?", "largest difference", "allowed", "agrees")
+        lines += _table(Table("", header, rows))
+        reasons = dict.fromkeys((found.allowed, found.reason) for found in section.agreements)
+        lines += [*(f"- Allowed {allowed:.3g}: {reason}." for allowed, reason in reasons), ""]
+    if section.missing:
+        lines += ["Not run:", "", *(f"- {text}" for text in section.missing), ""]
+    return lines
+
+
+def _table(table: Table) -> list[str]:
+    lines = [f"**{table.caption}**", ""] if table.caption else []
+    lines.append(f"| {' | '.join(table.header)} |")
+    lines.append("|---" * len(table.header) + "|")
+    lines += [f"| {' | '.join(_cell(text) for text in row)} |" for row in table.rows]
+    return [*lines, ""]
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _draw_curves(report: Report, path: Path) -> list[Path]:
+    """Write a chart for each kind of curve; none without curves or without matplotlib."""
+    by_chart: dict[str, list[Curve]] = {}
+    for section in report.sections:
+        for curve in section.curves:
+            by_chart.setdefault(curve.chart, []).append(curve)
+    if not by_chart or find_spec("matplotlib") is None:
+        return []
+    # Without pyplot, which would look for a display.
+    figures = importlib.import_module("matplotlib.figure")
+    written = []
+    for chart, curves in by_chart.items():
+        figure = figures.Figure(figsize=(6, 4), layout="constrained")
+        axes = figure.add_subplot()
+        for curve in curves:
+            axes.plot(curve.x, curve.milliseconds, marker="o", label=curve.label)
+        if max(curves[0].x) > _WIDE * min(curves[0].x):
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0)
+        axes.set_xlabel(chart)
+        axes.set_ylabel("median, ms")
+        axes.grid(visible=True, which="both", alpha=0.25)
+        axes.legend()
+        target = path.with_name(f"{path.stem}-{chart.replace(' ', '_')}.png")
+        figure.savefig(target, dpi=120)
+        written.append(target)
+    return written

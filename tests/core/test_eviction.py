@@ -1,0 +1,111 @@
+"""What is cached has bounds, and what is used again stays."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vkbloom import Pyramid, Renderer, Separable, Settings, _core
+
+#: The core's bounds (csrc/run/age.h, pipeline.h, slots.h).
+LEAST_AGE = 64
+PIPELINES = 256
+IMAGE_BYTES = 256 << 20
+
+
+def noise(height: int, width: int) -> NDArray[np.float32]:
+    return np.random.default_rng(5).random((height, width, 4), dtype=np.float32)
+
+
+def finals(
+    renderer: Renderer, image: NDArray[np.float32], settings: Sequence[Settings]
+) -> list[NDArray[np.float32]]:
+    return [frames["final"] for frames in renderer.apply_many(image, settings)]
+
+
+def test_a_thousand_sizes_take_no_more_memory_than_a_few(
+    new_renderer: Callable[[], Renderer],
+) -> None:
+    renderer = new_renderer()
+    image = noise(70, 70)
+    cached, created = [], []
+    for side in range(1000):
+        height, width = 20 + side % 50, 20 + side // 20
+        renderer.apply(image[:height, :width], Pyramid(levels=1 + side % 16), attachments="final")
+        cached.append(renderer._core.cached)
+        created.append(renderer._core.pipeline_count)
+    # The sixteen numbers of levels come round in both halves.
+    early, late = (np.max(half, axis=0) for half in (cached[:500], cached[500:]))
+    pipelines, framebuffers, image_bytes = late
+    assert pipelines <= early[0]
+    # Of each image that is there: six levels down, five up, glow, bloom, final and the input.
+    assert framebuffers <= 2 * 15
+    # 3 images of the size and the levels, all of them smaller.
+    assert image_bytes <= 6 * 70 * 70 * 16
+    assert created[-1] == created[499]
+
+
+def test_images_that_are_old_go(new_renderer: Callable[[], Renderer]) -> None:
+    renderer = new_renderer()
+    image = noise(24, 16)
+    # Twenty images of 16 MiB.
+    large = Separable(loops=10, bloom_size=(1024, 1024), format="rgba32float")
+    expected = renderer.apply(image, large)["final"].copy()
+    assert renderer._core.cached[2] > IMAGE_BYTES
+    for step in range(LEAST_AGE - 1):
+        renderer.apply(image, Pyramid(exposure=step / 100), attachments="final")
+    assert renderer._core.cached[2] > IMAGE_BYTES
+    for step in range(2):
+        renderer.apply(image, Pyramid(exposure=step / 100), attachments="final")
+    assert renderer._core.cached[2] <= IMAGE_BYTES // 2
+    np.testing.assert_array_equal(renderer.apply(image, large)["final"], expected)
+
+
+@pytest.mark.slow
+def test_pipelines_that_are_old_go(new_renderer: Callable[[], Renderer]) -> None:
+    renderer = new_renderer()
+    names = (_core.CHOICES[name] for name in ("composite", "tonemap", "encoding"))
+    chosen = [
+        Separable(composite=composite, tonemap=tonemap, encoding=encoding, bloom_size=size)  # type: ignore[arg-type]
+        for composite, tonemap, encoding in itertools.product(*names)
+        for size in (None, (3, 3))
+    ]
+    images = [noise(4, 5).astype(dtype) for dtype in ("float32", "float16", "uint8")]
+    expected = finals(renderer, images[0], chosen[:4])
+    counts = []
+    for image, settings in itertools.product(images, chosen):
+        renderer.apply(image, settings, attachments="final")
+        counts.append(renderer._core.cached[0])
+    assert renderer._core.pipeline_count > PIPELINES + 8
+    assert max(counts) <= PIPELINES + 8
+    for got, right in zip(finals(renderer, images[0], chosen[:4]), expected, strict=True):
+        np.testing.assert_array_equal(got, right)
+
+
+def test_pipelines_do_not_go_under_submissions_that_wait(
+    new_renderer: Callable[[], Renderer],
+) -> None:
+    """Frames are taken late, while many others are made; the validation layer watches."""
+    renderer = new_renderer()
+    image = noise(8, 8)
+    waiting = renderer.apply_many(image, [Separable(exposure=step / 8) for step in range(40)])
+    next(waiting)
+    for step in range(2 * LEAST_AGE):
+        renderer.apply(noise(9, 9 + step % 5), Pyramid(exposure=step / 100))
+    assert len(list(waiting)) == 39
+
+
+def test_a_few_sizes_in_turn_make_nothing_anew(new_renderer: Callable[[], Renderer]) -> None:
+    renderer = new_renderer()
+    sizes = [(16, 16), (33, 20), (8, 50), (64, 64)]
+    created = []
+    for _ in range(3 * LEAST_AGE // len(sizes)):
+        for height, width in sizes:
+            renderer.apply(noise(height, width), Pyramid())
+            renderer.apply(noise(height, width), Separable())
+        created.append(renderer._core.pipeline_count)
+    assert created[-1] == created[0]

@@ -1,0 +1,50 @@
+"""What ``import vkbloom`` loads: what a program that renders one frame does not need comes late."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import vkbloom
+
+# NumPy loads some of the standard library itself, differently by version.
+LATE = (
+    "vkbloom.cli",
+    "vkbloom.doctor",
+    "vkbloom.explorer.viewer",
+    "vkbloom.grid",
+    "vkbloom.io",
+    "vkbloom.reference",
+    "vkbloom.scene",
+    "vkbloom.testing",
+    "vkbloom.views",
+    "hashlib",
+    "html",
+    "importlib.metadata",
+    "shutil",
+    "tempfile",
+)
+
+
+def loaded(code: str) -> set[str]:
+    code += "; import sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_the_import_loads_what_is_needed() -> None:
+    added = loaded("import vkbloom") - loaded("import numpy, numpy.typing, dataclasses")
+    assert "vkbloom.renderer" in added
+    assert sorted(added & set(LATE)) == []
+
+
+@pytest.mark.parametrize("name", [*vkbloom.__all__, "scene", "__version__"])
+def test_every_public_name_is_there_after_the_import(name: str) -> None:
+    assert getattr(vkbloom, name) is not None
+
+
+def test_late_modules_are_there_at_the_first_use() -> None:
+    code = "import vkbloom; vkbloom.reference.apply; vkbloom.scene.Mesh; vkbloom.reductions.Mean"
+    assert "vkbloom.grid.reductions" in loaded(code)
