@@ -216,6 +216,12 @@ static PyObject *new_error(const struct vkb_module_state *state, const struct er
     return type;
 }
 
+static bool add_type(PyObject *module, PyType_Spec *spec, const char *name, PyObject **type)
+{
+    *type = PyType_FromModuleAndSpec(module, spec, NULL);
+    return *type && PyModule_AddObjectRef(module, name, *type) == 0;
+}
+
 static int execute(PyObject *module)
 {
     struct vkb_module_state *state = vkb_module_state(module);
@@ -228,16 +234,12 @@ static int execute(PyObject *module)
             return -1;
     }
     state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
-    state->renderer_type = PyType_FromModuleAndSpec(module, &vkb_renderer_spec, NULL);
-    state->source_type = PyType_FromModuleAndSpec(module, &vkb_source_spec, NULL);
-    state->plan_type = PyType_FromModuleAndSpec(module, &vkb_plan_spec, NULL);
-    state->submission_type = PyType_FromModuleAndSpec(module, &vkb_submission_spec, NULL);
-    state->pages_type = PyType_FromModuleAndSpec(module, &vkb_pages_spec, NULL);
-    if (!state->renderer_type || !state->source_type || !state->plan_type || !state->submission_type
-        || !state->pages_type
-        || PyModule_AddObjectRef(module, "Renderer", state->renderer_type) < 0)
-        return -1;
-    return vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
+    return add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
+                && add_type(module, &vkb_source_spec, "Source", &state->source_type)
+                && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
+                && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
+                && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
+                && vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
                 && add_steal(module, "CHOICES", choice_table())
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0

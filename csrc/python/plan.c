@@ -200,15 +200,31 @@ static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *imag
     return tuple;
 }
 
+// The images that the pass reads, each once; returns how many.
+static uint32_t read_images(const struct vkb_pass_row *pass, uint32_t *images)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < pass->read_count; ++i) {
+        uint32_t seen = 0;
+        while (seen < count && images[seen] != pass->reads[i])
+            ++seen;
+        if (seen == count)
+            images[count++] = pass->reads[i];
+    }
+    return count;
+}
+
 static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, uint32_t index,
                                uint32_t group)
 {
     const struct vkb_pass_row *pass = &graph->passes[index];
-    uint32_t targets[VKB_MAX_TARGETS + 1];
+    uint32_t reads[VKB_MAX_READS], targets[VKB_MAX_TARGETS + 1];
+    const uint32_t read_count = read_images(pass, reads);
     const uint32_t target_count = vkb_pass_targets(pass, targets);
 
     return Py_BuildValue("(ssNNsI)", name, vkb_spirv[pass->shader].name,
-                         image_names(graph, pass->reads, pass->read_count),
+                         image_names(graph, reads, read_count),
                          image_names(graph, targets, target_count),
                          pass->variant ? pass->variant : "fragment", group);
 }

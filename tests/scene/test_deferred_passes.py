@@ -92,12 +92,12 @@ def test_the_passes() -> None:
     # A render pass is timed under the name of the first image that it writes.
     assert [row[:4] for row in passes] == [
         ("glow", "glow_frag", (), ("glow", "glow_depth")),
-        ("albedo", "gbuffer_skybox_frag", (), tuple(GBUFFER)),
-        ("albedo", "gbuffer_frag", (), tuple(GBUFFER)),
-        ("albedo", "glow_light_frag", ("glow",), tuple(GBUFFER)),
+        ("albedo", "gbuffer_sky_frag", (), tuple(GBUFFER)),
+        ("albedo", "gbuffer_body_frag", (), tuple(GBUFFER)),
+        ("albedo", "gbuffer_glow_frag", ("glow",), tuple(GBUFFER)),
         ("blur_vertical", "blur_frag", ("brightness",), ("blur_vertical",)),
         ("bloom", "blur_frag", ("blur_vertical",), ("bloom",)),
-        ("scene", "light_frag", tuple(GBUFFER[:4]), ("scene",)),
+        ("scene", "lighting_frag", tuple(GBUFFER[:4]), ("scene",)),
         ("final", "composite_frag", ("scene", "bloom"), ("final",)),
     ]
     # One render pass for all of the G-buffer.
