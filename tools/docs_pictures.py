@@ -5,12 +5,14 @@ python tools/docs_pictures.py docs/pictures
 - flow_forward.png, flow_deferred.png: every framebuffer, and which are made from which, as the
   renderer's plan says
 - gallery.jpg: the saucer with each preset
+- the flowchart of docs/plans.md, from a plan
 - profiles.png: how the light of a point falls off with each preset
 """
 
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -172,8 +174,19 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
     plt.close(figure)
 
 
+def write_flowchart(page: Path) -> None:
+    """Put the forward system's flowchart in the place of the one in a page."""
+    os.environ["VKBLOOM_FORM"] = "fragment"
+    with vkbloom.Renderer("software") as renderer:
+        plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Separable(), SIZE)
+    del os.environ["VKBLOOM_FORM"]
+    before, _, rest = page.read_text().partition("```mermaid\n")
+    page.write_text(f"{before}```mermaid\n{plan.to_mermaid()}\n```{rest.partition('```')[2]}")
+
+
 def main(folder: Path) -> None:
     """Write all pictures."""
+    write_flowchart(folder.parent / "plans.md")
     with vkbloom.Renderer("software") as renderer:
         draw_flow(renderer, "forward", vkbloom.Separable(), FORWARD, folder / "flow_forward.png")
         draw_flow(
