@@ -53,6 +53,7 @@ bool vkb_make_attributes(struct vkb_module_state *state)
 struct reader {
     const struct vkb_module_state *state;
     PyObject *object;
+    PyObject *fields;  // of a dataclass, by name; NULL: it is none
 };
 
 // The attribute, or NULL: without an exception where the object lacks it. One that its type has,
@@ -60,8 +61,11 @@ struct reader {
 static PyObject *optional_attribute(const struct reader *reader, size_t attribute)
 {
     PyObject *name = PyTuple_GetItem(reader->state->attributes, (Py_ssize_t)attribute);
-    PyObject *value = PyObject_GetAttr(reader->object, name);
 
+    // An AttributeError takes ten times as long as this look-up, and most methods lack most fields.
+    if (reader->fields && PyDict_Contains(reader->fields, name) == 0)
+        return NULL;
+    PyObject *value = PyObject_GetAttr(reader->object, name);
     if (value || !PyErr_ExceptionMatches(PyExc_AttributeError))
         return value;
     PyObject *type, *error, *traceback;
@@ -351,7 +355,19 @@ static bool read_all(const struct reader *reader, struct vkb_settings *settings)
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings)
 {
-    return read_all(&(struct reader){.state = state, .object = object}, settings);
+    PyObject *type = (PyObject *)Py_TYPE(object);
+    struct reader reader = {.state = state, .object = object};
+
+    if (PyObject_HasAttrString(type, "__dataclass_fields__")) {
+        reader.fields = PyObject_GetAttrString(type, "__dataclass_fields__");
+        if (!reader.fields)
+            return false;
+        if (!PyDict_Check(reader.fields))
+            Py_CLEAR(reader.fields);
+    }
+    const bool done = read_all(&reader, settings);
+    Py_XDECREF(reader.fields);
+    return done;
 }
 
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)
