@@ -21,6 +21,7 @@ from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
+from vkbloom.plans import Pass, Plan
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
@@ -72,6 +73,8 @@ __all__ = [
     "HdrpBloom",
     "KinoBloom",
     "OutOfMemoryError",
+    "Pass",
+    "Plan",
     "PygfxBloom",
     "Pyramid",
     "Renderer",
