@@ -142,9 +142,9 @@ def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
 
         def settle() -> None:
             # The driver keeps blocks of 64 KiB of its last pictures; those of a pixel need none.
-            for time in range(8):
+            for time in range(64):
                 tiny = vkbloom.Separable(bloom_size=(1, 1))
-                renderer.render(scene, tiny, (1, 1), time=time / 8)
+                renderer.render(scene, tiny, (1, 1), time=time / 64)
 
         return growth(action, count, settle)
 
@@ -170,7 +170,7 @@ def measure(count: int) -> dict[str, dict[str, float]]:
     return {
         "renderer": renderer_growth(count),
         "validated": renderer_growth(count // 5, validation=True),
-        "frame": growth(frame, count // 10),
+        "frame": growth(frame, count // 4),
         "open": frame_growth(scene, 4 * count),
     }
 
