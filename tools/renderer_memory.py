@@ -142,9 +142,9 @@ def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
 
         def settle() -> None:
             # The driver keeps blocks of 64 KiB of its last pictures; those of a pixel need none.
-            for time in range(64):
+            for time in range(8):
                 tiny = vkbloom.Separable(bloom_size=(1, 1))
-                renderer.render(scene, tiny, (1, 1), time=time / 64)
+                renderer.render(scene, tiny, (1, 1), time=time / 8)
 
         return growth(action, count, settle)
 
@@ -171,7 +171,7 @@ def measure(count: int) -> dict[str, dict[str, float]]:
         "renderer": renderer_growth(count),
         "validated": renderer_growth(count // 5, validation=True),
         "frame": growth(frame, count // 4),
-        "open": frame_growth(scene, 4 * count),
+        "open": frame_growth(scene, 20 * count),
     }
 
 

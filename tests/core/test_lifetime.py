@@ -134,7 +134,7 @@ Measured = dict[str, dict[str, float]]  # what tools/renderer_memory.py prints
 
 @pytest.fixture(scope="module")
 def grown() -> Measured:
-    """What 200 renderers and 800 frames leave behind."""
+    """What 200 renderers and 4,000 frames leave behind."""
     if os.environ.get("VKBLOOM_SANITIZED"):
         pytest.skip("a sanitizer's own heap is not what is measured")
     tool = Path(__file__).resolve().parents[2] / "tools" / "renderer_memory.py"
