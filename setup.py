@@ -79,19 +79,24 @@ def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
     return (*words[:first_type], *decorations, *words[first_type:])
 
 
-def compile_module(module: Module) -> tuple[int, ...]:
-    """Compile one module to its SPIR-V words."""
+def compile_shader(module: Module, target: Path) -> None:
+    """Compile one module, as glslang does, to a file."""
     compiler = shutil.which("glslangValidator") or shutil.which("glslang")
     if compiler is None:
         raise SystemExit(
             "glslangValidator is missing; on Debian or Ubuntu: apt install glslang-tools"
         )
-    target = SPIRV / f"{module.name}.spv"
     command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", *module.options]
     command += ["-o", str(target), str(module.shader)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise SystemExit(f"{module.shader} does not compile:\n{result.stdout}{result.stderr}")
+
+
+def compile_module(module: Module) -> tuple[int, ...]:
+    """Compile one module to its SPIR-V words."""
+    target = SPIRV / f"{module.name}.spv"
+    compile_shader(module, target)
     code = target.read_bytes()
     return without_contraction(struct.unpack(f"={len(code) // 4}I", code))
 
