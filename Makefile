@@ -1,5 +1,6 @@
 # make demo: sets up what is missing, renders the built-in scene into out/.
 # make test: the same for the tests, and runs them. Both are quick the second time.
+# make check: while you work: lint of the changed files and a fast part of the tests.
 # make docs: the documentation into build/docs; a warning is a failure.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
@@ -7,14 +8,35 @@ VENV := .venv
 PYTHON := $(VENV)/bin/python
 CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) setup.py pyproject.toml
 
-.PHONY: demo test docs bench lint format sanitize clean
+# Processes that the tests run in. Fixtures of a file are made once: it stays in one process.
+WORKERS := $(shell nproc 2>/dev/null || echo 2)
+PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+# Every layer from the arguments to the pictures once, no process or browser of its own, no image of
+# a full frame: what a change of the core or of a method breaks first.
+FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
+	tests/core/test_errors.py tests/core/test_frames.py tests/core/test_out_of_date.py \
+	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
+	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
+
+.PHONY: demo test check docs bench lint format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
 	$(PYTHON) examples/demo.py --out out
 
 test: build/stamp/core build/stamp/test
-	$(PYTHON) -m pytest
+	$(PYTHON) -m pytest $(PARALLEL)
+
+# Changed: against the last commit, and files that Git does not know yet.
+check: build/stamp/core build/stamp/test build/stamp/lint
+	changed=$$(git ls-files --modified --others --exclude-standard --deduplicate -- '*.py' | \
+	    while read -r file; do test ! -e "$$file" || echo "$$file"; done); \
+	    test -z "$$changed" || { $(VENV)/bin/ruff check $$changed && \
+	    $(VENV)/bin/ruff format --check $$changed && $(VENV)/bin/mypy; }
+	changed=$$(git ls-files --modified --others --exclude-standard --deduplicate -- '*.c' '*.h' | \
+	    while read -r file; do test ! -e "$$file" || echo "$$file"; done); \
+	    test -z "$$changed" || $(VENV)/bin/clang-format --dry-run -Werror $$changed
+	$(PYTHON) -m pytest -q $(PARALLEL) $(FAST)
 
 docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api

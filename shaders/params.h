@@ -29,15 +29,14 @@
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, SETTING)
 
-// A blur pass. `step_ratio` is what one texel of the width is in texels of the height; the half-kernel w0..w64 lies four to a vec4.
+// A blur pass: the distances of its taps in texels of the source, and the half-kernel w0.. of what a
+// texel at each tap counts, four to a vec4. `gain` is of a blur in both directions.
 #define BLUR_BLOCK(B, SETTING, INPUT, VEC4S) \
-    SETTING(B, blur_scale, 1.0, 0.0, 16.0) \
-    SETTING(B, blur_strength, 1.5, 0.0, 16.0) \
-    INPUT(B, float, layer_scale) \
-    INPUT(B, float, layer_strength) \
-    INPUT(B, float, step_ratio) \
+    INPUT(B, float, step_across) \
+    INPUT(B, float, step_down) \
+    INPUT(B, float, gain) \
     SAMPLING_ROWS(B, INPUT) \
-    VEC4S(B, weights, 17)
+    VEC4S(B, weights, BLUR_VEC4S)
 
 // The same blur where the source's pixels are the target's: one symmetric kernel on whole texels,
 // from the first tap to the last, then zeros. `origin` is the place of the target's first pixel along the
@@ -149,17 +148,22 @@
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \
+    REAL(blur_scale, 1.0, 0.0, 16.0) \
+    REAL(blur_strength, 1.5, 0.0, 16.0) \
     REAL(bloom_scale, 1.0, 0.001, 4.0) \
     REAL(low_frequency_boost, 0.7, 0.0, 1.0) \
     REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
     REAL(high_pass_frequency, 1.0, 0.001, 1.0) \
     REAL(scatter, 0.7, 0.0, 1.0)
 
-// The largest half float.
+// The largest values of 8 bits, of half floats and of floats.
+#define UNORM_LIMIT 1.0
 #define HALF_LIMIT 65504.0
+#define SINGLE_LIMIT 3.402823466e38
 
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
+#define BLUR_VEC4S 17
 #define MAX_LAYERS 8
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
@@ -237,6 +241,7 @@
     NAME(STORED_UNORM8, 0, unorm8) \
     NAME(STORED_HALF, 1, half) \
     NAME(STORED_SINGLE, 2, single) \
+    NAME(STORED_UNORM8_SCALED, 3, unorm8_scaled) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
     NAME(UPSAMPLE_TENT, 0, tent) \

@@ -91,5 +91,13 @@ def decode(data: bytes | None, folder: Path) -> NDArray[np.uint8]:
     return read(folder / "decoded.png")[""].pixels
 
 
+def assert_same(frames: Frames, expected: Frames) -> None:
+    """Check that the settings are equal, and each framebuffer bit for bit."""
+    assert frames.settings == expected.settings
+    assert list(frames) == list(expected)
+    for name in expected:
+        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
+
+
 def names_in(folder: Path) -> list[str]:
     return sorted(file.name for file in folder.iterdir())

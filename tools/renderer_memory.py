@@ -1,17 +1,12 @@
-"""Measure what a renderer leaves behind, and how much of it is the driver's own.
+"""Measure what renderers and frames leave behind.
 
-Three things are repeated, and the growth of the process for one repetition is shown:
+The growth of the process for one repetition of each is shown:
 
-- ``device``: a bare Vulkan instance and device, created and destroyed through ctypes, with nothing
-  of vkbloom in it;
-- ``renderer``: a `vkbloom.Renderer`, created and closed;
-- ``frame``: the same with one small frame of all framebuffers between.
-
-They are so twice: with the driver's library unloaded by the loader whenever the last instance goes
-("unloaded"), and with an instance kept open beside, so that it stays loaded ("loaded"). What the
-driver allocates once a load is lost at the unloading and shows in the first only. Last ("open"),
-the growth for one more frame of a renderer that stays open, sizes and settings changing, and of a
-sequence of frames that is left half taken.
+- ``renderer``: a `vkbloom.Renderer`, created and closed, and a list of the adapters;
+- ``validated``: the same under the validation layer;
+- ``frame``: a renderer with one small frame of all framebuffers;
+- ``open``: one more frame of a renderer that stays open, sizes and settings changing, and a
+  sequence of frames that is left half taken.
 
 What is measured, after a collection and a trim of the heap, as the median of several rounds:
 
@@ -23,7 +18,7 @@ What is measured, after a collection and a trim of the heap, as the median of se
 - ``descriptors`` and ``threads``.
 
 Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT]``, COUNT renderers
-(default 500, at least 100)
+(default 1000, at least 100)
 """
 
 from __future__ import annotations
@@ -52,8 +47,6 @@ ROUNDS = 10
 WARM_UP = 20
 SIZES = ("heap", "data", "code", "descriptors", "threads")
 
-CPU = 4  # VK_PHYSICAL_DEVICE_TYPE_CPU
-
 
 class _HeapInfo(ctypes.Structure):
     """struct mallinfo2 of <malloc.h>."""
@@ -72,51 +65,6 @@ class _HeapInfo(ctypes.Structure):
             "fordblks",
             "keepcost",
         )
-    )
-
-
-class _InstanceCreateInfo(ctypes.Structure):
-    """VkInstanceCreateInfo."""
-
-    _fields_ = (
-        ("type", ctypes.c_uint32),
-        ("next", ctypes.c_void_p),
-        ("flags", ctypes.c_uint32),
-        ("application", ctypes.c_void_p),
-        ("layer_count", ctypes.c_uint32),
-        ("layers", ctypes.c_void_p),
-        ("extension_count", ctypes.c_uint32),
-        ("extensions", ctypes.c_void_p),
-    )
-
-
-class _QueueCreateInfo(ctypes.Structure):
-    """VkDeviceQueueCreateInfo."""
-
-    _fields_ = (
-        ("type", ctypes.c_uint32),
-        ("next", ctypes.c_void_p),
-        ("flags", ctypes.c_uint32),
-        ("family", ctypes.c_uint32),
-        ("count", ctypes.c_uint32),
-        ("priorities", ctypes.c_void_p),
-    )
-
-
-class _DeviceCreateInfo(ctypes.Structure):
-    """VkDeviceCreateInfo."""
-
-    _fields_ = (
-        ("type", ctypes.c_uint32),
-        ("next", ctypes.c_void_p),
-        ("flags", ctypes.c_uint32),
-        ("queue_count", ctypes.c_uint32),
-        ("queues", ctypes.c_void_p),
-        ("layer_count", ctypes.c_uint32),
-        ("layers", ctypes.c_void_p),
-        ("extension_count", ctypes.c_uint32),
-        ("extensions", ctypes.c_void_p),
-        ("features", ctypes.c_void_p),
     )
 
 
@@ -169,53 +117,6 @@ def growth(
     return dict(zip(SIZES, middle.tolist(), strict=True))
 
 
-def _check(call: str, result: int) -> None:
-    if result != 0:
-        raise RuntimeError(f"{call} failed with {result}")
-
-
-class BareDevice:
-    """An instance and a device of the software adapter, with nothing else."""
-
-    def __init__(self) -> None:
-        self.vulkan = ctypes.CDLL("libvulkan.so.1")
-        self.instance, self.device = ctypes.c_void_p(), ctypes.c_void_p()
-        info = _InstanceCreateInfo(type=1)
-        _check(
-            "vkCreateInstance",
-            self.vulkan.vkCreateInstance(ctypes.byref(info), None, ctypes.byref(self.instance)),
-        )
-        priority = ctypes.c_float(1.0)
-        queue = _QueueCreateInfo(type=2, count=1, priorities=ctypes.addressof(priority))
-        device_info = _DeviceCreateInfo(type=3, queue_count=1, queues=ctypes.addressof(queue))
-        _check(
-            "vkCreateDevice",
-            self.vulkan.vkCreateDevice(
-                self._software(), ctypes.byref(device_info), None, ctypes.byref(self.device)
-            ),
-        )
-
-    def _software(self) -> ctypes.c_void_p:
-        count = ctypes.c_uint32(32)
-        adapters = (ctypes.c_void_p * 32)()
-        _check(
-            "vkEnumeratePhysicalDevices",
-            self.vulkan.vkEnumeratePhysicalDevices(self.instance, ctypes.byref(count), adapters),
-        )
-        for adapter in map(ctypes.c_void_p, adapters[: count.value]):
-            # VkPhysicalDeviceProperties: four 32-bit numbers, then the type; 824 bytes in all.
-            properties = (ctypes.c_uint32 * 256)()
-            self.vulkan.vkGetPhysicalDeviceProperties(adapter, properties)
-            if properties[4] == CPU:
-                return adapter
-        raise RuntimeError("there is no software adapter")
-
-    def destroy(self) -> None:
-        """Give both back."""
-        self.vulkan.vkDestroyDevice(self.device, None)
-        self.vulkan.vkDestroyInstance(self.instance, None)
-
-
 def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
     """Return the growth for one more frame of a renderer that stays open, `count` of them."""
     sizes = [(64, 36), (33, 57), (1, 1), (120, 8)]
@@ -248,17 +149,29 @@ def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
         return growth(action, count, settle)
 
 
-def measure(count: int, scene: vkbloom.Scene) -> dict[str, dict[str, float]]:
-    """Return the growth for one device, one of `count` renderers, and one that drew a frame."""
+def renderer_growth(count: int, *, validation: bool = False) -> dict[str, float]:
+    """Return the growth for one more renderer, `count` of them."""
+
+    def action() -> None:
+        vkbloom.Renderer("software", validation=validation).close()
+        vkbloom.adapters()
+
+    return growth(action, count)
+
+
+def measure(count: int) -> dict[str, dict[str, float]]:
+    """Return the growth for one of each, `count` renderers and a number of frames to suit."""
+    scene = vkbloom.Scene.ufo()
 
     def frame() -> None:
         with vkbloom.Renderer("software") as renderer:
             renderer.render(scene, size=(32, 32))
 
     return {
-        "device": growth(lambda: BareDevice().destroy(), count // 5),
-        "renderer": growth(lambda: vkbloom.Renderer("software").close(), count),
+        "renderer": renderer_growth(count),
+        "validated": renderer_growth(count // 5, validation=True),
         "frame": growth(frame, count // 10),
+        "open": frame_growth(scene, 4 * count),
     }
 
 
@@ -266,14 +179,8 @@ def main() -> None:
     """Print the growths as JSON."""
     if any(os.environ.get(name) != value for name, value in ENVIRONMENT.items()):
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **ENVIRONMENT})
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 500
-    scene = vkbloom.Scene.ufo()
-    unloaded = measure(count, scene)
-    kept = BareDevice()
-    loaded = measure(count, scene)
-    kept.destroy()
-    frames = frame_growth(scene, 4 * count)
-    print(json.dumps({"unloaded": unloaded, "loaded": loaded, "open": frames}, indent=1))
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    print(json.dumps(measure(count), indent=1))
 
 
 if __name__ == "__main__":

@@ -43,8 +43,7 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
         if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
                               error))
             return false;
-        struct vkb_pass_row row = level ? vkb_pyramid_row(&levels, VKB_SHADER_pyramid_down_frag,
-                                                          from, levels.downs[level])
+        struct vkb_pass_row row = level ? vkb_down_row(&levels, false, from, levels.downs[level])
                                         : vkb_prefilter_row(&levels, VKB_SHADER_bevy_prefilter_frag,
                                                             from, levels.downs[level]);
         if (!vkb_graph_add_pass(graph, &row, error))

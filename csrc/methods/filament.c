@@ -60,9 +60,10 @@ static bool add_down(const struct vkb_levels *levels, uint32_t level, struct vkb
     const uint32_t from = levels->downs[level - 1];
     const struct vkb_size above = levels->sizes[level - 1];
     const bool even = above.width % 2 == 0 && above.height % 2 == 0;
-    struct vkb_pass_row row =
-        vkb_pyramid_row(levels, even ? VKB_SHADER_filament_down_frag : VKB_SHADER_pyramid_down_frag,
-                        from, levels->downs[level]);
+    const uint32_t to = levels->downs[level];
+    const struct vkb_pass_row row =
+        even ? vkb_pyramid_row(levels, VKB_SHADER_filament_down_frag, from, to)
+             : vkb_down_row(levels, false, from, to);
 
     return vkb_graph_add_pass(levels->graph, &row, error);
 }

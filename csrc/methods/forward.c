@@ -16,20 +16,22 @@ static struct vkb_size buffer_size(const struct vkb_settings *settings, struct v
 static bool add_scene(const struct vkb_scene_source *source, const struct vkb_mesh_params *params,
                       struct vkb_graph *graph, uint32_t *scene, struct vkb_error *error)
 {
+    struct vkb_mesh_params stored = *params;
     uint32_t depth;
 
+    stored.limit = vkb_formats[VKB_FORMAT_RGBA8_UNORM].limit;
     if (!vkb_add_target(graph, "scene", VKB_FORMAT_RGBA8_UNORM, source->size, true, scene, error)
         || !vkb_add_target(graph, "depth", VKB_FORMAT_DEPTH32_FLOAT, source->size, true, &depth,
                            error))
         return false;
     if (source->has_sky) {
         struct vkb_pass_row sky = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX,
-                                                VKB_SHADER_skybox_frag, *scene, depth, params);
+                                                VKB_SHADER_skybox_frag, *scene, depth, &stored);
         if (!vkb_graph_add_pass(graph, &sky, error))
             return false;
     }
     struct vkb_pass_row body =
-        vkb_scene_row("scene", VKB_GEOMETRY_BODY, VKB_SHADER_phong_frag, *scene, depth, params);
+        vkb_scene_row("scene", VKB_GEOMETRY_BODY, VKB_SHADER_phong_frag, *scene, depth, &stored);
     return vkb_add_mesh(&body, source->body_textured, VKB_SHADER_phong_textured_frag, graph, error);
 }
 

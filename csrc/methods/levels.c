@@ -1,5 +1,8 @@
 #include "methods/levels.h"
 
+#include "passes/blur.h"
+
+#include <math.h>
 #include <stdio.h>
 
 struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse)
@@ -89,6 +92,34 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_sh
     return row;
 }
 
+static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t small)
+{
+    return graph->images[large].width == 2 * graph->images[small].width
+        && graph->images[large].height == 2 * graph->images[small].height;
+}
+
+struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
+                                 uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_down_frag, from, to);
+
+    if (!firefly_filter && is_twice(levels->graph, from, to))
+        row.constants[0] = SAMPLING_WHOLE;
+    row.constants[1] = firefly_filter;
+    row.constant_count = 2;
+    return row;
+}
+
+bool vkb_halves(const struct vkb_pass_row *pass)
+{
+    return pass->shader == VKB_SHADER_pyramid_down_frag && pass->constants[0] == SAMPLING_WHOLE;
+}
+
+bool vkb_doubles(const struct vkb_pass_row *pass)
+{
+    return pass->shader == VKB_SHADER_pyramid_up_frag && pass->constants[0] == SAMPLING_WHOLE;
+}
+
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                       uint32_t from, uint32_t to)
 {
@@ -114,26 +145,18 @@ static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *k
                      enum vkb_mode direction, double step, uint32_t from, uint32_t to,
                      struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_fetching_row(levels, VKB_SHADER_blur_frag, from, to);
-    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
-    struct vkb_blur_params *params = &row.params.blur;
-    const bool whole = vkb_same_size(levels->graph, from, to) && step == 1.0;
+    struct vkb_blur blur = {
+        .direction = direction,
+        .count = kernel->count,
+        .gain = 1.0,
+        .across = step,
+        .down = step,
+    };
 
-    row.block = VKB_BLOCK_blur;
-    params->blur_scale = (float)step;
-    params->blur_strength = params->layer_scale = params->layer_strength = 1.0f;
-    params->step_ratio = 1.0f;
-    params->target_width = sampling.width;
-    params->target_height = sampling.height;
-    params->limit = sampling.limit;
-    for (uint32_t i = 0; i < kernel->count; ++i)
-        params->weights[i / 4][i % 4] = kernel->weights[i];
-    row.constants[0] = direction;
-    row.constants[1] = (int32_t)kernel->count - 1;
-    row.constants[2] = 1;
-    row.constants[3] = TEXEL_OWN;
-    row.constants[4] = whole ? SAMPLING_WHOLE : SAMPLING_FETCH;
-    row.constant_count = 5;
+    for (uint32_t tap = 0; tap < kernel->count; ++tap)
+        blur.weights[tap] = kernel->weights[tap];
+    const struct vkb_pass_row row =
+        vkb_blur_row(levels->graph, levels->graph->images[to].name, &blur, from, to);
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
@@ -152,6 +175,25 @@ bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
         && add_blur(levels, kernel, DIRECTION_HORIZONTAL, across, from, step, error)
         && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
         && add_blur(levels, kernel, DIRECTION_VERTICAL, down, step, levels->downs[level], error);
+}
+
+// What the taps of an upsampling to twice the size are on whole texels: those of a pixel at a
+// quarter of a texel after a texel's centre, from the texel before it. The tent's outer taps are up
+// to one texel away; a bilinear sample is a tent of no width.
+static void find_up_taps(double radius, float taps[4])
+{
+    static const double shares[3] = {0.25, 0.5, 0.25};
+    double sums[4] = {0};
+
+    for (int tap = 0; tap < 3; ++tap) {
+        const double at = 1.25 + (tap - 1) * radius, part = at - floor(at);
+        const int texel = (int)floor(at);
+        sums[texel] += shares[tap] * (1.0 - part);
+        if (part > 0.0)
+            sums[texel + 1] += shares[tap] * part;
+    }
+    for (int i = 0; i < 4; ++i)
+        taps[i] = (float)sums[i];
 }
 
 // From the smaller level `from` to `to`, to which the level `own` is added, if there is one.
@@ -174,6 +216,12 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     if (combination->target_step) {
         params->step_x = (float)((double)smaller->width / larger->width);
         params->step_y = (float)((double)smaller->height / larger->height);
+    }
+    if (is_twice(levels->graph, to, from) && kernel != UPSAMPLE_CUBIC
+        && (kernel == UPSAMPLE_LINEAR
+            || (params->step_x == params->step_y && fabsf(params->step_x) <= 1.0f))) {
+        row.constants[0] = SAMPLING_WHOLE;
+        find_up_taps(kernel == UPSAMPLE_TENT ? params->step_x : 0.0, params->taps[0]);
     }
     params->own = (float)own_share;
     params->coarse = (float)coarse_share;

@@ -53,6 +53,16 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_sh
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                       uint32_t from, uint32_t to);
 
+// The 13 taps of a pyramid's way down, fireflies filtered or not.
+struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
+                                 uint32_t from, uint32_t to);
+
+// Whether a row is of those taps from a level of exactly twice the size, or of an upsampling to
+// exactly twice the size: then it needs whole texels alone. (Where fireflies are filtered, groups
+// of taps have weights of their own.)
+bool vkb_halves(const struct vkb_pass_row *pass);
+bool vkb_doubles(const struct vkb_pass_row *pass);
+
 // A separable blur on the way down.
 struct vkb_kernel {
     const float *weights;  // w0..

@@ -9,10 +9,9 @@ static bool add_down(struct vkb_levels *levels, uint32_t level, struct vkb_error
     if (!vkb_levels_image(levels, "down_%u", level, levels->sizes[level], &levels->downs[level],
                           error))
         return false;
-    struct vkb_pass_row row =
-        vkb_pyramid_row(levels, VKB_SHADER_pyramid_down_frag, from, levels->downs[level]);
-    row.constants[1] = levels->settings->values.firefly_filter && level == 0;
-    row.constant_count = 2;
+    const bool firefly_filter = levels->settings->values.firefly_filter && level == 0;
+    const struct vkb_pass_row row =
+        vkb_down_row(levels, firefly_filter, from, levels->downs[level]);
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

@@ -1,62 +1,36 @@
 // The separable blur: loops of a vertical and a horizontal pass, in layers that are added; or the
 // same kernel as one N x N pass.
-#include "methods/methods.h"
+#include "passes/blur.h"
 
-#include <math.h>
 #include <stdio.h>
 
-static bool whole(double number)
+// Taps between texels: the sampler's filter is good enough for 8 bits; float formats are filtered
+// by hand, for the filters of some adapters keep 8 bits of the position.
+static struct vkb_pass_row blur_row(const struct vkb_settings *settings,
+                                    const struct vkb_bloom_source *source, const char *name,
+                                    enum vkb_mode direction, uint32_t layer, double strength,
+                                    uint32_t from, uint32_t to, const struct vkb_graph *graph)
 {
-    return floor(number) == number;
-}
+    const struct vkb_image_row *read = &graph->images[from];
+    const double scale = settings->values.blur_scale * settings->layers[layer].scale;
+    // In texels of the height, one texel of the width is height / width.
+    const bool width_steps = settings->choices[VKB_CHOICE_texel] == TEXEL_X;
+    // The strength does not touch the centre, unless the taps start at 0, which adds it twice more
+    // (the outline's loop).
+    const double side = settings->values.blur_strength;
+    const double centre = settings->values.first_tap ? 1.0 : 1.0 + 2.0 * side;
+    struct vkb_blur blur = {
+        .direction = direction,
+        .count = settings->weight_count,
+        .gain = strength,
+        .across = scale,
+        .down = width_steps ? scale * read->height / read->width : scale,
+        .filter = source->format == VKB_FORMAT_RGBA8_UNORM,
+    };
 
-// Taps at whole texels are fetched. Between texels the sampler's filter is good enough for 8 bits;
-// float formats are filtered by hand, for the filters of some adapters keep 8 bits of the position.
-static int choose_sampling(const struct vkb_graph *graph, const struct vkb_bloom_source *source,
-                           const struct vkb_pass_row *row, enum vkb_mode direction,
-                           enum vkb_texel texel)
-{
-    const struct vkb_blur_params *params = &row->params.blur;
-    const double across = (double)params->blur_scale * params->layer_scale;
-    const double down = texel == TEXEL_X ? across * params->step_ratio : across;
-
-    if (vkb_same_size(graph, row->reads[0], row->targets[0])
-        && (direction == DIRECTION_VERTICAL || whole(across))
-        && (direction == DIRECTION_HORIZONTAL || whole(down)))
-        return SAMPLING_WHOLE;
-    return source->format == VKB_FORMAT_RGBA8_UNORM ? SAMPLING_FILTER : SAMPLING_FETCH;
-}
-
-static bool add_blur(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                     const char *name, enum vkb_mode direction, uint32_t layer, uint32_t from,
-                     uint32_t to, struct vkb_graph *graph, struct vkb_error *error)
-{
-    struct vkb_pass_row row = vkb_fullscreen_row(name, VKB_SHADER_blur_frag, to);
-    const struct vkb_image_row *source_row = &graph->images[from];
-    const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
-    const enum vkb_texel texel = (enum vkb_texel)settings->choices[VKB_CHOICE_texel];
-    struct vkb_blur_params *params = &row.params.blur;
-
-    row.reads[0] = from;
-    row.read_count = 1;
-    row.block = VKB_BLOCK_blur;
-    params->blur_scale = settings->values.blur.blur_scale;
-    params->blur_strength = settings->values.blur.blur_strength;
-    params->layer_scale = settings->layers[layer].scale;
-    params->layer_strength = 1.0f;
-    params->target_width = sampling.width;
-    params->target_height = sampling.height;
-    params->limit = sampling.limit;
-    params->step_ratio = (float)((double)source_row->height / source_row->width);
-    for (uint32_t i = 0; i < settings->weight_count; ++i)
-        params->weights[i / 4][i % 4] = settings->weights[i];
-    row.constants[0] = direction;
-    row.constants[1] = (int32_t)settings->weight_count - 1;
-    row.constants[2] = settings->values.first_tap;
-    row.constants[3] = texel;
-    row.constants[4] = choose_sampling(graph, source, &row, direction, texel);
-    row.constant_count = 5;
-    return vkb_graph_add_pass(graph, &row, error);
+    for (uint32_t tap = 0; tap < blur.count; ++tap)
+        blur.weights[tap] = (tap ? side : centre) * settings->weights[tap];
+    return vkb_blur_row(graph, name, &blur, from, to);
 }
 
 // A blur image between the glow and the bloom, in a pass of its own.
@@ -66,8 +40,11 @@ static bool add_step(const struct vkb_settings *settings, const struct vkb_bloom
 {
     const uint32_t from = *image;
 
-    return vkb_add_target(graph, name, source->format, source->buffers, framebuffer, image, error)
-        && add_blur(settings, source, name, direction, layer, from, *image, graph, error);
+    if (!vkb_add_target(graph, name, source->format, source->buffers, framebuffer, image, error))
+        return false;
+    const struct vkb_pass_row row =
+        blur_row(settings, source, name, direction, layer, 1.0, from, *image, graph);
+    return vkb_graph_add_pass(graph, &row, error);
 }
 
 // All of a layer but its last pass; *image is what that pass reads.
@@ -114,17 +91,16 @@ bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_blo
     // The layers' last passes follow each other, so they share a render pass and add up in it.
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer) {
         snprintf(name, sizeof name, settings->layer_count == 1 ? "bloom" : "bloom_%u", layer);
-        if (!add_blur(settings, source, name,
-                      settings->values.direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL, layer,
-                      ends[layer], *bloom, graph, error))
-            return false;
-        struct vkb_pass_row *pass = &graph->passes[graph->pass_count - 1];
-        pass->params.blur.layer_strength = settings->layers[layer].strength;
+        struct vkb_pass_row row = blur_row(
+            settings, source, name, settings->values.direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
+            layer, settings->layers[layer].strength, ends[layer], *bloom, graph);
         // Blending does not clamp: sums of the largest floats must not overflow. (Half floats keep
         // their whole range; what overflows there, the composite clamps.)
         if (source->format == VKB_FORMAT_RGBA32_FLOAT)
-            pass->params.blur.limit /= (float)settings->layer_count;
-        pass->blend = layer ? VKB_BLEND_ADD : VKB_BLEND_NONE;
+            row.params.blur.limit /= (float)settings->layer_count;
+        row.blend = layer ? VKB_BLEND_ADD : VKB_BLEND_NONE;
+        if (!vkb_graph_add_pass(graph, &row, error))
+            return false;
     }
     return true;
 }

@@ -68,6 +68,14 @@ PyObject *vkb_fault_state(PyObject *module, PyObject *unused)
                          atomic_load(&messages));
 }
 
+PyObject *vkb_fault_forget(PyObject *module, PyObject *unused)
+{
+    (void)module;
+    (void)unused;
+    vkb_fault_forget_instances();
+    Py_RETURN_NONE;
+}
+
 #else
 
 // ISO C wants something in every file.

@@ -60,7 +60,6 @@ PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
 
 static PyObject *adapters(PyObject *module, PyObject *unused)
 {
-    struct vkb_instance instance;
     struct vkb_adapter_info found[VKB_MAX_ADAPTERS];
     struct vkb_error error = {0};
     uint32_t count = 0;
@@ -68,11 +67,12 @@ static PyObject *adapters(PyObject *module, PyObject *unused)
 
     (void)unused;
     Py_BEGIN_ALLOW_THREADS
-    done = vkb_instance_create(&instance, false, &error);
-    if (done) {
-        done = vkb_adapters_list(&instance, found, &count, &error);
-        vkb_instance_destroy(&instance);
-    }
+    struct vkb_instance *instance = vkb_instance_open(false, &error);
+    done = instance && vkb_adapters_list(instance, found, &count, &error);
+    if (instance)
+        vkb_instance_close(instance);
+    if (!done)
+        vkb_instance_explain_fork(&error);
     Py_END_ALLOW_THREADS
     if (!done)
         return vkb_raise(vkb_module_state(module), &error);
@@ -95,6 +95,8 @@ static PyMethodDef functions[] = {
      "arm_fault(n, result, names): the n-th call of those names (\"\": of all) answers result."},
     {"fault_state", vkb_fault_state, METH_NOARGS,
      "(calls since then, the one that failed or \"\", blocks, validation messages)"},
+    {"forget_instances", vkb_fault_forget, METH_NOARGS,
+     "Destroys the Vulkan instances; all renderers must be closed."},
 #endif
     {0},
 };

@@ -10,6 +10,7 @@
 #include "methods/methods.h"
 #include "run/frame.h"
 #include "variants/forms.h"
+#include "vulkan/process.h"
 
 #include <stdatomic.h>
 
@@ -44,7 +45,8 @@ struct vkb_renderer {
     struct vkb_cargo *adrift;  // touched with the GIL
     long process;              // that opened it: the device is no other's, not even a forked one's
     atomic_bool open;          // changed with the lock, looked at without
-    PyObject *array_memory;    // a capsule, which the arrays hold too; NULL: closed
+    const struct vkb_messages *before;  // whose the messages are when the holder leaves
+    PyObject *array_memory;             // a capsule, which the arrays hold too; NULL: closed
     PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
     size_t pipeline_count;     // made so far; read and written with the GIL
     struct vkb_cached cached;  // read and written with the GIL
@@ -72,9 +74,6 @@ bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struc
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Takes the cargo over, whose flight may be in the air.
 void vkb_renderer_set_adrift(struct vkb_renderer *renderer, struct vkb_cargo *cargo);
-
-// Whose the device is: this process's number, whatever it was forked from.
-long vkb_current_process(void);
 
 // Memory for large arrays that the device writes to without a copy; false with an exception set.
 bool vkb_array_memory_create(struct vkb_renderer *renderer);
@@ -147,6 +146,7 @@ PyObject *vkb_describe(PyObject *module, PyObject *arguments);
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);
 PyObject *vkb_fault_state(PyObject *module, PyObject *unused);
+PyObject *vkb_fault_forget(PyObject *module, PyObject *unused);
 #endif
 
 #endif

@@ -1,22 +1,9 @@
 // The Renderer type: a device and all that lives on it.
 #include "python/module.h"
 
-#ifndef _WIN32
-#include <unistd.h>
-#endif
-
 static struct vkb_module_state *state_of(PyObject *self)
 {
     return PyType_GetModuleState(Py_TYPE(self));
-}
-
-long vkb_current_process(void)
-{
-#ifdef _WIN32
-    return 0;  // nothing forks there
-#else
-    return (long)getpid();
-#endif
 }
 
 bool vkb_renderer_is_ours(const struct vkb_renderer *self)
@@ -29,7 +16,8 @@ static bool require_ours(const struct vkb_renderer *self, struct vkb_error *erro
     return vkb_renderer_is_ours(self)
         || vkb_fail(error, VKB_ERROR_VALUE,
                     "the renderer was opened in another process (%ld), from which this one (%ld) "
-                    "was forked; open one here",
+                    "was forked; open one here, or, where the driver opens none after a fork, "
+                    "start processes by multiprocessing's method \"spawn\"",
                     self->process, vkb_current_process());
 }
 
@@ -114,6 +102,7 @@ bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
         return false;
     self->holder = PyThread_get_thread_ident();
     self->thread = PyEval_SaveThread();
+    self->before = vkb_messages_begin(&self->device.messages);
     return true;
 }
 
@@ -125,6 +114,7 @@ void vkb_renderer_leave(struct vkb_renderer *self)
         self->cached = vkb_frame_cached(&self->frame);
     }
     struct vkb_cargo *over = take_over(self);
+    vkb_messages_end(self->before);
     self->holder = 0;
     PyThread_release_lock(self->lock);
     release_all(over);
@@ -134,7 +124,7 @@ bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vk
 {
     if (!self->open || (!done && error->kind == VKB_ERROR_INTERRUPTED))
         return done;
-    return vkb_instance_check(&self->device.instance, error) && done;
+    return vkb_messages_check(&self->device.messages, error) && done;
 }
 
 // create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
@@ -151,11 +141,9 @@ static bool create(struct vkb_renderer *self, const char *adapter, bool validati
     Py_END_ALLOW_THREADS
     if (!done)
         return false;
-    self->forms = vkb_forms_by_name(forms, &self->device);
-    if (self->forms == VKB_FORMS_COUNT) {
+    if (!vkb_forms_by_name(forms, &self->device, &self->forms, error)) {
         vkb_device_destroy(&self->device);
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "VKBLOOM_FORM: %s is not one of auto, fragment, cpu, gpu", forms);
+        return false;
     }
     PyObject *cache = PyObject_CallFunction(read_cache, "y#", self->device.adapter.driver_uuid,
                                             (Py_ssize_t)VK_UUID_SIZE);
@@ -166,12 +154,14 @@ static bool create(struct vkb_renderer *self, const char *adapter, bool validati
         return false;
     }
     Py_BEGIN_ALLOW_THREADS
+    const struct vkb_messages *before = vkb_messages_begin(&self->device.messages);
     done = vkb_frame_create(&self->device, data, (size_t)size, &self->frame, error)
-        && vkb_instance_check(&self->device.instance, error);
+        && vkb_messages_check(&self->device.messages, error);
     if (!done) {
         vkb_frame_destroy(&self->device, &self->frame);
         vkb_device_destroy(&self->device);
     }
+    vkb_messages_end(before);
     Py_END_ALLOW_THREADS
     Py_DECREF(cache);
     return done;
@@ -219,30 +209,42 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
 }
 
 // With the lock, without the GIL. With the validation layer, an object left behind is a message
-// here. A device that hangs is left as it is, with all that it may still use.
+// here. A wait that is interrupted leaves the renderer open. A device that is at work for too long
+// is left as it is, with all that it may still use.
 static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
 {
-    struct vkb_error ignored;
-
     if (!self->open)
         return true;
-    if (self->device.hung) {
-        self->device.frame_seconds = 0.0;  // one slice
-        if (!vkb_frame_land(&self->device, &self->frame, &ignored)) {
-            self->open = false;
-            return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
-                            "the device is still at work; what it uses is kept until the process "
-                            "ends");
-        }
+    if (self->device.hung)
+        self->device.frame_seconds = 0.0;  // it has been waited for: one slice
+    if (!vkb_frame_end(&self->device, &self->frame, error)) {
+        if (error->kind == VKB_ERROR_INTERRUPTED)
+            return false;
+        self->open = false;
+        return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
+                        "the device is still at work; what it uses is kept until the process ends");
     }
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
     vkb_array_memory_close(self);
     self->thread = PyEval_SaveThread();
-    // The instance stays readable after its end: the messages are the renderer's own memory.
     vkb_device_destroy(&self->device);
-    return vkb_instance_check(&self->device.instance, error);
+    return vkb_messages_check(&self->device.messages, error);
+}
+
+// The device's question while nobody can be told of an exception: a Ctrl-C ends the wait, and its
+// handler runs as soon as Python's code goes on.
+static bool interrupted_at_the_end(void *asked)
+{
+    struct vkb_renderer *self = asked;
+
+    PyEval_RestoreThread(self->thread);
+    const bool pressed = PyOS_InterruptOccurred();
+    if (pressed)
+        PyErr_SetInterrupt();
+    self->thread = PyEval_SaveThread();
+    return pressed;
 }
 
 static void dealloc(PyObject *object)
@@ -252,15 +254,17 @@ static void dealloc(PyObject *object)
     freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
     struct vkb_error error = {0};
 
-    self->device.interrupted = NULL;
+    self->device.interrupted = interrupted_at_the_end;
     if (vkb_renderer_is_ours(self)) {
         self->thread = PyEval_SaveThread();
+        const struct vkb_messages *before = vkb_messages_begin(&self->device.messages);
         destroy(self, &error);
+        vkb_messages_end(before);
         PyEval_RestoreThread(self->thread);
     }
     self->open = false;
-    // A device that hangs, or another process's, is left behind, and with it what the driver may
-    // still use: what is adrift, and this object, to which the messenger brings its messages.
+    // A device that is at work still, or another process's, is left behind, and with it what the
+    // driver may still use: what is adrift, and this object, which has the device's messages.
     if (self->device.handle)
         return;
     release_all(take_over(self));
@@ -287,7 +291,6 @@ static PyObject *close_renderer(PyObject *object, PyObject *unused)
 {
     struct vkb_renderer *self = (struct vkb_renderer *)object;
     struct vkb_error error = {0};
-    bool done = true;
 
     (void)unused;
     if (!vkb_renderer_is_ours(self)) {
@@ -297,12 +300,7 @@ static PyObject *close_renderer(PyObject *object, PyObject *unused)
     }
     if (!vkb_renderer_enter(self, &error))
         return vkb_raise(state_of(object), &error);
-    // A wait that is interrupted leaves the renderer open; another failure changes nothing.
-    if (self->open && !self->device.hung)
-        done = vkb_frame_land(&self->device, &self->frame, &error)
-            || error.kind != VKB_ERROR_INTERRUPTED;
-    if (done)
-        done = destroy(self, &error);
+    const bool done = destroy(self, &error);
     vkb_renderer_leave(self);
     return done ? Py_NewRef(Py_None) : vkb_raise(state_of(object), &error);
 }

@@ -15,11 +15,6 @@ static void destroy_flight(const struct vkb_device *device, struct vkb_flight *f
 void vkb_flights_destroy(const struct vkb_device *device, struct vkb_flights *flights)
 {
     for (size_t i = 0; i < flights->count; ++i)
-        if (flights->flights[i]->airborne) {
-            device->vk.vkDeviceWaitIdle(device->handle);
-            break;
-        }
-    for (size_t i = 0; i < flights->count; ++i)
         destroy_flight(device, flights->flights[i]);
     vkb_free(flights->flights);
     *flights = (struct vkb_flights){0};
@@ -130,5 +125,23 @@ bool vkb_flights_land(struct vkb_device *device, struct vkb_flights *flights,
     for (size_t i = 0; i < flights->count; ++i)
         if (!vkb_flight_wait(device, flights, flights->flights[i], error))
             return false;
+    return true;
+}
+
+bool vkb_flights_end(struct vkb_device *device, struct vkb_flights *flights,
+                     struct vkb_error *error)
+{
+    for (size_t i = 0; i < flights->count; ++i) {
+        struct vkb_flight *flight = flights->flights[i];
+        if (vkb_flight_wait(device, flights, flight, error))
+            continue;
+        if (error->kind == VKB_ERROR_INTERRUPTED || error->result == VK_TIMEOUT)
+            return false;
+        // A wait for which there was no memory tells nothing; one that says twice that the device
+        // is lost does, and what is on a lost device can be destroyed.
+        if (!vkb_flight_wait(device, flights, flight, error)
+            && error->result != VK_ERROR_DEVICE_LOST)
+            return false;
+    }
     return true;
 }

@@ -27,7 +27,7 @@ struct vkb_flights {
     size_t count, capacity;
 };
 
-// Waits for what is in the air, then destroys all flights, those taken too.
+// Destroys all flights, those taken too. After vkb_flights_end, where some were submitted.
 void vkb_flights_destroy(const struct vkb_device *device, struct vkb_flights *flights);
 
 // A flight that nobody uses, ready for vkb_commands_begin.
@@ -54,5 +54,10 @@ bool vkb_flight_wait(struct vkb_device *device, const struct vkb_flights *flight
 // Waits for all that is in the air: what flights share can be changed by the host after this.
 bool vkb_flights_land(struct vkb_device *device, struct vkb_flights *flights,
                       struct vkb_error *error);
+
+// The same for the last time, also on a lost device: false where what flights use cannot be
+// destroyed, because the device may still be at work on it.
+bool vkb_flights_end(struct vkb_device *device, struct vkb_flights *flights,
+                     struct vkb_error *error);
 
 #endif

@@ -473,7 +473,7 @@ bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct v
     return true;
 }
 
-bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
+bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
 {
-    return vkb_flights_land(device, &frame->flights, error);
+    return vkb_flights_end(device, &frame->flights, error);
 }

@@ -40,7 +40,8 @@ struct vkb_timing {
     double seconds;  // NaN: the queue has no timestamps
 };
 
-// Destroying a zeroed or half-built object is fine.
+// Destroying a zeroed or half-built object is fine, one that flights were submitted with only after
+// vkb_frame_end.
 bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, size_t cache_size,
                       struct vkb_frame *frame, struct vkb_error *error);
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame);
@@ -80,7 +81,8 @@ struct vkb_cached {
 };
 struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame);
 
-// Waits for all flights.
-bool vkb_frame_land(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error);
+// Waits for all flights for the last time, no longer than a frame may take for each. False where
+// the frame cannot be destroyed: the wait was interrupted, or the device is at work still.
+bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error);
 
 #endif

@@ -48,8 +48,12 @@ static struct vkb_page_run *create_run(const struct vkb_device *device, size_t s
 
 static void destroy_run(const struct vkb_device *device, struct vkb_page_run *run)
 {
-    if (device)
+    // An array may go at any time, in any thread.
+    if (device) {
+        const struct vkb_messages *before = vkb_messages_begin(&device->messages);
         vkb_buffer_destroy(device, &run->buffer);
+        vkb_messages_end(before);
+    }
     vkb_free(run->start);
     vkb_free(run);
 }

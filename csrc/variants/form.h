@@ -18,9 +18,8 @@ struct vkb_form_choice {
 typedef bool vkb_form_add(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
                           bool *fits, struct vkb_error *error);
 
-// A blur's lines, whole taps and enlarged lines; an image's whole bloom in strips and tiles.
-vkb_form_add vkb_add_line, vkb_add_whole_taps, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines,
-    vkb_add_tiles;
+// A blur's lines and enlarged lines; an image's whole bloom in strips and tiles.
+vkb_form_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
 // Levels of exactly half and twice a size.
 vkb_form_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 
@@ -32,8 +31,8 @@ vkb_form_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
         [VKB_FORMAT_RGBA32_FLOAT] = VKB_SHADER_##shader##_rgba32float, \
     }
 
-// What an image of the format gives back of what is stored.
-extern const enum vkb_mode vkb_stored_as[VKB_FORMAT_COUNT];
+// What an image of the format gives back of what is stored: of STORED_*.
+enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format);
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
 // The last pass whose one target the image is; NULL: there is none.

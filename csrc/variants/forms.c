@@ -8,25 +8,37 @@ static const char *const form_names[VKB_FORMS_COUNT] = {
     [VKB_FORMS_GPU] = "gpu",
 };
 
-enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *device)
+bool vkb_forms_by_name(const char *name, const struct vkb_device *device, enum vkb_forms *forms,
+                       struct vkb_error *error)
 {
-    int forms = 0;
+    int found = 0;
 
     if (strcmp(name, "auto") == 0)
-        forms = device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_FORMS_CPU
+        found = !device->dispatch                                          ? VKB_FORMS_FRAGMENT
+              : device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_FORMS_CPU
                                                                            : VKB_FORMS_GPU;
     else
-        while (forms < VKB_FORMS_COUNT && strcmp(form_names[forms], name) != 0)
-            ++forms;
-    return forms < VKB_FORMS_COUNT && !device->dispatch ? VKB_FORMS_FRAGMENT
-                                                        : (enum vkb_forms)forms;
+        while (found < VKB_FORMS_COUNT && strcmp(form_names[found], name) != 0)
+            ++found;
+    if (found == VKB_FORMS_COUNT)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "VKBLOOM_FORM: %s is not one of auto, fragment, cpu, gpu", name);
+    if (found != VKB_FORMS_FRAGMENT && !device->dispatch)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "VKBLOOM_FORM: the compute shaders of %s cannot write images, which %s "
+                        "needs; use auto or fragment",
+                        device->adapter.name, name);
+    *forms = (enum vkb_forms)found;
+    return true;
 }
 
-const enum vkb_mode vkb_stored_as[VKB_FORMAT_COUNT] = {
-    [VKB_FORMAT_RGBA8_UNORM] = STORED_UNORM8,
-    [VKB_FORMAT_RGBA16_FLOAT] = STORED_HALF,
-    [VKB_FORMAT_RGBA32_FLOAT] = STORED_SINGLE,
-};
+enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format)
+{
+    if (format == VKB_FORMAT_RGBA8_UNORM)
+        return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? STORED_UNORM8_SCALED
+                                                                          : STORED_UNORM8;
+    return format == VKB_FORMAT_RGBA16_FLOAT ? STORED_HALF : STORED_SINGLE;
+}
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
 {
@@ -142,7 +154,6 @@ static const struct form forms_table[] = {
     {VKB_FORMS_CPU, vkb_add_doubled, 0},
     {VKB_FORMS_CPU, vkb_add_doubled_final, 0},
     {VKB_FORMS_CPU, add_pixels, 0},
-    {VKB_FORMS_GPU, vkb_add_whole_taps, 0},
     {VKB_FORMS_GPU, vkb_add_enlarged, 0},
     {VKB_FORMS_GPU, vkb_add_from_lines, 0},
     {VKB_FORMS_GPU, vkb_add_tiles, 0},

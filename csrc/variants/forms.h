@@ -11,10 +11,11 @@ enum vkb_forms {
     VKB_FORMS_COUNT,
 };
 
-// The forms of that name: "fragment", "cpu", "gpu", or "auto" for those that suit the device; on
-// one without compute shaders that write images always "fragment". VKB_FORMS_COUNT where there are
-// none.
-enum vkb_forms vkb_forms_by_name(const char *name, const struct vkb_device *device);
+// The forms of that name: "fragment", "cpu", "gpu", or "auto" for those that suit the device. A
+// VALUE error where the name is none of these, or the device has no compute shaders that write
+// images, without which there is only "fragment".
+bool vkb_forms_by_name(const char *name, const struct vkb_device *device, enum vkb_forms *forms,
+                       struct vkb_error *error);
 
 // Gives each pass of a graph its form, within what the device can do.
 bool vkb_forms_choose(enum vkb_forms forms, const struct vkb_device *device,

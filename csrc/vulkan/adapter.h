@@ -1,18 +1,10 @@
-// The Vulkan instance, the adapters that it finds, and the choice of one.
+// The adapters that an instance finds, and the choice of one.
 #ifndef VKB_ADAPTER_H
 #define VKB_ADAPTER_H
 
-#include "vulkan/error.h"
+#include "vulkan/instance.h"
 
 #include <stdint.h>
-
-struct vkb_instance {
-    VkInstance handle;
-    bool validation;
-    VkDebugUtilsMessengerEXT messenger;
-    unsigned message_count;  // validation messages since the last vkb_instance_check
-    char first_message[1024];
-};
 
 struct vkb_adapter_info {
     VkPhysicalDevice physical;
@@ -30,14 +22,6 @@ enum { VKB_MAX_ADAPTERS = 32 };
 
 // "cpu", "integrated", "discrete", "virtual" or "other".
 const char *vkb_adapter_type(const struct vkb_adapter_info *adapter);
-
-// Opens the Vulkan loader at run time; ADAPTER_NOT_FOUND says what to install.
-// The instance must not move in memory while it lives: the debug messenger points to it.
-bool vkb_instance_create(struct vkb_instance *instance, bool validation, struct vkb_error *error);
-void vkb_instance_destroy(struct vkb_instance *instance);
-
-// False, with the first validation message since the last call, where there was one.
-bool vkb_instance_check(struct vkb_instance *instance, struct vkb_error *error);
 
 // The adapters that can run vkbloom, in the system's order.
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,

@@ -5,17 +5,20 @@
 #include <string.h>
 #include <time.h>
 
-static bool has_extension(VkPhysicalDevice physical, const char *name, bool *found,
+static bool has_extension(const struct vkb_device *device, const char *name, bool *found,
                           struct vkb_error *error)
 {
+    const struct vkb_instance_table *vk = &device->instance->vk;
+    const VkPhysicalDevice physical = device->adapter.physical;
     VkExtensionProperties *extensions;
     uint32_t count = 0;
 
     *found = false;
-    if (!VK(error, vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
+    if (!VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
         || !(extensions = vkb_alloc(error, count, sizeof *extensions)))
         return false;
-    bool done = VK(error, vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
+    bool done =
+        VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
     for (uint32_t i = 0; done && i < count; ++i)
         *found |= strcmp(extensions[i].extensionName, name) == 0;
     vkb_free(extensions);
@@ -23,14 +26,14 @@ static bool has_extension(VkPhysicalDevice physical, const char *name, bool *fou
 }
 
 // Whether the device can copy to buffers in memory of the host's own.
-static bool imports_buffers(VkPhysicalDevice physical)
+static bool imports_buffers(const struct vkb_device *device)
 {
     VkExternalBufferProperties properties = {
         .sType = VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES,
     };
 
-    vkGetPhysicalDeviceExternalBufferProperties(
-        physical,
+    device->instance->vk.vkGetPhysicalDeviceExternalBufferProperties(
+        device->adapter.physical,
         &(VkPhysicalDeviceExternalBufferInfo){
             .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO,
             .usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT,
@@ -43,54 +46,54 @@ static bool imports_buffers(VkPhysicalDevice physical)
         && !(features & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
 }
 
-static VkDeviceSize import_alignment(VkPhysicalDevice physical)
+static VkDeviceSize import_alignment(const struct vkb_device *device)
 {
     VkPhysicalDeviceExternalMemoryHostPropertiesEXT host = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT,
     };
 
-    vkGetPhysicalDeviceProperties2(physical,
-                                   &(VkPhysicalDeviceProperties2){
-                                       .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
-                                       .pNext = &host,
-                                   });
+    device->instance->vk.vkGetPhysicalDeviceProperties2(
+        device->adapter.physical, &(VkPhysicalDeviceProperties2){
+                                      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
+                                      .pNext = &host,
+                                  });
     return host.minImportedHostPointerAlignment;
 }
 
 static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
+    const struct vkb_instance_table *vk = &device->instance->vk;
     VkPhysicalDeviceFeatures available;
     bool has_import;
 
-    if (!has_extension(device->adapter.physical, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME,
-                       &has_import, error))
+    if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error))
         return false;
-    has_import = has_import && imports_buffers(device->adapter.physical);
+    has_import = has_import && imports_buffers(device);
     if (has_import)
-        device->import_alignment = import_alignment(device->adapter.physical);
-    vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
+        device->import_alignment = import_alignment(device);
+    vk->vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
     device->dispatch = available.shaderStorageImageWriteWithoutFormat;
-    return VK(error,
-              vkCreateDevice(device->adapter.physical,
-                             &(VkDeviceCreateInfo){
-                                 .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                                 .pEnabledFeatures =
-                                     &(VkPhysicalDeviceFeatures){
-                                         .shaderStorageImageWriteWithoutFormat = device->dispatch,
-                                     },
-                                 .queueCreateInfoCount = 1,
-                                 .pQueueCreateInfos =
-                                     &(VkDeviceQueueCreateInfo){
-                                         .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                                         .queueFamilyIndex = device->adapter.queue_family,
-                                         .queueCount = 1,
-                                         .pQueuePriorities = &(float){1.0f},
-                                     },
-                                 .enabledExtensionCount = has_import ? 1 : 0,
-                                 .ppEnabledExtensionNames =
-                                     (const char *[]){VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME},
-                             },
-                             NULL, &device->handle));
+    return VK(error, vk->vkCreateDevice(
+                         device->adapter.physical,
+                         &(VkDeviceCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                             .pEnabledFeatures =
+                                 &(VkPhysicalDeviceFeatures){
+                                     .shaderStorageImageWriteWithoutFormat = device->dispatch,
+                                 },
+                             .queueCreateInfoCount = 1,
+                             .pQueueCreateInfos =
+                                 &(VkDeviceQueueCreateInfo){
+                                     .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                     .queueFamilyIndex = device->adapter.queue_family,
+                                     .queueCount = 1,
+                                     .pQueuePriorities = &(float){1.0f},
+                                 },
+                             .enabledExtensionCount = has_import ? 1 : 0,
+                             .ppEnabledExtensionNames =
+                                 (const char *[]){VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME},
+                         },
+                         NULL, &device->handle));
 }
 
 static uint64_t timestamp_mask(const struct vkb_device *device)
@@ -98,7 +101,8 @@ static uint64_t timestamp_mask(const struct vkb_device *device)
     VkQueueFamilyProperties families[16];
     uint32_t count = sizeof families / sizeof families[0];
 
-    vkGetPhysicalDeviceQueueFamilyProperties(device->adapter.physical, &count, families);
+    device->instance->vk.vkGetPhysicalDeviceQueueFamilyProperties(device->adapter.physical, &count,
+                                                                  families);
     uint32_t bits = families[device->adapter.queue_family].timestampValidBits;
     return bits >= 64 ? UINT64_MAX : (UINT64_C(1) << bits) - 1;
 }
@@ -111,46 +115,66 @@ static uint32_t smallest(uint32_t a, uint32_t b)
 // What is asked again and again, or when the device may be gone.
 static void read_properties(struct vkb_device *device)
 {
+    const struct vkb_instance_table *vk = &device->instance->vk;
     VkPhysicalDeviceProperties properties;
     const VkPhysicalDeviceLimits *limits = &device->limits;
 
-    vkGetPhysicalDeviceMemoryProperties(device->adapter.physical, &device->memory);
-    vkGetPhysicalDeviceProperties(device->adapter.physical, &properties);
+    vk->vkGetPhysicalDeviceMemoryProperties(device->adapter.physical, &device->memory);
+    vk->vkGetPhysicalDeviceProperties(device->adapter.physical, &properties);
     device->limits = properties.limits;
     device->max_side = smallest(smallest(limits->maxFramebufferWidth, limits->maxFramebufferHeight),
                                 smallest(limits->maxImageDimension2D, VKB_MAX_SIDE));
     for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format) {
         VkFormatProperties ways;
-        vkGetPhysicalDeviceFormatProperties(device->adapter.physical, vkb_formats[format].vk,
-                                            &ways);
+        vk->vkGetPhysicalDeviceFormatProperties(device->adapter.physical, vkb_formats[format].vk,
+                                                &ways);
         device->features[format] = ways.optimalTilingFeatures;
     }
     device->timestamp_mask = timestamp_mask(device);
+}
+
+static bool create_handle(struct vkb_device *device, const char *adapter_choice, bool validation,
+                          struct vkb_error *error)
+{
+    device->instance = vkb_instance_open(validation, error);
+    if (!device->instance
+        || !vkb_adapter_choose(device->instance, adapter_choice, &device->adapter, error)
+        || !create_logical(device, error))
+        return false;
+    vkb_instance_load_device(device->instance, device->handle, &device->vk);
+    device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
+    read_properties(device);
+    return true;
 }
 
 bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bool validation,
                        struct vkb_error *error)
 {
     *device = (struct vkb_device){0};
-    if (!vkb_instance_create(&device->instance, validation, error))
-        return false;
-    if (!vkb_adapter_choose(&device->instance, adapter_choice, &device->adapter, error)
-        || !create_logical(device, error)) {
+    if (validation)
+        vkb_messages_open(&device->messages);
+    const struct vkb_messages *before = vkb_messages_begin(&device->messages);
+    const bool done = create_handle(device, adapter_choice, validation, error);
+    vkb_messages_end(before);
+    if (!done) {
         vkb_device_destroy(device);
-        return false;
+        vkb_instance_explain_fork(error);
     }
-    volkLoadDeviceTable(&device->vk, device->handle);
-    device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
-    read_properties(device);
-    return true;
+    return done;
 }
 
 void vkb_device_destroy(struct vkb_device *device)
 {
+    const struct vkb_messages *before = vkb_messages_begin(&device->messages);
+
     if (device->handle)
         device->vk.vkDestroyDevice(device->handle, NULL);
     device->handle = VK_NULL_HANDLE;
-    vkb_instance_destroy(&device->instance);
+    if (device->instance)
+        vkb_instance_close(device->instance);
+    device->instance = NULL;
+    vkb_messages_end(before);
+    vkb_messages_close(&device->messages);
 }
 
 bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format,
@@ -168,9 +192,10 @@ bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
 
     if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU)
         return false;
-    vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
+    device->instance->vk.vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format,
+                                                             &properties);
     return (properties.linearTilingFeatures & features) == features
-        && VK_RESULT(vkGetPhysicalDeviceImageFormatProperties(
+        && VK_RESULT(device->instance->vk.vkGetPhysicalDeviceImageFormatProperties(
                device->adapter.physical, format, VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage, 0,
                &limits))
                == VK_SUCCESS

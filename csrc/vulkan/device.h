@@ -4,12 +4,13 @@
 
 #include "vulkan/adapter.h"
 #include "vulkan/format.h"
+#include "vulkan/messages.h"
 
 #include <stdatomic.h>
-#include <volk.h>
 
 struct vkb_device {
-    struct vkb_instance instance;
+    struct vkb_instance *instance;
+    struct vkb_messages messages;  // stay readable after the device's end
     struct vkb_adapter_info adapter;
     VkDevice handle;
     struct VolkDeviceTable vk;
@@ -30,7 +31,9 @@ struct vkb_device {
     double frame_seconds;  // how long a wait may take for each frame that is waited for
 };
 
-// `device` must not move in memory while it lives, as the instance in it.
+// `device` must not move in memory while it lives, as the messages in it. Whoever calls Vulkan with
+// it is between vkb_messages_begin(&device->messages) and vkb_messages_end; these two do so
+// themselves.
 bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bool validation,
                        struct vkb_error *error);
 void vkb_device_destroy(struct vkb_device *device);

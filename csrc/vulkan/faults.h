@@ -12,9 +12,12 @@ bool vkb_fault(const char *call_text);
 // What it answers.
 extern VkResult vkb_fault_result;
 
-// Blocks of vkb_alloc and vkb_grow that are there, and validation messages that ever came: also of
-// instances that nobody can ask any more.
+// Blocks of vkb_alloc and vkb_grow that are there, and validation messages that ever came: also
+// those that no device got.
 void vkb_fault_blocks(int more);
 void vkb_fault_message(void);
+
+// Destroys the instances, which no device may use any more: the next ones are made anew.
+void vkb_fault_forget_instances(void);
 
 #endif

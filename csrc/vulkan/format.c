@@ -15,7 +15,7 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .channels = 4,
             .channel_size = 1,
             .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
-            .limit = FLT_MAX,
+            .limit = (float)UNORM_LIMIT,
         },
     [VKB_FORMAT_RGBA16_FLOAT] =
         {

@@ -6,12 +6,11 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom._core import Error
 from vkbloom.adapter import AdapterInfo
 from vkbloom.checks import check_attachments, check_image, check_size, check_time
 from vkbloom.frames import Frames
@@ -105,7 +104,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range.
+        `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
+        what the adapter cannot run.
 
     Notes
     -----
@@ -116,33 +116,26 @@ class Renderer:
     be used again; closing waits for what the device is still at work on. A device that takes longer
     than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
     number. After a fork the child opens a renderer of its own, where the driver can; its parent's
-    raise ValueError.
-    """
+    raise ValueError. NVIDIA's driver cannot: start processes by multiprocessing's method "spawn".
 
-    #: The process that opened the last one: any other has been forked from it since.
-    _opened_in: ClassVar[int | None] = None
+    The first renderer, or list of `adapters`, opens the Vulkan loader for the life of the process:
+    drivers that are installed later, and variables such as VK_DRIVER_FILES that are set later, are
+    seen by new processes only.
+    """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
             raise TypeError(f"adapter: a name is needed, not {adapter!r}")
+        if not adapter:
+            raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         forms = os.environ.get("VKBLOOM_FORM") or "auto"
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
-        try:
-            self._core = _core.Renderer(
-                adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
-            )
-        except Error as error:
-            if self._opened_in not in (None, os.getpid()):
-                error.add_note(
-                    "This process was forked from one that had opened a renderer, which some "
-                    "drivers (NVIDIA's among them) refuse to work after; start it by "
-                    'multiprocessing\'s method "spawn" or "forkserver".'
-                )
-            raise
-        Renderer._opened_in = os.getpid()
+        self._core = _core.Renderer(
+            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+        )
         *fields, self._driver_uuid = self._core.info
         self.info = AdapterInfo(*fields)
         self._made_by = {

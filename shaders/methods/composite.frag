@@ -22,7 +22,8 @@ vec3 bloom_light()
 {
     if (BLOOM == BLOOM_OWN)
         return texelFetch(bloom, PIXEL, 0).rgb;
-    int sampling = BLOOM_FORMAT == STORED_UNORM8 ? SAMPLING_FILTER : SAMPLING_FETCH;
+    bool floats = BLOOM_FORMAT == STORED_HALF || BLOOM_FORMAT == STORED_SINGLE;
+    int sampling = floats ? SAMPLING_FETCH : SAMPLING_FILTER;
     vec3 light = sample_bordered(bloom, PIXEL, textureSize(scene, 0), sampling).rgb;
     return as_stored(light, BLOOM_FORMAT);
 }

@@ -25,8 +25,28 @@ float group_share(vec3 mean, float share)
     return share / (1.0 + max(dot(mean, vec3(0.2126, 0.7152, 0.0722)), 0.0));
 }
 
+// The 13 taps from a level of exactly twice the size, where they lie between texels: the sum of two
+// separable kernels, as in all variants of such a pass (variants/halve.comp).
+vec3 halved()
+{
+    vec3 sum = vec3(0.0);
+    for (int row = 0; row < 6; ++row) {
+        vec3 texels[6];
+        for (int i = 0; i < 6; ++i)
+            texels[i] = fetch_clamped(source, 2 * PIXEL + ivec2(i, row) - 2).rgb;
+        vec3 inner = texels[2] + texels[3];
+        vec3 four = inner + texels[1] + texels[4];
+        vec3 six = four + inner + texels[0] + texels[5];
+        sum += six / (row == 2 || row == 3 ? 64.0 : 128.0)
+             + (row == 0 || row == 5 ? vec3(0.0) : four / 32.0);
+    }
+    return sum;
+}
+
 vec4 shade()
 {
+    if (SAMPLING == SAMPLING_WHOLE)
+        return vec4(storable(halved()), 1.0);
     vec3 means[5] = group_means(PLACE_IN(source));
     vec3 sum = vec3(0.0);
     float shares = 0.0;

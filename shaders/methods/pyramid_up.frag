@@ -7,6 +7,7 @@
 
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
+#include "lib/doubling.glsl"
 
 layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
 layout(constant_id = 1) const int ADD_OWN = 1;
@@ -31,8 +32,24 @@ vec3 tent(Place place)
     return sum;
 }
 
+// The same, or one bilinear tap, where the level is exactly twice as large as the smaller one.
+vec3 doubled()
+{
+    ivec2 first = (PIXEL + 1) / 2 - 2;
+    vec3 rows[4];
+    for (int y = 0; y < 4; ++y) {
+        vec3 texels[4];
+        for (int x = 0; x < 4; ++x)
+            texels[x] = fetch_clamped(smaller, first + ivec2(x, y)).rgb;
+        rows[y] = four(texels[0], texels[1], texels[2], texels[3], (PIXEL.x & 1) == 1);
+    }
+    return four(rows[0], rows[1], rows[2], rows[3], (PIXEL.y & 1) == 1);
+}
+
 vec3 upsample(Place place)
 {
+    if (SAMPLING == SAMPLING_WHOLE)
+        return doubled();
     if (UPSAMPLE == UPSAMPLE_LINEAR)
         return sample_at(smaller, place, vec2(0.0), SAMPLING).rgb;
     if (UPSAMPLE == UPSAMPLE_CUBIC)

@@ -1,6 +1,10 @@
 // The lit mesh of the forward system.
+#include "lib/block.glsl"
 #include "scene/phong.glsl"
 #include "scene/surface.glsl"
+
+UNIFORM_BLOCK(MESH_BLOCK);
+#include "lib/storage.glsl"
 
 layout(location = 0) in vec3 view_position;
 layout(location = 1) in vec3 view_normal;
@@ -8,5 +12,6 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    colour = vec4(phong(surface_colour(), LAMP, normalize(view_normal), view_position), 1.0);
+    vec3 lit = phong(surface_colour(), LAMP, normalize(view_normal), view_position);
+    colour = vec4(storable(lit), 1.0);
 }

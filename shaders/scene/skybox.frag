@@ -1,5 +1,10 @@
 #version 450
+#extension GL_GOOGLE_include_directive : require
 // The sky, looked up by the position on the cube.
+#include "lib/block.glsl"
+
+UNIFORM_BLOCK(MESH_BLOCK);
+#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform samplerCube sky;
 
@@ -8,5 +13,5 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    colour = vec4(texture(sky, direction).rgb, 1.0);
+    colour = vec4(storable(texture(sky, direction).rgb), 1.0);
 }

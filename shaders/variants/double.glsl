@@ -1,19 +1,12 @@
-// From a level to one of exactly twice its size: a side, each pixel is a sum of four texels whose
-// weights (`taps`) are mirrored from one pixel to the next. An invocation walks down a strip and
-// loads each texel once. A shader that includes this has `smaller`, `target`, and what a pixel makes
-// of its sum.
+// From a level to one of exactly twice its size. An invocation walks down a strip and loads each
+// texel once. A shader that includes this has `smaller`, `target`, and what a pixel makes of its sum.
+#include "lib/doubling.glsl"
 
 vec4 shade(ivec2 pixel, vec3 sum);
 
 // Texels of the smaller level, columns and rows; a pixel of an odd place starts one texel later.
 const int LOADED = DOUBLE_COLUMNS / 2 + 4;
 const int KEPT = 5;
-
-vec3 four(vec3 a, vec3 b, vec3 c, vec3 d, bool odd)
-{
-    vec4 taps = odd ? params.taps[0] : params.taps[0].wzyx;
-    return taps.x * a + taps.y * b + taps.z * c + taps.w * d;
-}
 
 void store(ivec2 pixel, vec3 sum, ivec2 size)
 {

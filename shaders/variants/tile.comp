@@ -19,29 +19,32 @@ shared uint sums[WORDS][TILE_ROWS][TILE_LOADED];
 
 void keep_sum(int row, int column, vec3 sum)
 {
-    vec3 kept = as_stored(sum, FORMAT);
-    if (FORMAT == STORED_UNORM8) {
-        sums[0][row][column] = packUnorm4x8(vec4(kept, 0.0));
+    if (FORMAT == STORED_SINGLE) {
+        for (int channel = 0; channel < WORDS; ++channel)
+            sums[channel][row][column] = floatBitsToUint(as_stored(sum, FORMAT)[channel]);
     } else if (FORMAT == STORED_HALF) {
+        vec3 kept = as_stored(sum, FORMAT);
         sums[0][row][column] = packHalf2x16(kept.rg);
         sums[WORDS - 1][row][column] = packHalf2x16(kept.bb);
     } else {
-        for (int channel = 0; channel < WORDS; ++channel)
-            sums[channel][row][column] = floatBitsToUint(kept[channel]);
+        uvec3 level = uvec3(nearest_level(sum));
+        sums[0][row][column] = level.r | level.g << 8 | level.b << 16;
     }
 }
 
 vec3 kept_sum(int row, int column)
 {
-    if (FORMAT == STORED_UNORM8)
-        return unpackUnorm4x8(sums[0][row][column]).rgb;
+    if (FORMAT == STORED_SINGLE) {
+        vec3 sum;
+        for (int channel = 0; channel < WORDS; ++channel)
+            sum[channel] = uintBitsToFloat(sums[channel][row][column]);
+        return sum;
+    }
     if (FORMAT == STORED_HALF)
         return vec3(unpackHalf2x16(sums[0][row][column]),
                     unpackHalf2x16(sums[WORDS - 1][row][column]).x);
-    vec3 sum;
-    for (int channel = 0; channel < WORDS; ++channel)
-        sum[channel] = uintBitsToFloat(sums[channel][row][column]);
-    return sum;
+    uint levels = sums[0][row][column];
+    return from_level(vec3(uvec3(levels, levels >> 8, levels >> 16) & 255u), FORMAT);
 }
 
 // A run of vertical sums in one column, each texel loaded once.

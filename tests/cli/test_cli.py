@@ -19,6 +19,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.cli.processes import python
 from vkbloom.cli import fields
 from vkbloom.cli.program import COMMANDS, blaming_the_call, program
 from vkbloom.cli.settings_options import METHODS, settings_options
@@ -505,16 +506,6 @@ def test_no_adapter_is_a_failure(
 
 
 # As a process
-
-
-def python(*arguments: str, **changes: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *arguments],
-        env={**os.environ, **changes},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def test_the_process_ends_with_the_status() -> None:

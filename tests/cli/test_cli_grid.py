@@ -43,7 +43,7 @@ def done(*arguments: Any) -> str:
 
 
 @pytest.fixture
-def picture(tmp_path: Path) -> Path:
+def image_file(tmp_path: Path) -> Path:
     values = np.random.default_rng(5).random((9, 12, 3)).astype(np.float32)
     save(Picture.of_values(values, "float"), tmp_path / "a.exr")
     return tmp_path / "a.exr"
@@ -117,10 +117,10 @@ class TestStores:
         assert load(tmp_path / "s.png").pixels.shape[2] == 3
         assert "<svg" in (tmp_path / "c.svg").read_text()
 
-    def test_images_by_their_names(self, tmp_path: Path, picture: Path) -> None:
+    def test_images_by_their_names(self, tmp_path: Path, image_file: Path) -> None:
         save(Picture.of_values(noise(9, 12, 3, dtype="float32"), "float"), tmp_path / "b.exr")
         done(
-            picture,
+            image_file,
             tmp_path / "b.exr",
             "--axis",
             "radius=1,2",
@@ -129,16 +129,16 @@ class TestStores:
             "--attachments",
             "none",
             "--reduce",
-            f"psnr@{picture}",
+            f"psnr@{image_file}",
             "-o",
             tmp_path / "a.zarr",
         )
         found = xr.open_zarr(tmp_path / "a.zarr")
         assert set(found) == {"done", "psnr"}
-        assert list(found["image"].values) == [str(picture), str(tmp_path / "b.exr")]
+        assert list(found["image"].values) == [str(image_file), str(tmp_path / "b.exr")]
 
-    def test_resumed_only_when_asked(self, tmp_path: Path, picture: Path) -> None:
-        words = [picture, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
+    def test_resumed_only_when_asked(self, tmp_path: Path, image_file: Path) -> None:
+        words = [image_file, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
         done(*words)
         (tmp_path / "a.zarr" / "final" / "c.0.0.0.0").write_bytes(b"")
         again = run(*words)
@@ -152,8 +152,8 @@ class TestStores:
         assert other.exit_code == 1
         assert "settings.intensity: 1.0 in the store, 0.5 asked for" in other.stderr
 
-    def test_workers(self, tmp_path: Path, picture: Path) -> None:
-        words = [picture, "--axis", "exposure=0:1:4"]
+    def test_workers(self, tmp_path: Path, image_file: Path) -> None:
+        words = [image_file, "--axis", "exposure=0:1:4"]
         # Dask's own port is often taken, by a notebook's cluster or another grid.
         with socket.socket() as other:
             with contextlib.suppress(OSError):
@@ -165,10 +165,10 @@ class TestStores:
         found, expected = (xr.open_zarr(tmp_path / name) for name in ("a.zarr", "b.zarr"))
         np.testing.assert_array_equal(found["final"].values, expected["final"].values)
 
-    def test_an_interrupt_of_all_processes(self, tmp_path: Path, picture: Path) -> None:
+    def test_an_interrupt_of_all_processes(self, tmp_path: Path, image_file: Path) -> None:
         """Ctrl-C on a terminal, which the workers get as well."""
         out = tmp_path / "a.zarr"
-        words = [picture, "-o", out, "--axis", "exposure=0:1:5000", "--workers", "2"]
+        words = [image_file, "-o", out, "--axis", "exposure=0:1:5000", "--workers", "2"]
         running = subprocess.Popen(
             [sys.executable, "-m", "vkbloom.cli", "grid", *map(str, words)],
             stdout=subprocess.PIPE,
@@ -200,41 +200,41 @@ class TestStores:
         ],
         ids=str,
     )
-    def test_wrong_use(self, tmp_path: Path, picture: Path, words: list[str], told: str) -> None:
+    def test_wrong_use(self, tmp_path: Path, image_file: Path, words: list[str], told: str) -> None:
         out = tmp_path / "a.zarr"
-        result = run(picture, "--axis", "blur_scale=1,2", "-o", out, *words)
+        result = run(image_file, "--axis", "blur_scale=1,2", "-o", out, *words)
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert told in result.stderr
         assert not out.exists()
 
-    def test_a_reference_of_several_images(self, tmp_path: Path, picture: Path) -> None:
-        arrays = {"glow": noise(9, 12, 3, dtype="float32"), "final": load(picture).pixels}
+    def test_a_reference_of_several_images(self, tmp_path: Path, image_file: Path) -> None:
+        arrays = {"glow": noise(9, 12, 3, dtype="float32"), "final": load(image_file).pixels}
         file = tmp_path / "frames.exr"
         vkbloom.Frames(arrays, timings={}, settings=Separable(), info={}).save(file)
-        result = run(picture, "-o", tmp_path / "a.zarr", "--reduce", f"psnr@{file}")
+        result = run(image_file, "-o", tmp_path / "a.zarr", "--reduce", f"psnr@{file}")
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert "frames.exr holds several images" in result.stderr
 
     @pytest.mark.parametrize("option", ["--sheet", "--curves"])
     def test_drawings_that_cannot_be_written(
-        self, tmp_path: Path, picture: Path, option: str
+        self, tmp_path: Path, image_file: Path, option: str
     ) -> None:
         """Known before anything is rendered."""
         out = tmp_path / "a.zarr"
         (tmp_path / "folder.png").mkdir()
         for name, told in (("no/a.png", "No such file"), ("folder.png", "Is a directory")):
             file = tmp_path / name
-            result = run(picture, "--axis", "blur_scale=1,2", "-o", out, option, file)
+            result = run(image_file, "--axis", "blur_scale=1,2", "-o", out, option, file)
             assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
             assert result.stderr.startswith(f"vkbloom: {file}: {told}")
             assert not out.exists()
 
 
 class TestImageFiles:
-    def test_one_a_point_in_the_colours_of_apply(self, tmp_path: Path, picture: Path) -> None:
+    def test_one_a_point_in_the_colours_of_apply(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "files"
         done(
-            picture,
+            image_file,
             "--axis",
             "intensity=0,1",
             "--axis",
@@ -257,7 +257,7 @@ class TestImageFiles:
             program,
             [
                 "apply",
-                str(picture),
+                str(image_file),
                 str(tmp_path / "one.png"),
                 "--exposure",
                 "-1",
@@ -285,9 +285,9 @@ class TestImageFiles:
         found = load(out / "001_final.exr").pixels
         np.testing.assert_array_equal(np.rint(found * np.float32(255)), expected)
 
-    def test_resumed(self, tmp_path: Path, picture: Path) -> None:
+    def test_resumed(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "files"
-        words = [picture, "--axis", "exposure=0,1,2", "-o", out, "--image-format", "exr"]
+        words = [image_file, "--axis", "exposure=0,1,2", "-o", out, "--image-format", "exr"]
         done(*words)
         names = sorted(path.name for path in out.iterdir())
         before = load(out / "001_final.exr").pixels
@@ -302,10 +302,10 @@ class TestImageFiles:
         assert other.exit_code == 1
         assert "settings.knee" in other.stderr
 
-    def test_something_else_is_left_alone(self, tmp_path: Path, picture: Path) -> None:
+    def test_something_else_is_left_alone(self, tmp_path: Path, image_file: Path) -> None:
         (tmp_path / "files").mkdir()
         (tmp_path / "files" / "letter.txt").write_text("dear")
-        result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", "--resume")
+        result = run(image_file, "--axis", "exposure=0", "-o", tmp_path / "files", "--resume")
         assert result.exit_code == 1
         assert "there is no grid in it" in result.stderr
 
@@ -321,26 +321,26 @@ class TestImageFiles:
         ids=["half", "no text", "deep", "a list", "a number"],
     )
     def test_a_damaged_index(
-        self, tmp_path: Path, picture: Path, content: bytes, told: str
+        self, tmp_path: Path, image_file: Path, content: bytes, told: str
     ) -> None:
         out = tmp_path / "files"
-        done(picture, "-o", out)
+        done(image_file, "-o", out)
         (out / "grid.json").write_bytes(content)
         before = {path: path.read_bytes() for path in out.iterdir()}
-        result = run(picture, "-o", out, "--resume")
+        result = run(image_file, "-o", out, "--resume")
         assert result.exit_code == 1
         assert told in result.stderr
         assert {path: path.read_bytes() for path in out.iterdir()} == before
 
-    def test_what_is_for_stores(self, tmp_path: Path, picture: Path) -> None:
+    def test_what_is_for_stores(self, tmp_path: Path, image_file: Path) -> None:
         for words in (["--reduce", "mean"], ["--sheet", "a.png"], ["--chunk", "exposure=1"]):
-            result = run(picture, "--axis", "exposure=0", "-o", tmp_path / "files", *words)
+            result = run(image_file, "--axis", "exposure=0", "-o", tmp_path / "files", *words)
             assert result.exit_code == 2
             assert "for a store" in result.stderr
 
-    def test_formats_that_are_not_there(self, tmp_path: Path, picture: Path) -> None:
+    def test_formats_that_are_not_there(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "files"
-        result = run(picture, "--axis", "exposure=0", "-o", out, "--image-format", "no")
+        result = run(image_file, "--axis", "exposure=0", "-o", out, "--image-format", "no")
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert "no image format for the extension '.no'" in result.stderr
         assert not out.exists()
@@ -392,9 +392,9 @@ CHAIN = "a0: &a0 1\n" + "".join(
 
 class TestOptionFiles:
     @pytest.mark.parametrize(("suffix", "text"), [("toml", TOML), ("yaml", YAML)])
-    def test_holds_options(self, tmp_path: Path, picture: Path, suffix: str, text: str) -> None:
+    def test_holds_options(self, tmp_path: Path, image_file: Path, suffix: str, text: str) -> None:
         file = tmp_path / f"a.{suffix}"
-        file.write_text(text.format(out=tmp_path / "a.zarr", picture=picture))
+        file.write_text(text.format(out=tmp_path / "a.zarr", picture=image_file))
         done("--from", file)
         found = xr.open_zarr(tmp_path / "a.zarr")
         settings = json.loads(found.attrs["settings"])
@@ -404,7 +404,7 @@ class TestOptionFiles:
         assert list(found["tonemap"].values) == ["none", "aces"]
         assert found["final"].chunks[1] == (2,)
         assert {"mean", "energy"} <= set(found)
-        image = load(picture).pixels
+        image = load(image_file).pixels
         with Renderer() as renderer:
             expected = renderer.apply(
                 image,
@@ -419,21 +419,21 @@ class TestOptionFiles:
             )
         np.testing.assert_array_equal(found["final"].values[1, 0, 1], expected["final"])
 
-    def test_the_command_line_comes_on_top(self, tmp_path: Path, picture: Path) -> None:
+    def test_the_command_line_comes_on_top(self, tmp_path: Path, image_file: Path) -> None:
         file = tmp_path / "a.toml"
-        file.write_text(TOML.format(out=tmp_path / "a.zarr", picture=picture))
+        file.write_text(TOML.format(out=tmp_path / "a.zarr", picture=image_file))
         done(f"--from={file}", "--levels", "2", "-o", tmp_path / "b.zarr")
         settings = json.loads(xr.open_zarr(tmp_path / "b.zarr").attrs["settings"])
         assert settings["levels"] == 2
         assert not (tmp_path / "a.zarr").exists()
 
-    def test_lists_in_lists(self, tmp_path: Path, picture: Path) -> None:
+    def test_lists_in_lists(self, tmp_path: Path, image_file: Path) -> None:
         file = tmp_path / "a.toml"
         file.write_text(
             "[settings]\nlayers = [[1, 1], [2, 0.5]]\n[axes]\nbloom_size = [[4, 4], [8, 8]]\n"
             "weights = [[0.5, 0.25], [1.0]]\n"
         )
-        done(picture, "--from", file, "-o", tmp_path / "a.zarr")
+        done(image_file, "--from", file, "-o", tmp_path / "a.zarr")
         found = xr.open_zarr(tmp_path / "a.zarr")
         assert list(found["bloom_size"].values) == ["[4, 4]", "[8, 8]"]
         assert list(found["weights"].values) == ["[0.5, 0.25]", "[1.0]"]
@@ -520,8 +520,8 @@ class TestOptionFiles:
         # The file's own words and modules that the first call loads take some MB.
         assert most < 64 << 20
 
-    def test_a_flag_that_is_off(self, tmp_path: Path, picture: Path) -> None:
+    def test_a_flag_that_is_off(self, tmp_path: Path, image_file: Path) -> None:
         (tmp_path / "a.toml").write_text("resume = false\nraw = false\n[settings]\nbloom = false")
-        done(picture, "--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
+        done(image_file, "--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
         settings = json.loads(xr.open_zarr(tmp_path / "a.zarr").attrs["settings"])
         assert settings["bloom"] is False

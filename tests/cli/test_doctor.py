@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.cli.processes import python
 from vkbloom import doctor
 from vkbloom.doctor import child, drivers, installation, trial
 from vkbloom.doctor.finding import Finding
@@ -30,16 +30,6 @@ VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES")
 def by_topic(findings: Iterable[Finding], topic: str) -> Finding:
     (found,) = (finding for finding in findings if finding.topic == topic)
     return found
-
-
-def python(*arguments: str, **changes: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *arguments],
-        env={**os.environ, **changes},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:

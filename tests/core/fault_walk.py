@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.images import picture
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
 from vkbloom.scene.textures import Texture
@@ -34,7 +35,7 @@ SIZE = (24, 16)
 Arrays = Mapping[str, NDArray[Any]]
 Work = Callable[[Renderer], Arrays]
 Result = TypeVar("Result")
-core: Any = _core  # arm_fault and fault_state are in test builds only
+core: Any = _core  # arm_fault, fault_state and forget_instances are in test builds only
 
 
 def textured() -> Scene:
@@ -45,18 +46,13 @@ def textured() -> Scene:
     return Scene(body=body, glow=glow, camera=CAMERA)
 
 
-def picture(size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
-    values = np.random.default_rng(2).random((size[1], size[0], 4)) ** 8
-    return (values * 255).astype(dtype) if dtype == np.uint8 else values.astype(dtype)
-
-
 def method(settings: vkbloom.Settings) -> Work:
-    return lambda renderer: renderer.apply(picture(SIZE), settings)
+    return lambda renderer: renderer.apply(picture(*SIZE), settings)
 
 
 def batch(renderer: Renderer) -> Arrays:
     settings = [vkbloom.Separable(exposure=step / 4, loops=1 + step // 5) for step in range(8)]
-    frames = renderer.apply_many(picture(SIZE), settings)
+    frames = renderer.apply_many(picture(*SIZE), settings)
     return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
 
 
@@ -71,7 +67,7 @@ def readback(renderer: Renderer) -> Arrays:
 
     The caller's own array, the renderer's new pages, and the same pages once their array is gone.
     """
-    image = picture((512, 512), np.uint8)
+    image = picture(512, 512, dtype="uint8")
 
     def final(exposure: float, **out: Any) -> NDArray[Any]:
         settings = vkbloom.Separable(exposure=exposure)
@@ -96,7 +92,7 @@ AXES = {"radius": [0.25, 0.5, 0.75], "exposure": [0.5, 1.0]}
 
 def grid_in_memory(renderer: Renderer) -> Arrays:
     base = vkbloom.Pyramid(levels=2)
-    return variables(renderer.grid(picture(SIZE), base, AXES, progress=False))
+    return variables(renderer.grid(picture(*SIZE), base, AXES, progress=False))
 
 
 #: Where the grid lies that a fault has ended; the next call goes on with it.
@@ -107,7 +103,7 @@ def grid_to_zarr(_: Renderer) -> Arrays:
     """Opens its own renderer. What is whole is removed, so that the next one begins anew."""
     base = vkbloom.Pyramid(levels=2)
     dataset = vkbloom.grid_to_zarr(
-        picture(SIZE),
+        picture(*SIZE),
         base,
         AXES,
         FOLDER,
@@ -220,7 +216,8 @@ class Walk:
         return value, error, bool(failed)
 
     def renderer_at(self, n: int, result: int) -> bool:
-        """Opening a renderer with a fault at its n-th point; False: there are fewer."""
+        """Opening a process's first renderer with a fault at its n-th point; False: fewer there."""
+        core.forget_instances()
         renderer, error, failed = self._at(n, result, "", open_renderer)
         if error is not None and not failed:
             raise error
@@ -233,7 +230,7 @@ class Walk:
     def close_at(self, n: int, result: int, names: str) -> bool:
         """Closing a renderer while the device is at work for it."""
         renderer = open_renderer()
-        frames = renderer.apply_many(picture((64, 64)), [vkbloom.Separable()] * 9)
+        frames = renderer.apply_many(picture(64, 64), [vkbloom.Separable()] * 9)
         next(frames)
         next(frames)
         _, _, failed = self._at(n, result, names, renderer.close)

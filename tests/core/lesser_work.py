@@ -13,6 +13,7 @@ import numpy as np
 
 import vkbloom
 from tests import tolerance
+from tests.images import picture
 from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, UnrealBloom
 from vkbloom.scene import skybox
 
@@ -29,12 +30,6 @@ SETTINGS = {
 
 #: Beyond it images come back past the staging memory, where the device can do that.
 LARGE = (600, 500)
-
-
-def picture(size: tuple[int, int], channels: int, dtype: str) -> Any:
-    width, height = size
-    values = np.random.default_rng(5).random((height, width, channels), dtype=np.float32)
-    return (values * 255).astype(dtype) if dtype == "uint8" else values.astype(dtype)
 
 
 def try_all(renderer: Renderer) -> dict[str, str]:
@@ -56,17 +51,17 @@ def try_all(renderer: Renderer) -> dict[str, str]:
     scene = Scene.ufo()
     for name, settings in SETTINGS.items():
         for dtype in DTYPES:
-            image = picture((28, 20), 3, dtype)
+            image = picture(28, 20, 3, dtype)
             attempt(f"{name} {dtype}", lambda: apply(image, settings))  # noqa: B023  called here
         for shading in ("forward", "deferred"):
             attempt(
                 f"{name} {shading}",
                 lambda: renderer.render(scene, settings, (40, 30), shading=shading),  # noqa: B023
             )
-    large = picture(LARGE, 4, "uint8")
+    large = picture(*LARGE, 4, "uint8")
     attempt("large", lambda: apply(large, Separable()))
     for dtype in DTYPES:
-        sky = skybox.load(picture((4, 24), 4, dtype).reshape(6, 4, 4, 4))
+        sky = skybox.load(picture(4, 24, 4, dtype).reshape(6, 4, 4, 4))
         with_sky = dataclasses.replace(scene, skybox=sky)
         attempt(f"sky {dtype}", lambda: renderer.render(with_sky, None, (40, 30)))  # noqa: B023
     for size in ((6000, 1), (1, 6000)):
@@ -82,7 +77,7 @@ def main() -> None:
     renderer = Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True)
     wrong = try_all(renderer)
     # Other settings than before, so that passes run.
-    frames = renderer.apply(picture((9, 9), 3, "uint8"), Separable(blur_strength=0.125))
+    frames = renderer.apply(picture(9, 9, 3, "uint8"), Separable(blur_strength=0.125))
     print(json.dumps({"type": renderer.info.type, "wrong": wrong, "timed": timed(frames)}))
     renderer.close()
 

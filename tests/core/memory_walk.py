@@ -16,7 +16,8 @@ import numpy as np
 from numpy._core.multiarray import get_handler_name
 from numpy.typing import NDArray
 
-from tests.core.fault_walk import SIZE, core, open_renderer, picture
+from tests.core.fault_walk import SIZE, core, open_renderer
+from tests.images import picture
 from vkbloom import Renderer, Separable
 from vkbloom.renderer import _allocator
 
@@ -72,7 +73,7 @@ def walk(image: NDArray[Any]) -> tuple[int, int]:
 
 def main() -> None:
     """Walk both frames, and print the counts of both together."""
-    walks = [walk(picture(SIZE)), walk(picture((512, 300)))]
+    walks = [walk(picture(*SIZE)), walk(picture(512, 300))]
     requests, refused = (sum(counts) for counts in zip(*walks, strict=True))
     print(f"{requests} requests of memory, {refused} raised MemoryError")
 

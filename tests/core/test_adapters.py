@@ -128,6 +128,11 @@ def test_a_message_is_cut_between_or_in_characters(
     assert type(caught.value) is ValueError
 
 
+def test_an_empty_name_is_none() -> None:
+    with pytest.raises(ValueError, match=r'^adapter: "" '):
+        Renderer("")
+
+
 @pytest.mark.parametrize("adapter", [None, 0, b"software", ["software"]])
 def test_an_adapter_is_a_name(adapter: Any) -> None:
     with pytest.raises(TypeError, match=r"^adapter: "):
@@ -162,6 +167,28 @@ def test_no_driver_at_all(tmp_path: Path) -> None:
     assert result["result"] == VK_ERROR_INCOMPATIBLE_DRIVER
     assert "apt install" in result["error"]
     assert "mesa-vulkan-drivers" in result["error"]
+
+
+def test_a_damaged_manifest_beside_a_good_one(tmp_path: Path) -> None:
+    """Debian 12's loader says that there is no memory; others pass over the damaged one."""
+    damaged = tmp_path / "damaged.json"
+    damaged.write_text("{ no JSON")
+    icds = [str(damaged), *map(str, Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))]
+    files = os.pathsep.join(icds)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env={**os.environ, "VK_ICD_FILENAMES": files, "VK_DRIVER_FILES": files},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode == 0:
+        assert json.loads(done.stdout)["type"] == "cpu"
+        return
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("vkbloom.OutOfMemoryError: vkCreateInstance failed with VK_ERROR_OUT_OF")
+    assert "manifest" in last
+    assert "`vkbloom doctor`" in last
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="hides the loader as Linux finds it")

@@ -12,6 +12,7 @@ import pytest
 from numpy._core.multiarray import get_handler_name
 from numpy.typing import NDArray
 
+from tests.images import picture
 from vkbloom import Renderer, Separable
 
 PLAIN = "default_allocator"
@@ -23,11 +24,6 @@ SIDE = 600
 def own(new_renderer: Callable[[], Renderer]) -> Renderer:
     """A renderer without pages from other tests."""
     return new_renderer()
-
-
-def picture(dtype: str, channels: int = 4, side: int = SIDE, seed: int = 0) -> NDArray[np.generic]:
-    noise = np.random.default_rng(seed).random((side, side - 1, channels), dtype=np.float32)
-    return (noise * 255).astype(dtype) if dtype == "uint8" else noise.astype(dtype)
 
 
 def final(renderer: Renderer, image: NDArray[np.generic], exposure: float) -> NDArray[np.generic]:
@@ -45,7 +41,7 @@ def place(array: NDArray[np.generic]) -> int:
 def test_the_memory_of_an_array_that_is_gone_is_used_again(
     own: Renderer, dtype: str, channels: int
 ) -> None:
-    image = picture(dtype, channels)
+    image = picture(SIDE - 1, SIDE, channels, dtype)
     expected = [final(own, image, exposure).copy() for exposure in (1.0, 0.5)]
     first = final(own, image, 1.0)
     before = place(first)
@@ -65,8 +61,8 @@ def test_the_memory_of_an_array_that_is_gone_is_used_again(
 
 
 def test_other_arrays_are_plain(own: Renderer) -> None:
-    large = final(own, picture("float32"), 1.0)
-    small = final(own, picture("float32", side=64), 1.0)
+    large = final(own, picture(SIDE - 1, SIDE, dtype="float32"), 1.0)
+    small = final(own, picture(63, 64, dtype="float32"), 1.0)
     names = [get_handler_name(array) for array in (large.copy(), large + 1, small, np.empty(1))]
     assert names == [PLAIN] * 4
     assert get_handler_name() == PLAIN
@@ -82,7 +78,7 @@ def test_arrays_are_large_from_a_mebibyte_on(own: Renderer, dtype: str) -> None:
 
 
 def test_an_array_given_back_is_written_in_place(own: Renderer) -> None:
-    image = picture("float16")
+    image = picture(SIDE - 1, SIDE, dtype="float16")
     expected = final(own, image, 0.5).copy()
     array = final(own, image, 1.0)
     frames = own.apply(
@@ -95,7 +91,7 @@ def test_an_array_given_back_is_written_in_place(own: Renderer) -> None:
 # Slices of one array's pages, at multiples of a pixel and between them.
 @pytest.mark.parametrize("start", [0, 4, 1, 2])
 def test_slices_of_an_array_are_written_in_place(own: Renderer, start: int) -> None:
-    image = picture("float16")
+    image = picture(SIDE - 1, SIDE, dtype="float16")
     expected = final(own, image, 0.5).copy()
     pages = own._core.new_array(np.empty, (3 * image.size,), "float16")
     pages[:] = 7
@@ -107,7 +103,7 @@ def test_slices_of_an_array_are_written_in_place(own: Renderer, start: int) -> N
 
 
 def test_arrays_outlive_the_renderer_and_can_grow(own: Renderer) -> None:
-    array = final(own, picture("float32"), 1.0)
+    array = final(own, picture(SIDE - 1, SIDE, dtype="float32"), 1.0)
     kept = array.copy()
     own.close()
     np.testing.assert_array_equal(array, kept)
@@ -157,7 +153,7 @@ def test_memory_that_is_not_there(own: Renderer) -> None:
 
 
 def test_threads_free_what_others_render(own: Renderer) -> None:
-    image = picture("float32", side=512)
+    image = picture(511, 512, dtype="float32")
     exposures = [0.5, 1.0, 2.0, 4.0]
     expected = {exposure: final(own, image, exposure).copy() for exposure in exposures}
 
@@ -176,7 +172,7 @@ def test_threads_free_what_others_render(own: Renderer) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="nothing forks there")
 def test_a_forked_process_keeps_its_copies(own: Renderer) -> None:
-    image = picture("float32")
+    image = picture(SIDE - 1, SIDE, dtype="float32")
     array = final(own, image, 1.0)
     kept = array.copy()
     child = os.fork()

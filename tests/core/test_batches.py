@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.framebuffers import assert_same
+from tests.images import picture
 from vkbloom import (
     DualKawase,
-    Frames,
     Pyramid,
     Renderer,
     Scene,
@@ -26,17 +27,6 @@ from vkbloom import (
 from vkbloom.renderer import _scene_arrays
 
 SIZE = (64, 36)
-
-
-def picture(width: int, height: int, channels: int, seed: int) -> Any:
-    return np.random.default_rng(seed).random((height, width, channels), dtype=np.float32)
-
-
-def assert_same(frames: Frames, expected: Frames) -> None:
-    assert frames.settings == expected.settings
-    assert list(frames) == list(expected)
-    for name in expected:
-        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
 
 
 #: Changes of one pass, of all, of the images' number, sizes and formats; more than one batch.
@@ -63,7 +53,7 @@ SEQUENCE: list[Settings] = [
 def test_images_one_by_one_and_many(
     new_renderer: Callable[[], Renderer], attachments: str | Sequence[str]
 ) -> None:
-    image = picture(40, 30, 3, 1)
+    image = picture(40, 30, 3, seed=1)
     alone, together = new_renderer(), new_renderer()
     sequence = [settings for settings in SEQUENCE if settings.bloom or "bloom" not in attachments]
     expected = [alone.apply(image, s, attachments=attachments) for s in sequence]
@@ -96,7 +86,7 @@ def test_scenes_one_by_one_and_many(
 def test_frames_that_fill_a_batch_alone(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, points: int
 ) -> None:
-    image = picture(33, 21, 4, 2)
+    image = picture(33, 21, 4, seed=2)
     monkeypatch.setattr(requests, "BYTES", points * image.nbytes)
     monkeypatch.setattr(requests, "SECONDS", 1e6)
     sizes = []
@@ -118,7 +108,7 @@ def test_frames_that_fill_a_batch_alone(
 def test_a_batch_is_as_long_as_a_wait_may_be(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
 ) -> None:
-    image = picture(33, 21, 4, 2)
+    image = picture(33, 21, 4, seed=2)
     monkeypatch.setattr(requests, "SECONDS", seconds)
     counts: list[int] = []
 
@@ -139,7 +129,7 @@ def test_a_batch_is_as_long_as_a_wait_may_be(
 
 
 def test_arrays_are_the_takers(renderer: Renderer) -> None:
-    image = picture(20, 10, 4, 3)
+    image = picture(20, 10, 4, seed=3)
     frames = list(renderer.apply_many(image, [Separable()] * 10))
     kept = frames[0]["final"].copy()
     for one in frames:
@@ -152,7 +142,7 @@ def test_arrays_are_the_takers(renderer: Renderer) -> None:
 
 
 def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
-    image = picture(20, 10, 4, 4)
+    image = picture(20, 10, 4, seed=4)
     image[3, 4] = (np.nan, np.inf, 0.0, -np.inf)
     frames = list(renderer.apply_many(image, [Separable(), Pyramid(), Separable()]))
     assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
@@ -161,11 +151,11 @@ def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
 def test_settings_that_are_no_sequence(renderer: Renderer) -> None:
     wrong: Any = Separable()
     with pytest.raises(TypeError, match=r"^settings_seq: "):
-        list(renderer.apply_many(picture(4, 4, 3, 5), wrong))
+        list(renderer.apply_many(picture(4, 4, 3, seed=5), wrong))
 
 
 def test_no_settings(renderer: Renderer, scene: Scene) -> None:
-    assert list(renderer.apply_many(picture(4, 4, 3, 5), [])) == []
+    assert list(renderer.apply_many(picture(4, 4, 3, seed=5), [])) == []
     assert list(renderer.render_many(scene, [], SIZE)) == []
 
 
@@ -193,7 +183,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
             taken += 1
             yield Separable(exposure=taken % 7 / 7)
 
-    frames = renderer.apply_many(picture(8, 8, 4, 6), endless(), attachments=("final",))
+    frames = renderer.apply_many(picture(8, 8, 4, seed=6), endless(), attachments=("final",))
     assert taken == 0
     next(frames)
     assert taken == 1
@@ -210,7 +200,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
 
 
 def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> None:
-    image, other = picture(40, 30, 3, 7), picture(25, 50, 4, 8)
+    image, other = picture(40, 30, 3, seed=7), picture(25, 50, 4, seed=8)
     settings = [Separable(blur_strength=strength / 8) for strength in range(24)]
     expected = [renderer.apply(image, s) for s in settings]
     of_other, of_scene = renderer.apply(other), renderer.render(scene, None, SIZE)
@@ -228,7 +218,7 @@ def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> Non
 
 
 def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
-    image = picture(40, 30, 3, 9)
+    image = picture(40, 30, 3, seed=9)
     settings = [Separable(exposure=exposure / 8, loops=1 + exposure % 2) for exposure in range(24)]
     expected = [(renderer.apply(image, s), renderer.render(scene, s, SIZE)) for s in settings]
     both = zip(
@@ -242,7 +232,7 @@ def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
 
 
 def test_threads(renderer: Renderer, scene: Scene) -> None:
-    images = [picture(30, 20, 3, 10), picture(30, 20, 4, 11), picture(17, 40, 4, 12)]
+    images = [picture(30, 20, 3, seed=10), picture(30, 20, 4, seed=11), picture(17, 40, 4, seed=12)]
     settings = [Separable(blur_strength=strength / 8) for strength in range(20)]
     many = [[renderer.apply(image, s) for s in settings] for image in images]
     single = renderer.render(scene, None, SIZE)
@@ -275,7 +265,7 @@ def test_threads(renderer: Renderer, scene: Scene) -> None:
 
 
 def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
-    image = picture(30, 20, 3, 13)
+    image = picture(30, 20, 3, seed=13)
     settings = [Separable(blur_strength=strength / 8) for strength in range(12)]
     expected = [renderer.apply(image, s) for s in settings]
     frames = renderer.apply_many(image, settings)
@@ -290,7 +280,7 @@ def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
 @pytest.mark.parametrize("taken", [0, 1, 2, 5])
 @pytest.mark.parametrize("end", ["close", "forget"])
 def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> None:
-    image = picture(40, 30, 3, 14)
+    image = picture(40, 30, 3, seed=14)
     right = renderer.apply(image)
     for _ in range(3):
         frames = renderer.apply_many(image, SEQUENCE)
@@ -305,7 +295,7 @@ def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> N
 
 def test_a_sequence_forgotten_with_its_renderer() -> None:
     renderer = Renderer(validation=True)
-    frames = renderer.apply_many(picture(40, 30, 3, 15), SEQUENCE)
+    frames = renderer.apply_many(picture(40, 30, 3, seed=15), SEQUENCE)
     for _ in range(4):
         next(frames)
     del renderer, frames
@@ -313,7 +303,7 @@ def test_a_sequence_forgotten_with_its_renderer() -> None:
 
 
 def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Renderer]) -> None:
-    image = picture(40, 30, 3, 16)
+    image = picture(40, 30, 3, seed=16)
     renderer = new_renderer()
     expected = [renderer.apply(image, settings) for settings in SEQUENCE]
     frames = renderer.apply_many(image, SEQUENCE)
@@ -345,7 +335,7 @@ def wrong_ones() -> list[tuple[Any, type[Exception], str]]:
 def test_an_error_comes_in_its_turn(
     renderer: Renderer, place: int, wrong: Any, kind: type[Exception], words: str
 ) -> None:
-    image = picture(20, 30, 4, 17)
+    image = picture(20, 30, 4, seed=17)
     right = [Separable(blur_strength=strength / 8) for strength in range(20)]
     sequence = [*right[:place], wrong, *right[place:]]
     frames = renderer.apply_many(image, sequence, attachments=("bloom", "final"))
@@ -364,7 +354,7 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
             yield Separable(exposure=exposure)
         raise KeyError("mine")
 
-    frames = renderer.apply_many(picture(4, 4, 3, 18), broken())
+    frames = renderer.apply_many(picture(4, 4, 3, seed=18), broken())
     for _ in range(place):
         next(frames)
     with pytest.raises(KeyError, match="mine"):
@@ -376,11 +366,11 @@ def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) 
     with pytest.raises(TypeError, match="image"):
         renderer.apply_many(wrong, [Separable()])
     with pytest.raises(TypeError, match="attachments"):
-        renderer.apply_many(picture(4, 4, 3, 19), [Separable()], attachments=wrong)
+        renderer.apply_many(picture(4, 4, 3, seed=19), [Separable()], attachments=wrong)
     with pytest.raises(ValueError, match="shading"):
         renderer.render_many(scene, [Separable()], shading=wrong)
     with pytest.raises(TypeError):
-        renderer.apply_many(picture(4, 4, 3, 19), Separable())  # type: ignore[arg-type]
+        renderer.apply_many(picture(4, 4, 3, seed=19), Separable())  # type: ignore[arg-type]
 
 
 # The core's errors: from a device that fails where it is told to
@@ -472,7 +462,7 @@ def test_a_batch_is_submitted_and_collected_once(renderer: Renderer) -> None:
     def allocate(_: str, shape: tuple[int, ...], dtype: str) -> Any:
         return np.empty(shape, dtype)
 
-    batch = renderer._core.apply(picture(8, 8, 4, 20), None)
+    batch = renderer._core.apply(picture(8, 8, 4, seed=20), None)
     with pytest.raises(RuntimeError):
         batch.submit()
     assert batch.add(Separable(), allocate)
@@ -515,7 +505,7 @@ def test_a_batch_of_a_closed_renderer() -> None:
         return np.empty(shape, dtype)
 
     renderer = vkbloom.Renderer(validation=True)
-    waiting, flying = (renderer._core.apply(picture(8, 8, 4, 21), None) for _ in range(2))
+    waiting, flying = (renderer._core.apply(picture(8, 8, 4, seed=21), None) for _ in range(2))
     for batch in (waiting, flying):
         batch.add(Separable(), allocate)
     flying.submit()
@@ -524,4 +514,4 @@ def test_a_batch_of_a_closed_renderer() -> None:
         with pytest.raises(ValueError, match="closed"):
             call()
     with pytest.raises(ValueError, match="closed"):
-        renderer._core.apply(picture(8, 8, 4, 21), None).add(Separable(), allocate)
+        renderer._core.apply(picture(8, 8, 4, seed=21), None).add(Separable(), allocate)

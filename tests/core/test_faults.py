@@ -116,6 +116,31 @@ def test_points_of_every_workload(
             assert row["raised"] > 0 or name == "close", name
 
 
+# Prints how many instances a process makes.
+INSTANCES = """
+from concurrent.futures import ThreadPoolExecutor
+import vkbloom
+from vkbloom import _core
+
+def use(number):
+    vkbloom.adapters()
+    vkbloom.Renderer(validation=number % 2 == 0).close()
+
+_core.arm_fault(0, 0, "vkCreateInstance")
+with ThreadPoolExecutor(4) as pool:
+    list(pool.map(use, range(40)))
+print(_core.fault_state()[0])
+"""
+
+
+def test_one_instance_with_the_validation_layer_and_one_without(faulty: dict[str, str]) -> None:
+    """NVIDIA's driver 580 gives a process no more than about 30, one after the other."""
+    done = subprocess.run(
+        [sys.executable, "-c", INSTANCES], env=faulty, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["2"]
+
+
 def test_memory_that_python_does_not_get(
     faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,48 +7,20 @@ from typing import Any
 
 import pytest
 
+from tests.core.dependencies import (
+    COLOR_OUTPUT,
+    COLOR_READ,
+    COLOR_WRITE,
+    DEPTH_BEFORE_DEPTH,
+    EXTERNAL,
+    FRAGMENT_SHADER,
+    READ_BEFORE_WRITE,
+    SHADER_READ,
+    TRANSFER,
+    TRANSFER_READ,
+    WRITE_BEFORE_READ,
+)
 from vkbloom import Separable, _core
-
-EXTERNAL = -1
-
-# VkPipelineStageFlagBits, VkAccessFlagBits and VkDependencyFlagBits of the Vulkan specification.
-DEPTH_TESTS = 0x100 | 0x200
-FRAGMENT_SHADER = 0x80
-COLOR_OUTPUT = 0x400
-TRANSFER = 0x1000
-SHADER_READ = 0x20
-COLOR_READ, COLOR_WRITE = 0x80, 0x100
-DEPTH_READ, DEPTH_WRITE = 0x200, 0x400
-TRANSFER_READ = 0x800
-BY_REGION = 1
-
-DEPTH_BEFORE_DEPTH = (
-    EXTERNAL,
-    0,
-    DEPTH_TESTS,
-    DEPTH_TESTS,
-    DEPTH_WRITE,
-    DEPTH_READ | DEPTH_WRITE,
-    BY_REGION,
-)
-READ_BEFORE_WRITE = (
-    EXTERNAL,
-    0,
-    FRAGMENT_SHADER,
-    COLOR_OUTPUT,
-    SHADER_READ,
-    COLOR_WRITE,
-    0,
-)
-WRITE_BEFORE_READ = (
-    0,
-    EXTERNAL,
-    COLOR_OUTPUT,
-    FRAGMENT_SHADER,
-    COLOR_WRITE,
-    SHADER_READ,
-    0,
-)
 
 
 def describe(settings: Separable, has_sky: bool = True) -> dict[str, Any]:

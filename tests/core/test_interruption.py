@@ -19,6 +19,7 @@ import xarray
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.images import picture
 from vkbloom import DeviceLostError, Frames, Renderer, Scene, Separable, gaussian_weights
 
 LEAVES_BEHIND = pytest.mark.skipif(
@@ -51,17 +52,13 @@ def alarm() -> Iterator[Callable[[float], None]]:
     signal.signal(signal.SIGALRM, before)
 
 
-def noise(side: int) -> NDArray[np.float32]:
-    return np.random.default_rng(side).random((side, side, 4), dtype=np.float32)
-
-
 @pytest.fixture(scope="module")
 def large() -> NDArray[np.float32]:
     """An image that LONG takes a second or so for, so that there is a wait to leave."""
     with Renderer() as renderer:
-        renderer.apply(noise(8), LONG)
+        renderer.apply(picture(8, 8), LONG)
         for side in (256, 512, 1024, 2048, 4096):
-            image = noise(side)
+            image = picture(side, side)
             begin = time.perf_counter()
             renderer.apply(image, LONG, attachments="final")
             if time.perf_counter() - begin > 0.5:
@@ -82,7 +79,7 @@ def check(renderer: Renderer, scene: Scene) -> None:
             for name, array in expected.items():
                 np.testing.assert_array_equal(frames[name], array)
         np.testing.assert_array_equal(
-            renderer.apply(noise(9), SHORT)["final"], new.apply(noise(9), SHORT)["final"]
+            renderer.apply(picture(9, 9), SHORT)["final"], new.apply(picture(9, 9), SHORT)["final"]
         )
 
 
@@ -101,7 +98,7 @@ def test_a_long_frame_is_interrupted(
     large: NDArray[np.float32],
 ) -> None:
     renderer = new_renderer()
-    renderer.apply(noise(8), LONG)
+    renderer.apply(picture(8, 8), LONG)
     for _ in range(2):
         alarm(0.1)
         with pytest.raises(Alarm):
@@ -134,11 +131,11 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
 ) -> None:
     """Once the array of an interrupted call was given up with the renderer's lock held."""
     renderer = new_renderer()
-    renderer.apply(noise(8), LONG)
+    renderer.apply(picture(8, 8), LONG)
     finished: list[bool] = []
 
     def use_elsewhere() -> None:
-        thread = threading.Thread(target=renderer.apply, args=(noise(8), SHORT), daemon=True)
+        thread = threading.Thread(target=renderer.apply, args=(picture(8, 8), SHORT), daemon=True)
         thread.start()
         thread.join(20.0)
         finished.append(not thread.is_alive())
@@ -152,7 +149,7 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
     gc.collect()
     assert not finished
     # The next flight waits for the one that nobody wants any more, which is over then.
-    renderer.apply(noise(9), SHORT)
+    renderer.apply(picture(9, 9), SHORT)
     assert finished == [True]
 
 
@@ -285,7 +282,7 @@ def test_waiting_for_another_thread_is_interrupted(
     time.sleep(0.05)
     alarm(0.1)
     with pytest.raises(Alarm):
-        list(map(renderer.apply, [noise(8)] * 1000))
+        list(map(renderer.apply, [picture(8, 8)] * 1000))
     thread.join()
     check(renderer, scene)
 
@@ -347,6 +344,67 @@ def test_a_device_that_takes_too_long(
         renderer.close()
     assert renderer.closed
     renderer.close()
+
+
+# Collects a renderer while its device is at work; prints how it ended, and after how many seconds
+# from the collection, or from Ctrl-C in it.
+COLLECT = """
+import gc, signal, sys, threading, time
+import numpy as np
+import vkbloom
+
+side, pressing = int(sys.argv[1]), sys.argv[2] == "pressed"
+image = np.random.default_rng(side).random((side, side, 4), dtype=np.float32)
+long = vkbloom.Separable(
+    weights=vkbloom.gaussian_weights(10.0, 32), blur_scale=0.5, direct=True, format="rgba32float"
+)
+renderer = vkbloom.Renderer()
+batch = renderer._core.apply(image, ("final",))
+batch.add(long, lambda name, shape, dtype: np.empty(shape, dtype))
+batch.submit()
+begin = time.perf_counter()
+
+def press():
+    global begin
+    begin = time.perf_counter()
+    signal.raise_signal(signal.SIGINT)
+
+timer = threading.Timer(0.1, press)
+if pressing:
+    timer.start()
+try:
+    del renderer, batch
+    gc.collect()
+    print("collected", time.perf_counter() - begin, flush=True)
+    if pressing:
+        timer.join()
+except KeyboardInterrupt:
+    print("interrupted", time.perf_counter() - begin, flush=True)
+"""
+
+
+@UNIX
+@LEAVES_BEHIND
+@pytest.mark.parametrize(
+    ("how", "limit", "words"), [("left", "0.1", "collected"), ("pressed", "300", "interrupted")]
+)
+def test_collecting_a_renderer_at_work(
+    large: NDArray[np.float32], how: str, limit: str, words: str
+) -> None:
+    """Once the wait in it had no limit and no end by Ctrl-C."""
+    # Twice the side: four times as long as half a second.
+    done = subprocess.run(
+        [sys.executable, "-c", COLLECT, str(2 * len(large)), how],
+        env={**os.environ, "VKBLOOM_TIMEOUT": limit},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    ending, seconds = done.stdout.split()
+    assert ending == words
+    assert float(seconds) < 1.0
 
 
 # Forks
@@ -415,20 +473,35 @@ def test_a_forked_process(how: str, tmp_path: Path) -> None:
     ), done.stdout + done.stderr
 
 
-def test_a_driver_that_does_not_survive_forks(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object) -> None:
-        raise vkbloom.Error("vkCreateDevice failed with VK_ERROR_INITIALIZATION_FAILED")
+# Prints what a child is told where its driver does not give it a device.
+ADVICE = """
+import os, sys
+import vkbloom
 
-    def notes() -> list[str]:
-        with pytest.raises(vkbloom.Error, match="vkCreateDevice failed") as refused:
-            Renderer()
-        return getattr(refused.value, "__notes__", [])
+vkbloom.adapters()
+for _ in range(2):
+    if os.fork():
+        os.wait()
+        sys.exit()
+    # The child, then the child's.
+    try:
+        vkbloom.Renderer("no such adapter")
+    except vkbloom.AdapterNotFoundError as error:
+        print(error, flush=True)
+"""
 
-    Renderer().close()
-    monkeypatch.setattr(vkbloom._core, "Renderer", refuse)
-    assert notes() == []
-    here = os.getpid()
-    monkeypatch.setattr(os, "getpid", lambda: here + 1)
-    (note,) = notes()
-    assert "forked" in note
-    assert '"spawn"' in note
+
+@UNIX
+def test_a_child_without_an_adapter_is_told_to_spawn() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", ADVICE], capture_output=True, text=True, timeout=120, check=True
+    )
+    told = done.stdout.splitlines()
+    assert len(told) == 2
+    for line in told:
+        assert "no such adapter" in line
+        assert "forked" in line
+        assert '"spawn"' in line
+    with pytest.raises(vkbloom.AdapterNotFoundError) as caught:
+        Renderer("no such adapter")
+    assert "forked" not in str(caught.value)

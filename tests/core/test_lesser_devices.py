@@ -164,6 +164,13 @@ def test_a_form_that_is_none_is_refused_where_there_is_but_one(layer: Path, name
     assert "ValueError: VKBLOOM_FORM: tiles is not one of auto" in done.stderr
 
 
+@pytest.mark.parametrize("form", ["cpu", "gpu"])
+def test_a_form_that_the_device_cannot_run_is_refused(layer: Path, name: str, form: str) -> None:
+    done = run(layer, name, "storage", VKBLOOM_FORM=form)
+    words = f"ValueError: VKBLOOM_FORM: the compute shaders of .* cannot write .* {form} needs"
+    assert re.search(words, done.stderr), done.stderr
+
+
 def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> None:
     done = run(layer, name, "timestamps,storage", ("-m", "vkbloom.cli", "doctor", "--json"))
     findings = {finding["topic"]: finding for finding in json.loads(done.stdout)["findings"]}

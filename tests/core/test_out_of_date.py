@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.framebuffers import assert_same
 from tests.screens import noise, screen
 from vkbloom import Camera, Frames, Renderer, Scene, Separable
-from vkbloom.renderer import Shading
+from vkbloom.settings import Shading
 
 SIZE = (160, 90)
 ALL = ["glow", "blur_vertical", "bloom", "scene", "final"]
@@ -35,12 +36,6 @@ def fresh(*arguments: Any, **more: Any) -> Frames:
 @pytest.fixture(scope="module")
 def default(scene: Scene) -> Frames:
     return fresh(scene, None, SIZE)
-
-
-def assert_same(frames: Frames, expected: Frames) -> None:
-    assert list(frames) == list(expected)
-    for name in expected:
-        np.testing.assert_array_equal(frames[name], expected[name], err_msg=name)
 
 
 # What runs after one change

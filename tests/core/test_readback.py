@@ -11,15 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.images import picture
 from vkbloom import Renderer, Scene, Separable
 
 OFF = Separable(bloom=False)
 DTYPES = ["uint8", "float16", "float32"]
-
-
-def picture(width: int, height: int, channels: int, dtype: str, seed: int) -> Any:
-    random = np.random.default_rng(seed).random((height, width, channels), dtype=np.float32)
-    return (random * 255).astype(np.uint8) if dtype == "uint8" else random.astype(dtype)
 
 
 def placed(shape: tuple[int, ...], dtype: str, start: int) -> tuple[Any, Any]:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from tests.images import picture
 from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings
 
 THREADS = 8
@@ -34,27 +34,25 @@ SETTINGS: tuple[Settings, ...] = (
 )
 
 
-def image(size: tuple[int, int]) -> NDArray[np.float32]:
-    return np.random.default_rng(size).random((size[1], size[0], 4), dtype=np.float32)
-
-
 def one(renderer: Renderer, scene: Scene, kind: str, which: int, size: tuple[int, int]) -> Any:
     """Return what a call of that kind gives: arrays in the order of the call."""
     settings = SETTINGS[which]
     if kind == "render":
         return list(renderer.render(scene, settings, size).values())
     if kind == "apply":
-        return list(renderer.apply(image(size), settings).values())
+        return list(renderer.apply(picture(*size), settings).values())
     if kind == "out":
         out = np.zeros((size[1], size[0], 4), np.float32)
-        renderer.apply(image(size), settings, attachments="final", out={"final": out})
+        renderer.apply(picture(*size), settings, attachments="final", out={"final": out})
         return [out]
     if kind == "left":
         # A sequence that is left half taken: its flights are still in the air.
-        return [next(iter(renderer.apply_many(image(size), [settings] * 5)))["final"]]
+        return [next(iter(renderer.apply_many(picture(*size), [settings] * 5)))["final"]]
     return [
         frames["final"]
-        for frames in renderer.apply_many(image(size), [settings, *SETTINGS], attachments="final")
+        for frames in renderer.apply_many(
+            picture(*size), [settings, *SETTINGS], attachments="final"
+        )
     ]
 
 

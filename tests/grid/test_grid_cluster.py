@@ -15,6 +15,7 @@ import pytest
 
 import vkbloom
 from tests.framebuffers import noise
+from tests.grid.stores import contents
 from vkbloom import Frames, Separable, check_grid, grid_to_zarr, reductions
 from vkbloom.grid import cluster
 
@@ -47,14 +48,6 @@ def make(store: Path, client: Any = None, **changes: Any) -> Any:
         **changes,
     }
     return grid_to_zarr(source(), Separable(), AXES, store, client=client, **arguments)
-
-
-def contents(store: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(store)): path.read_bytes()
-        for path in store.rglob("*")
-        if path.is_file()
-    }
 
 
 @pytest.fixture(scope="module")

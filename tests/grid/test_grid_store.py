@@ -20,6 +20,7 @@ import pytest
 
 import vkbloom
 from tests.framebuffers import noise
+from tests.grid.stores import contents
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, reductions
 from vkbloom.grid.filling import Filler
 from vkbloom.grid.identity import differences
@@ -54,14 +55,6 @@ def make(store: Any, **changes: Any) -> Any:
     settings = arguments.pop("settings", None)
     axes = arguments.pop("axes", AXES)
     return grid_to_zarr(arguments.pop("source", source()), settings, axes, store, **arguments)
-
-
-def contents(store: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(store)): path.read_bytes()
-        for path in store.rglob("*")
-        if path.is_file()
-    }
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,15 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import os
+import random
 import re
 import resource
 import signal
 import stat
+import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -355,13 +359,56 @@ class TestWriteErrors:
     def test_an_interrupt_leaves_nothing(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def interrupted(array: Any) -> None:
+        def interrupted(*_: Any) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("vkbloom.io.safe_writing.np.ascontiguousarray", interrupted)
+        monkeypatch.setattr("vkbloom.io.safe_writing.os.posix_fallocate", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            safe_writing.reserve(tmp_path / "a.png", 9)
+        assert names_in(tmp_path) == []
+        monkeypatch.setattr(Path, "replace", interrupted)
         with pytest.raises(KeyboardInterrupt):
             safe_writing.write_whole(tmp_path / "a.png", b"bytes")
         assert names_in(tmp_path) == []
+
+    @pytest.mark.parametrize("name", ["a.png", "a.txt"])
+    def test_a_kill_leaves_the_old_file_or_the_new_one(self, name: str, tmp_path: Path) -> None:
+        file, old, new = tmp_path / name, b"o" * 300_000, b"n" * 200_000
+        code = (
+            "from pathlib import Path\n"
+            "from vkbloom.io.safe_writing import write_whole\n"
+            f"file = Path({str(file)!r})\n"
+            "while True:\n"
+            "    write_whole(file, b'n' * 200_000)\n"
+            "    write_whole(file, b'o' * 300_000)\n"
+        )
+        for _ in range(5):
+            with subprocess.Popen([sys.executable, "-c", code]) as child:
+                while not file.exists():
+                    assert child.poll() is None
+                time.sleep(0.02 * random.random())
+                child.kill()
+            assert file.read_bytes() in (old, new)
+
+    @pytest.mark.parametrize("reason", [errno.EOPNOTSUPP, errno.EINVAL, None])
+    def test_space_without_the_systems_help(
+        self, reason: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def unsupported(*_: Any) -> None:
+            assert reason is not None
+            raise OSError(reason, "not here")
+
+        if reason is None:
+            monkeypatch.delattr(os, "posix_fallocate")
+        else:
+            monkeypatch.setattr(os, "posix_fallocate", unsupported)
+        size = 3 << 20
+        assert safe_writing.reserve(tmp_path / "a.png", size).stat().st_size > size
+        file = tmp_path / "b.png"
+        with small_files_only(), pytest.raises(OSError, match=r"b\.png") as caught:
+            safe_writing.reserve(file, size)
+        assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
+        assert len(names_in(tmp_path)) == 1
 
     def test_disk_is_full_of_bytes(self, tmp_path: Path) -> None:
         file = tmp_path / "sheet.png"

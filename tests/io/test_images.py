@@ -64,7 +64,7 @@ def reread(path: Path) -> tuple[Any, NDArray[Any]]:
     return spec, pixels
 
 
-def picture(pixels: NDArray[Any], numbers: str, **changes: Any) -> Picture:
+def linear_picture(pixels: NDArray[Any], numbers: str, **changes: Any) -> Picture:
     made = Picture.of_values(pixels, numbers)
     return dataclasses.replace(made, **{"encoding": "linear", **changes})
 
@@ -416,7 +416,7 @@ class TestSave:
         pixels = noise(5, 7, channels, numbers=numbers)
         pixels[0, :3, 0] = (np.nan, np.inf, -np.inf)
         pixels[:, :, 3:] = 1
-        assert save(picture(pixels, numbers), tmp_path / "b.exr") == ()
+        assert save(linear_picture(pixels, numbers), tmp_path / "b.exr") == ()
         spec, written = reread(tmp_path / "b.exr")
         assert str(spec.format) == numbers
         assert np.array_equal(written, pixels, equal_nan=True)
@@ -448,7 +448,7 @@ class TestSave:
         # Large enough for formats that halve a picture five times.
         pixels = np.random.default_rng(0).random((64, 64, 4)).astype(dtype)
         pixels[:, :, 3] = 1
-        assert save(picture(pixels, numbers), tmp_path / name) == ()
+        assert save(linear_picture(pixels, numbers), tmp_path / name) == ()
         spec, written = reread(tmp_path / name)
         assert (str(spec.format), spec.nchannels) == (stored_as, channels)
         if stored_as.startswith("uint"):
@@ -472,7 +472,7 @@ class TestSave:
         self, tmp_path: Path, name: str, colour: Colour | None, expected: float
     ) -> None:
         pixels = np.full((4, 4, 3), 0.5, np.float32)
-        save(picture(pixels, "float"), tmp_path / name, colour)
+        save(linear_picture(pixels, "float"), tmp_path / name, colour)
         _, written = reread(tmp_path / name)
         assert np.allclose(written, expected, rtol=1e-6, atol=0)
         # And it says so: reading gives the light again.
@@ -481,13 +481,13 @@ class TestSave:
 
     def test_alpha_is_not_encoded(self, tmp_path: Path) -> None:
         pixels = np.full((4, 4, 4), 0.5, np.float32)
-        save(picture(pixels, "uint8"), tmp_path / "b.png")
+        save(linear_picture(pixels, "uint8"), tmp_path / "b.png")
         assert reread(tmp_path / "b.png")[1][0, 0].tolist() == [188, 188, 188, 128]
 
     @pytest.mark.parametrize("encoding", ["srgb", "gamma22", None])
     def test_encoded_values_are_left_alone(self, tmp_path: Path, encoding: Any) -> None:
         pixels = np.full((4, 4, 3), 0.5, np.float32)
-        made = picture(pixels, "uint8", encoding=encoding)
+        made = linear_picture(pixels, "uint8", encoding=encoding)
         save(made, tmp_path / "b.png")
         save(made, tmp_path / "b.exr")
         assert (reread(tmp_path / "b.png")[1] == 128).all()
@@ -500,7 +500,7 @@ class TestSave:
     def test_integers_clip(self, tmp_path: Path) -> None:
         row = np.array([-5, -0.0, 1, 1.001, 1e30, np.nan, np.inf, -np.inf], np.float32)
         pixels = np.repeat(row[None, :, None], 3, axis=2)
-        (note,) = save(picture(pixels, "float"), tmp_path / "b.png")
+        (note,) = save(linear_picture(pixels, "float"), tmp_path / "b.png")
         assert note.endswith("b.png holds integers: NaN is written as 0, infinity as 1")
         levels = reread(tmp_path / "b.png")[1][0, :, 0].tolist()
         assert levels == [0, 0, 255, 255, 255, 0, 255, 0]
@@ -514,7 +514,7 @@ class TestSave:
     ) -> None:
         dtype = np.float16 if numbers == "half" else np.float32
         pixels = np.full((8, 8, 3), 0.5, dtype)
-        assert save(picture(pixels, numbers, grey=True), tmp_path / name) == ()
+        assert save(linear_picture(pixels, numbers, grey=True), tmp_path / name) == ()
         spec, _ = reread(tmp_path / name)
         assert spec.nchannels == channels
         if channels == 1:
@@ -531,10 +531,10 @@ class TestSave:
     def test_lost_alpha_is_noted(self, tmp_path: Path) -> None:
         pixels = np.full((8, 8, 4), 0.5, np.float32)
         for name in ("b.jpg", "b.hdr"):
-            (note,) = save(picture(pixels, "float"), tmp_path / name)
+            (note,) = save(linear_picture(pixels, "float"), tmp_path / name)
             assert note.endswith(f"{name} has no place for the alpha, which is not 1 everywhere")
         pixels[:, :, 3] = 1
-        assert save(picture(pixels, "float"), tmp_path / "b.hdr") == ()
+        assert save(linear_picture(pixels, "float"), tmp_path / "b.hdr") == ()
 
     def test_alpha_that_is_read_otherwise_is_noted(self, tmp_path: Path) -> None:
         pixels = np.full((4, 4, 4), 0.5, np.float16)
@@ -596,14 +596,14 @@ class TestSave:
             assert np.array_equal(profile, original.getattribute("ICCProfile"))
 
     def test_attributes_are_added(self, tmp_path: Path) -> None:
-        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         save(made, tmp_path / "b.png", attributes={"Software": "vkbloom 9", "vkbloom:x": "y"})
         spec, _ = reread(tmp_path / "b.png")
         assert (spec["Software"], spec["vkbloom:x"]) == ("vkbloom 9", "y")
 
     @pytest.mark.parametrize("name", ["b.unknown", "b", "b.null", "b.term", "b.heic"])
     def test_extensions_that_cannot_be_written(self, tmp_path: Path, name: str) -> None:
-        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         for write in (lambda: save(made, tmp_path / name), lambda: check_writable(name)):
             with pytest.raises(ValueError, match="no image format for the extension"):
                 write()
@@ -611,14 +611,14 @@ class TestSave:
         check_writable("b.PNG")
 
     def test_pictures_that_no_format_holds(self, tmp_path: Path) -> None:
-        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         # Of depth only.
         with pytest.raises(ValueError, match=r"b\.zfile: zfile cannot hold such a picture"):
             save(made, tmp_path / "b.zfile")
         assert only_in(tmp_path) == []
 
     def test_folders_that_are_not_there(self, tmp_path: Path) -> None:
-        made = picture(np.ones((2, 2, 3), np.float32), "uint8")
+        made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         with pytest.raises(FileNotFoundError) as caught:
             save(made, tmp_path / "no" / "b.png")
         assert caught.value.filename == str(tmp_path / "no" / "b.png")
@@ -639,7 +639,7 @@ class TestSave:
 
         monkeypatch.setattr(safe_writing, "_is_readable", is_readable)
         with pytest.raises(OSError, match="is the disk full") as caught:
-            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
+            save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
         assert (caught.value.errno, caught.value.filename) == (errno.EIO, str(target))
         assert len(seen) == 1
         assert target.read_bytes() == b"before"
@@ -650,21 +650,21 @@ class TestSave:
         target = tmp_path / "b.png"
         target.write_bytes(b"before")
         with target.open("rb") as opened:
-            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
+            save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
             assert opened.read() == b"before"
         assert load(target).pixels.shape == (2, 2, 3)
 
     def test_a_folder_in_its_place(self, tmp_path: Path) -> None:
         (tmp_path / "b.png").mkdir()
         with pytest.raises(OSError, match=r"b\.png") as caught:
-            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), tmp_path / "b.png")
+            save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), tmp_path / "b.png")
         assert caught.value.filename == str(tmp_path / "b.png")
         assert only_in(tmp_path) == ["b.png"]
 
     def test_openimageio_missing(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "OpenImageIO", None)
         with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[images\]"):
-            save(picture(np.ones((2, 2, 3), np.float32), "uint8"), "b.png")
+            save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), "b.png")
 
 
 def test_real_files_come_back(shared_data: Path, tmp_path: Path) -> None:

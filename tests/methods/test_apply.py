@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.images import hdr_picture
+from tests.methods.cases import DTYPES, METHODS
 from tests.tolerance import (
     FORMATS,
     assert_close,
@@ -16,64 +18,17 @@ from tests.tolerance import (
     tolerance,
 )
 from vkbloom import (
-    DualKawase,
-    Pyramid,
     Renderer,
     Separable,
     Settings,
-    gaussian_weights,
     presets,
     reference,
 )
 
 Image = NDArray[Any]
 
-DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
 
-# No level of an 8-bit image has this luminance: a sum of whole multiples of 1e-4 / 255 never
-# meets it, so that rounding cannot lift a pixel over it.
-HARD_THRESHOLD = 0.30001
-
-METHODS: dict[str, Settings] = {
-    "tutorial": Separable(),
-    "outline": Separable(first_tap=0, texel="x", blur_strength=0.5),
-    "fractional": Separable(blur_scale=1.7),
-    "still": Separable(blur_scale=0.0),
-    "deferred": Separable(weights=DEFERRED, loops=3, blur_scale=1.1),
-    "layers": Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25)), blur_strength=0.5),
-    "loops-layers": Separable(layers=((1.0, 0.5), (2.5, 0.5)), loops=2, blur_strength=0.75),
-    "one-weight": Separable(weights=(0.75,)),
-    "longest": Separable(weights=gaussian_weights(20, 64), blur_strength=1.0),
-    "direct": Separable(direct=True),
-    "direct-loops-layers": Separable(
-        direct=True, loops=2, layers=((1.0, 0.5), (1.5, 0.5)), blur_strength=0.75, texel="x"
-    ),
-    "half-size": Separable(bloom_scale=0.5),
-    "double-size": Separable(bloom_scale=2.0, blur_scale=1.3),
-    "fixed-size": Separable(bloom_size=(31, 23), blur_scale=0.7),
-    "direct-half-size": Separable(bloom_scale=0.5, direct=True, weights=gaussian_weights(1.5)),
-    "hard-threshold": Separable(threshold=HARD_THRESHOLD),
-    "knee": Separable(threshold=0.3, knee=0.5, bloom_scale=0.5, intensity=0.5),
-    "pyramid": Pyramid(),
-    "pyramid-one-level": Pyramid(levels=1),
-    "pyramid-radius": Pyramid(levels=4, radius=1.6),
-    "pyramid-firefly": Pyramid(firefly_filter=True, threshold=0.2, knee=1.0),
-    "pyramid-sixteen": Pyramid(levels=16, bloom_scale=0.5),
-    "dual-kawase": DualKawase(),
-    "dual-kawase-offset": DualKawase(levels=2, offset=2.3, threshold=HARD_THRESHOLD),
-    "dual-kawase-deep": DualKawase(levels=7, bloom_size=(64, 48), intensity=0.3),
-}
-DTYPES = ("uint8", "float16", "float32")
 SIZES = ((1, 1), (1, 7), (7, 1), (13, 17), (97, 61), (333, 517))
-
-
-def picture(width: int, height: int, channels: int, dtype: str, seed: int = 0) -> Image:
-    """Mostly dark noise: most of what 8 bits hold of its bloom stays under 1."""
-    values = np.random.default_rng(seed).random((height, width, channels)) ** 2
-    if dtype == "uint8":
-        return np.rint(255 * values).astype(np.uint8)
-    # Beyond what 8 bits hold, and below 0.
-    return (8 * values - 0.5).astype(dtype)
 
 
 def flat(value: Any, dtype: str, size: tuple[int, int] = (37, 22)) -> Image:
@@ -87,7 +42,7 @@ def flat(value: Any, dtype: str, size: tuple[int, int] = (37, 22)) -> Image:
 def test_reference(renderer: Renderer, method: str, dtype: str, size: tuple[int, int]) -> None:
     width, height = size
     # Three and four channels by turns.
-    image = picture(width, height, 3 + width % 4 // 2, dtype)
+    image = hdr_picture(width, height, 3 + width % 4 // 2, dtype)
     settings = METHODS[method]
     assert_matches_reference(renderer.apply(image, settings), image, settings)
 
@@ -104,7 +59,7 @@ def test_reference(renderer: Renderer, method: str, dtype: str, size: tuple[int,
     ],
 )
 def test_reference_at_1920_1080(renderer: Renderer, method: str, dtype: str) -> None:
-    image = picture(1920, 1080, 3, dtype)
+    image = hdr_picture(1920, 1080, 3, dtype)
     settings = METHODS[method]
     assert_matches_reference(renderer.apply(image, settings), image, settings)
 
@@ -117,7 +72,7 @@ def test_reference_at_1920_1080(renderer: Renderer, method: str, dtype: str) -> 
 def test_format_of_the_bloom_buffers(
     renderer: Renderer, method: str, dtype: str, format: Any
 ) -> None:
-    image = picture(45, 30, 4, dtype)
+    image = hdr_picture(45, 30, 4, dtype)
     settings = METHODS[method].replace(format=format)
     assert_matches_reference(renderer.apply(image, settings), image, settings)
 
@@ -128,7 +83,7 @@ def test_format_of_the_bloom_buffers(
 def test_names_shapes_and_dtypes(
     renderer: Renderer, method: str, dtype: str, channels: int
 ) -> None:
-    image = picture(40, 24, channels, dtype)
+    image = hdr_picture(40, 24, channels, dtype)
     frames = renderer.apply(image, METHODS[method])
     blurs = {
         "tutorial": {"blur_vertical": (24, 40)},
@@ -162,12 +117,12 @@ def test_names_shapes_and_dtypes(
 
 
 def test_direct_has_no_vertical_blur(renderer: Renderer) -> None:
-    frames = renderer.apply(picture(9, 5, 3, "uint8"), Separable(direct=True))
+    frames = renderer.apply(hdr_picture(9, 5, 3, "uint8"), Separable(direct=True))
     assert list(frames) == ["glow", "bloom", "final"]
 
 
 def test_no_settings_are_the_tutorials(renderer: Renderer) -> None:
-    image = picture(300, 20, 3, "uint8")
+    image = hdr_picture(300, 20, 3, "uint8")
     frames = renderer.apply(image)
     assert frames.settings == Separable()
     # An image keeps its own size where a forward scene would have 256 x 256.
@@ -178,7 +133,7 @@ def test_no_settings_are_the_tutorials(renderer: Renderer) -> None:
 @pytest.mark.parametrize("name", presets)
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_presets(renderer: Renderer, name: str, dtype: str) -> None:
-    image = picture(61, 43, 3, dtype)
+    image = hdr_picture(61, 43, 3, dtype)
     assert_matches_reference(renderer.apply(image, presets[name]), image, presets[name])
 
 
@@ -252,7 +207,7 @@ def test_composite_tonemap_and_encoding(
 @pytest.mark.parametrize("composite", COMPOSITES)
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
 def test_composite_beyond_white_and_black(renderer: Renderer, dtype: str, composite: Any) -> None:
-    image = picture(14, 19, 4, dtype)
+    image = hdr_picture(14, 19, 4, dtype)
     assert image.min() < -0.4
     assert image.max() > 6
     assert_composite(renderer, image, Separable(composite=composite, intensity=0.7))

@@ -11,10 +11,11 @@ from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.framebuffers import assert_same
+from tests.images import picture
 from tests.tolerance import assert_close, assert_matches_reference, tolerance
 from vkbloom import (
     DualKawase,
-    Frames,
     Pyramid,
     Renderer,
     Scene,
@@ -35,17 +36,6 @@ METHODS: dict[str, Settings] = {
 }
 DTYPES = ("uint8", "float16", "float32")
 OFF = Separable(bloom=False)
-
-
-def picture(height: int, width: int, channels: int, dtype: str, seed: int = 0) -> Image:
-    values = np.random.default_rng(seed).random((height, width, channels))
-    return np.rint(255 * values).astype(dtype) if dtype == "uint8" else values.astype(dtype)
-
-
-def assert_same(frames: Frames, others: Frames) -> None:
-    assert list(frames) == list(others)
-    for name, array in frames.items():
-        assert_array_equal(array, others[name], err_msg=name)
 
 
 # --- Strides ---
@@ -92,7 +82,7 @@ VIEWS: dict[str, Callable[[Image], Image]] = {
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("view", VIEWS)
 def test_any_strides(renderer: Renderer, view: str, dtype: str) -> None:
-    image = VIEWS[view](picture(15, 22, 4, dtype))
+    image = VIEWS[view](picture(22, 15, 4, dtype))
     before = image.copy()
     plain = np.array(image, dtype=dtype, order="C")
     frames = renderer.apply(image)
@@ -105,7 +95,7 @@ def test_any_strides(renderer: Renderer, view: str, dtype: str) -> None:
 
 
 def test_subclasses_and_memory_maps(renderer: Renderer, tmp_path: Any) -> None:
-    image = picture(6, 5, 3, "float32")
+    image = picture(5, 6, 3, "float32")
     mapped = np.memmap(tmp_path / "image.raw", np.float32, "w+", shape=image.shape)
     mapped[:] = image
     frames = renderer.apply(mapped)
@@ -119,7 +109,7 @@ def test_subclasses_and_memory_maps(renderer: Renderer, tmp_path: Any) -> None:
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("channels", [3, 4])
 def test_same_image_again_runs_no_pass(renderer: Renderer, dtype: str, channels: int) -> None:
-    image = picture(20, 31, channels, dtype, seed=1)
+    image = picture(31, 20, channels, dtype, seed=1)
     first = renderer.apply(image, Pyramid())
     assert first.timings
     again = renderer.apply(image.copy(), Pyramid())
@@ -130,7 +120,7 @@ def test_same_image_again_runs_no_pass(renderer: Renderer, dtype: str, channels:
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("channels", [3, 4])
 def test_image_changed_in_place(renderer: Renderer, dtype: str, channels: int) -> None:
-    image = picture(20, 31, channels, dtype, seed=2)
+    image = picture(31, 20, channels, dtype, seed=2)
     renderer.apply(image, Pyramid())
     # One component of one pixel, the last that a copy reaches.
     image[-1, -1, -1] = 77 if dtype == "uint8" else 7.5
@@ -142,14 +132,14 @@ def test_image_changed_in_place(renderer: Renderer, dtype: str, channels: int) -
 def test_images_of_all_kinds_by_turns(renderer: Renderer) -> None:
     """What is left of one image must not show in the next one."""
     images = [
-        picture(12, 18, 3, "float32"),
-        picture(12, 18, 4, "float32"),
         picture(18, 12, 3, "float32"),
+        picture(18, 12, 4, "float32"),
+        picture(12, 18, 3, "float32"),
         # As many bytes as the one before.
-        picture(18, 24, 3, "float16"),
-        picture(18, 24, 4, "uint8"),
+        picture(24, 18, 3, "float16"),
+        picture(24, 18, 4, "uint8"),
         picture(1, 1, 3, "uint8"),
-        picture(12, 18, 3, "float32", seed=1),
+        picture(18, 12, 3, "float32", seed=1),
     ]
     for image in [*images, *images[::-1], *images[::2], *images[::3]]:
         for settings in (Separable(), DualKawase(levels=2)):
@@ -157,7 +147,7 @@ def test_images_of_all_kinds_by_turns(renderer: Renderer) -> None:
 
 
 def test_only_what_a_setting_changes_runs_again(renderer: Renderer) -> None:
-    image = picture(20, 31, 3, "float32", seed=3)
+    image = picture(31, 20, 3, "float32", seed=3)
     whole = set(renderer.apply(image, Separable()).timings)
     last = set(renderer.apply(image, Separable(exposure=1.0)).timings)
     assert len(last) == 1
@@ -168,7 +158,7 @@ def test_only_what_a_setting_changes_runs_again(renderer: Renderer) -> None:
 
 
 def test_what_is_not_wanted_does_not_run(renderer: Renderer) -> None:
-    image = picture(20, 31, 3, "float32", seed=4)
+    image = picture(31, 20, 3, "float32", seed=4)
     frames = renderer.apply(image, attachments=("glow",))
     assert list(frames) == ["glow"]
     assert len(frames.timings) == 1
@@ -183,7 +173,7 @@ def test_what_is_not_wanted_does_not_run(renderer: Renderer) -> None:
 
 def with_specials(dtype: str, channels: int, size: tuple[int, int] = (23, 17)) -> Image:
     width, height = size
-    image = picture(height, width, channels, dtype, seed=5)
+    image = picture(width, height, channels, dtype, seed=5)
     image[0, 0, 0] = np.nan
     image[-1, -1] = -np.inf
     image[5, 5] = np.inf
@@ -239,11 +229,11 @@ def test_nan_and_infinity_stay_in_final(
 def test_special_counts_follow_the_image(renderer: Renderer, dtype: str) -> None:
     special = with_specials(dtype, 3)
     counts = (int(np.isnan(special).sum()), int(np.isinf(special).sum()))
-    plain = picture(17, 23, 3, dtype)
+    plain = picture(23, 17, 3, dtype)
     for image, expected in [(special, counts), (special, counts), (plain, (0, 0))] * 2:
         info = renderer.apply(image).info
         assert (info["nan"], info["inf"]) == expected
-    image = picture(17, 23, 3, "uint8")
+    image = picture(23, 17, 3, "uint8")
     assert renderer.apply(image).info["nan"] == renderer.apply(image).info["inf"] == 0
 
 
@@ -307,7 +297,7 @@ def test_no_bloom_is_the_identity_of_floats(renderer: Renderer) -> None:
 def test_alpha_is_untouched(
     renderer: Renderer, method: str, dtype: str, composite: Any, tonemap: Any
 ) -> None:
-    image = picture(14, 15, 4, dtype, seed=7)
+    image = picture(15, 14, 4, dtype, seed=7)
     if dtype != "uint8":
         # Beyond 0..1, too.
         image[..., 3] = 4 * image[..., 3] - 2
@@ -326,7 +316,7 @@ def test_alpha_is_untouched(
 
 
 def test_attachments_come_in_the_order_of_the_data_flow(renderer: Renderer) -> None:
-    image = picture(9, 12, 3, "uint8", seed=8)
+    image = picture(12, 9, 3, "uint8", seed=8)
     whole = renderer.apply(image)
     frames = renderer.apply(image, attachments=["final", "glow", "final"])
     assert list(frames) == ["glow", "final"]
@@ -360,7 +350,7 @@ def test_attachments_of_the_wrong_type(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_out_is_filled_in_place(renderer: Renderer, dtype: str) -> None:
-    image = picture(9, 12, 3, dtype, seed=9)
+    image = picture(12, 9, 3, dtype, seed=9)
     out = {"bloom": np.zeros((9, 12, 4), dtype), "final": np.zeros((9, 12, 3), dtype)}
     frames = renderer.apply(image, out=out)
     assert list(frames) == ["glow", "blur_vertical", "bloom", "final"]
@@ -371,7 +361,7 @@ def test_out_is_filled_in_place(renderer: Renderer, dtype: str) -> None:
 
 
 def test_out_of_a_repeated_image_is_filled(renderer: Renderer) -> None:
-    image = picture(9, 12, 3, "uint8", seed=10)
+    image = picture(12, 9, 3, "uint8", seed=10)
     expected = renderer.apply(image)["final"]
     out = {"final": np.zeros_like(image)}
     frames = renderer.apply(image, out=out)
@@ -380,7 +370,7 @@ def test_out_of_a_repeated_image_is_filled(renderer: Renderer) -> None:
 
 
 def test_out_can_be_the_image_itself(renderer: Renderer) -> None:
-    image = picture(9, 12, 3, "float32", seed=11)
+    image = picture(12, 9, 3, "float32", seed=11)
     expected = renderer.apply(image.copy())["final"]
     renderer.apply(image, out={"final": image})
     assert_array_equal(image, expected)
@@ -401,7 +391,7 @@ def test_out_can_be_the_image_itself(renderer: Renderer) -> None:
     ],
 )
 def test_out_that_does_not_fit(renderer: Renderer, array: Image) -> None:
-    image = picture(9, 12, 3, "uint8")
+    image = picture(12, 9, 3, "uint8")
     before = array.copy()
     with pytest.raises(ValueError, match="out: final"):
         renderer.apply(image, out={"final": array})
@@ -412,17 +402,17 @@ def test_out_that_does_not_fit(renderer: Renderer, array: Image) -> None:
 def test_out_of_the_other_byte_order(renderer: Renderer) -> None:
     out = {"final": np.zeros((9, 12, 3), np.dtype(np.float32).newbyteorder())}
     with pytest.raises(ValueError, match="out: final"):
-        renderer.apply(picture(9, 12, 3, "float32"), out=out)
+        renderer.apply(picture(12, 9, 3, "float32"), out=out)
 
 
 def test_out_that_is_no_array(renderer: Renderer) -> None:
     wrong: Any = {"final": bytearray(9 * 12 * 3)}
     with pytest.raises(TypeError, match="out: final"):
-        renderer.apply(picture(9, 12, 3, "uint8"), out=wrong)
+        renderer.apply(picture(12, 9, 3, "uint8"), out=wrong)
 
 
 def test_out_that_shares_memory(renderer: Renderer) -> None:
-    image = picture(9, 12, 3, "uint8")
+    image = picture(12, 9, 3, "uint8")
     whole = np.zeros((18, 12, 4), np.uint8)
     with pytest.raises(ValueError, match=r"^out: glow and bloom must not share memory"):
         renderer.apply(image, out={"glow": whole[:9], "bloom": whole[4:13]})
@@ -433,19 +423,19 @@ def test_out_that_shares_memory(renderer: Renderer) -> None:
 
 
 def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
-    image = picture(9, 12, 3, "uint8", seed=12)
+    image = picture(12, 9, 3, "uint8", seed=12)
     first = renderer.apply(image)
     kept = {name: array.copy() for name, array in first.items()}
     second = renderer.apply(image)
     for array in second.values():
         array[:] = 1
-    renderer.apply(picture(9, 12, 3, "uint8", seed=13))
+    renderer.apply(picture(12, 9, 3, "uint8", seed=13))
     for name, array in first.items():
         assert_array_equal(array, kept[name], err_msg=name)
 
 
 def test_framebuffers_outlive_the_renderer() -> None:
-    image = picture(9, 12, 3, "float16", seed=14)
+    image = picture(12, 9, 3, "float16", seed=14)
     with Renderer() as renderer:
         frames = renderer.apply(image)
     assert_matches_reference(frames, image, Separable())
@@ -455,7 +445,7 @@ def test_framebuffers_outlive_the_renderer() -> None:
 
 
 def test_apply_many(renderer: Renderer) -> None:
-    image = picture(20, 30, 3, "float32", seed=15)
+    image = picture(30, 20, 3, "float32", seed=15)
     sequence: list[Settings] = [
         *METHODS.values(),
         *(Separable(blur_strength=strength) for strength in (0.5, 1.0, 2.0)),
@@ -471,7 +461,7 @@ def test_apply_many(renderer: Renderer) -> None:
 
 
 def test_apply_many_is_lazy_and_runs_what_changed(renderer: Renderer) -> None:
-    image = picture(20, 30, 3, "float32", seed=16)
+    image = picture(30, 20, 3, "float32", seed=16)
     asked = []
 
     def exposures() -> Any:
@@ -580,7 +570,7 @@ def test_image_of_the_wrong_shape(renderer: Renderer, dtype: str, shape: tuple[i
 
 def test_masked_images(renderer: Renderer) -> None:
     """What lies under a mask is not to be seen."""
-    image = picture(6, 5, 3, "float32")
+    image = picture(5, 6, 3, "float32")
     masked = np.ma.masked_greater(image, float(np.median(image)))
     with pytest.raises(ValueError, match=r"^image: some of it is masked"):
         renderer.apply(masked)
@@ -609,7 +599,7 @@ def test_too_large(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_largest_side(renderer: Renderer, method: str) -> None:
-    image = picture(2, largest_side(renderer), 3, "float32", seed=17)
+    image = picture(largest_side(renderer), 2, 3, "float32", seed=17)
     for view in (image, image.transpose(1, 0, 2)):
         frames = renderer.apply(view, METHODS[method])
         assert_matches_reference(frames, view, METHODS[method])
@@ -620,7 +610,7 @@ def test_largest_side(renderer: Renderer, method: str) -> None:
 def test_long_odd_side(renderer: Renderer, method: str, side: int | None) -> None:
     """The sizes of two levels have no whole ratio: positions need more bits than a float has."""
     side = side or largest_side(renderer) - 1
-    image = picture(3, side, 3, "float32", seed=19)
+    image = picture(side, 3, 3, "float32", seed=19)
     for view in (image, image.transpose(1, 0, 2)):
         frames = renderer.apply(view, METHODS[method])
         assert_matches_reference(frames, view, METHODS[method])

@@ -1,4 +1,4 @@
-"""Bloom on real HDR images: equal to the reference, and none of what spoils a picture."""
+"""Bloom on real HDR images: equal to the reference, and none of what spoils a photo."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ METHODS: dict[str, Settings] = {
 
 
 @pytest.fixture(scope="module", params=PICTURES)
-def picture(request: pytest.FixtureRequest, shared_data: Path) -> Image:
+def photo(request: pytest.FixtureRequest, shared_data: Path) -> Image:
     """One of the images as float32; they are stored as half, so that float16 loses nothing."""
     path = shared_data / "hdr" / f"{request.param}.exr"
     buffer = oiio.ImageBuf(str(path))
@@ -51,9 +51,9 @@ def apply(renderer: Renderer, image: Image, settings: Settings) -> dict[str, Arr
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
 @pytest.mark.parametrize("method", METHODS)
-def test_reference(renderer: Renderer, picture: Image, method: str, dtype: str) -> None:
+def test_reference(renderer: Renderer, photo: Image, method: str, dtype: str) -> None:
     settings = METHODS[method]
-    image = picture.astype(dtype)
+    image = photo.astype(dtype)
     frames = renderer.apply(image, settings)
     # The files hold neither NaN nor infinity, and none comes in.
     assert (frames.info["nan"], frames.info["inf"]) == (0, 0)
@@ -61,13 +61,13 @@ def test_reference(renderer: Renderer, picture: Image, method: str, dtype: str) 
 
 
 @pytest.mark.parametrize("tonemap", ["reinhard", "aces", "khronos_neutral", "agx"])
-def test_reference_tone_mapped(renderer: Renderer, picture: Image, tonemap: Any) -> None:
+def test_reference_tone_mapped(renderer: Renderer, photo: Image, tonemap: Any) -> None:
     settings = Pyramid(
         threshold=1.0, composite="mix", intensity=0.2, tonemap=tonemap, encoding="srgb"
     )
-    frames = renderer.apply(picture, settings, attachments=("bloom", "final"))
-    expected = reference.composite(picture, frames["bloom"], settings)
-    assert_close("final", frames["final"], expected, tolerance(picture.dtype, expected))
+    frames = renderer.apply(photo, settings, attachments=("bloom", "final"))
+    expected = reference.composite(photo, frames["bloom"], settings)
+    assert_close("final", frames["final"], expected, tolerance(photo.dtype, expected))
 
 
 def displacement(image: Array, other: Array) -> Array:
@@ -91,8 +91,8 @@ SHIFTS = {"dual-kawase": 0.5}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_no_shift(renderer: Renderer, picture: Image, method: str) -> None:
-    frames = apply(renderer, np.maximum(picture, 0), METHODS[method])
+def test_no_shift(renderer: Renderer, photo: Image, method: str) -> None:
+    frames = apply(renderer, np.maximum(photo, 0), METHODS[method])
     glow, bloom = frames["glow"].sum(axis=-1), frames["bloom"].sum(axis=-1)
     # Each texel of a smaller bloom buffer as the square of pixels that it covers.
     side = bloom.shape[0] // glow.shape[0]
@@ -101,9 +101,9 @@ def test_no_shift(renderer: Renderer, picture: Image, method: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_no_ringing(renderer: Renderer, picture: Image, method: str) -> None:
+def test_no_ringing(renderer: Renderer, photo: Image, method: str) -> None:
     """Nothing is darker for the bloom beside it, nor brighter than the gain allows."""
-    image = np.maximum(picture, 0)
+    image = np.maximum(photo, 0)
     frames = apply(renderer, image, METHODS[method])
     gain = reference.gain(METHODS[method].replace(threshold=None))
     for name, framebuffer in frames.items():
@@ -123,15 +123,15 @@ def test_no_ringing(renderer: Renderer, picture: Image, method: str) -> None:
         ("dual-kawase", "symmetric"),
     ],
 )
-def test_no_dark_border(renderer: Renderer, picture: Image, method: str, beyond: Any) -> None:
+def test_no_dark_border(renderer: Renderer, photo: Image, method: str, beyond: Any) -> None:
     """At the edges the bloom is what it would be if the picture went on beyond them.
 
     Black beyond the edges would leave 0.6 of a chain's bloom there.
     """
     # A whole number of all levels' texels, so that they keep their places.
     pad = 64
-    height, width = (side // pad * pad for side in picture.shape[:2])
-    image = np.maximum(picture[:height, :width, :3], 0)
+    height, width = (side // pad * pad for side in photo.shape[:2])
+    image = np.maximum(photo[:height, :width, :3], 0)
     larger = np.pad(image, ((pad, pad), (pad, pad), (0, 0)), mode=beyond)
     frames = apply(renderer, image, METHODS[method])
     whole = apply(renderer, larger, METHODS[method])["bloom"][pad:-pad, pad:-pad]
@@ -156,7 +156,7 @@ def far_from(lit: NDArray[np.bool_], distance: int) -> NDArray[np.bool_]:
 
 @pytest.mark.parametrize("levels", [4, 5, 6])
 @pytest.mark.parametrize("method", [Pyramid, DualKawase])
-def test_no_blocks(renderer: Renderer, picture: Image, method: Any, levels: int) -> None:
+def test_no_blocks(renderer: Renderer, photo: Image, method: Any, levels: int) -> None:
     """Away from what glows, the bloom comes from the small levels alone, and must be smooth.
 
     Along a row, d1 is the difference of neighbours and d2 that of neighbouring d1. Flat blocks
@@ -164,7 +164,7 @@ def test_no_blocks(renderer: Renderer, picture: Image, method: Any, levels: int)
     twice that of |d1|. Straight lines between the texels of a level have d2 where they meet
     alone, and a smooth hill of a width of n pixels has a ratio of about 4 / n.
     """
-    image = np.maximum(picture, 0)
+    image = np.maximum(photo, 0)
     frames = apply(renderer, image, method(threshold=8.0, levels=levels))
     bloom = frames["bloom"].sum(axis=-1)
     far = far_from((frames["glow"] > 0).max(axis=-1), 2**levels // 2)

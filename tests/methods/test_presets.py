@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.tolerance import real
 from vkbloom import (
     BevyBloom,
     DualKawase,
@@ -42,11 +43,6 @@ def lights(size: tuple[int, int], dtype: str, seed: int = 3) -> Array:
     points[height // 2, width // 3] = True
     image[points] = generator.random((int(points.sum()), 3)) * (1 if dtype == "uint8" else 40)
     return np.round(image * 255).astype(np.uint8) if dtype == "uint8" else image.astype(dtype)
-
-
-def real(array: Array) -> NDArray[np.float64]:
-    values = array.astype(np.float64)
-    return values / 255 if array.dtype == np.uint8 else values
 
 
 def tolerance(name: str, expected: Array, format: str, settings: Settings, downs: int) -> float:

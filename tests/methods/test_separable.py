@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
 from tests.screens import noise, screen
+from tests.tolerance import colours
 from vkbloom import TUTORIAL, Frames, Renderer, Scene, Separable, gaussian_weights, reference
 
 Format = Literal["rgba8unorm", "rgba16float", "rgba32float"]
@@ -27,12 +28,6 @@ LEVELS = {"blur_vertical": 1, "bloom": 2}
 FRACTION = {"rgba16float": 1e-3, "rgba32float": 1e-4}
 
 Size = tuple[int, int]
-
-
-def real(image: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the colours of a framebuffer, 0..1 for 8 bits."""
-    colours = image[..., :3].astype(np.float64)
-    return colours * LEVEL if image.dtype == np.uint8 else colours
 
 
 def render(
@@ -65,7 +60,7 @@ def assert_is_the_references(frames: Frames, settings: Separable, format: Format
             apart = np.abs(frames[name][..., :3] - np.round(right / LEVEL)).max()
             assert apart <= LEVELS[name], name
         else:
-            apart = np.abs(real(frames[name]) - right).max()
+            apart = np.abs(colours(frames[name]) - right).max()
             assert apart <= FRACTION[format] * highest, name
         assert (frames[name][..., 3] == (255 if format == "rgba8unorm" else 1)).all()
 
@@ -190,8 +185,8 @@ def test_separable_is_direct(renderer: Renderer, format: Format, blur_scale: flo
     assert reference.gain(settings) <= 1 + 1e-9
     # Squares, of which the blur leaves a structure that rounding to 8 bits does not rule.
     image = np.kron(noise((37, 31), brightest(format)), np.ones((7, 9, 1)))
-    passes = real(render(renderer, image, settings)["bloom"])
-    direct = real(render(renderer, image, settings.replace(direct=True))["bloom"])
+    passes = colours(render(renderer, image, settings)["bloom"])
+    direct = colours(render(renderer, image, settings.replace(direct=True))["bloom"])
     highest = direct.max()
     assert highest > 0.3
     likeness = similarity(passes, direct, highest)
@@ -210,7 +205,7 @@ def test_another_kernel_is_not_the_same(renderer: Renderer) -> None:
     image = np.kron(noise((37, 31), 8.0), np.ones((7, 9, 1)))
     settings = NORMALIZED.replace(format="rgba32float")
     wider = settings.replace(weights=gaussian_weights(2.02))
-    passes, other = (real(render(renderer, image, s)["bloom"]) for s in (settings, wider))
+    passes, other = (colours(render(renderer, image, s)["bloom"]) for s in (settings, wider))
     likeness = similarity(passes, other, passes.max())
     assert likeness < 0.99999
     assert np.abs(passes - other).max() > 2 * FRACTION["rgba16float"] * passes.max()
@@ -241,21 +236,21 @@ GAINS = [
 @pytest.mark.parametrize("settings", GAINS)
 def test_the_gain_of_a_flat_glow(renderer: Renderer, settings: Separable) -> None:
     settings = settings.replace(format="rgba32float")
-    bloom = real(render(renderer, flat(0.75), settings)["bloom"])
+    bloom = colours(render(renderer, flat(0.75), settings)["bloom"])
     np.testing.assert_allclose(bloom, 0.75 * reference.gain(settings), rtol=1e-5)
 
 
 def test_the_tutorials_gain(renderer: Renderer) -> None:
     # 0.227027 + 1.5 * 2 (0.1945946 + 0.1216216 + 0.054054 + 0.016216) = 1.3864856 a direction.
     frames = render(renderer, flat(0.5), Separable(format="rgba32float"))
-    np.testing.assert_allclose(real(frames["blur_vertical"]), 0.5 * 1.3864856, rtol=1e-6)
-    np.testing.assert_allclose(real(frames["bloom"]), 0.5 * 1.3864856**2, rtol=1e-6)
+    np.testing.assert_allclose(colours(frames["blur_vertical"]), 0.5 * 1.3864856, rtol=1e-6)
+    np.testing.assert_allclose(colours(frames["bloom"]), 0.5 * 1.3864856**2, rtol=1e-6)
 
 
 @pytest.mark.parametrize("settings", GAINS)
 def test_the_gain_in_8_bits_is_clamped(renderer: Renderer, settings: Separable) -> None:
     gain = reference.gain(settings)
-    bloom = real(render(renderer, flat(128 * LEVEL), settings)["bloom"])
+    bloom = colours(render(renderer, flat(128 * LEVEL), settings)["bloom"])
     # Layers are clamped as they add up, and loops on the way, but all of these only grow or
     # only shrink, so that the end is the same.
     right = min(1.0, 128 * LEVEL * gain)
@@ -296,7 +291,7 @@ def test_the_spread_of_a_point(
     point = np.zeros((height, width, 3))
     point[height // 2, width // 2] = 1.0
     settings = Separable(blur_scale=blur_scale, texel=texel, format=format)
-    bloom = real(render(renderer, point, settings)["bloom"])[..., 0]
+    bloom = colours(render(renderer, point, settings)["bloom"])[..., 0]
     # A texel of the width is height / width texels of the height.
     texels = {"x": 1.0, "y": height / width if texel == "x" else 1.0}
     for axis, line in (("x", bloom.sum(axis=0)), ("y", bloom.sum(axis=1))):
@@ -312,7 +307,7 @@ def test_the_variance_grows_with_the_square_of_the_scale(renderer: Renderer) -> 
     point[31, 31] = 1.0
     variances = [
         spread(
-            real(
+            colours(
                 render(renderer, point, Separable(blur_scale=scale, format="rgba32float"))["bloom"]
             )[..., 0].sum(axis=0)
         )[1]
@@ -326,7 +321,7 @@ def test_the_variance_grows_with_the_square_of_the_scale(renderer: Renderer) -> 
 def test_a_pass_is_linear_in_its_strength(renderer: Renderer, format: Format) -> None:
     image = noise((61, 47), 4.0)
     zero, one, two, four = (
-        real(
+        colours(
             render(renderer, image, Separable(blur_strength=strength, format=format))[
                 "blur_vertical"
             ]
@@ -346,7 +341,7 @@ def test_a_pass_is_linear_in_its_strength(renderer: Renderer, format: Format) ->
 def test_two_passes_are_quadratic_in_their_strength(renderer: Renderer, format: Format) -> None:
     image = noise((61, 47), 4.0)
     blooms = [
-        real(render(renderer, image, Separable(blur_strength=strength, format=format))["bloom"])
+        colours(render(renderer, image, Separable(blur_strength=strength, format=format))["bloom"])
         for strength in (0.0, 1.0, 2.0, 3.0)
     ]
     # Third differences of a parabola are 0; their four terms have factors of 8 together.
@@ -359,7 +354,7 @@ def test_two_passes_are_quadratic_in_their_strength(renderer: Renderer, format: 
 def test_layers_add_up(renderer: Renderer, format: Format) -> None:
     image = noise((61, 47), 4.0)
     near, far, both = (
-        real(render(renderer, image, Separable(layers=layers, format=format))["bloom"])
+        colours(render(renderer, image, Separable(layers=layers, format=format))["bloom"])
         for layers in (((1.0, 1.0),), ((3.0, 1.0),), ((1.0, 0.5), (3.0, 2.0)))
     )
     allowed = 3 * FRACTION[format] * both.max()
@@ -371,7 +366,7 @@ def test_a_blur_is_linear_in_its_glow(renderer: Renderer, format: Format) -> Non
     settings = Separable(blur_scale=1.37, format=format)
     first, second = noise((61, 47), 4.0), noise((61, 47), 4.0)[::-1, ::-1]
     one, other, both = (
-        real(render(renderer, image, settings)["bloom"])
+        colours(render(renderer, image, settings)["bloom"])
         for image in (first, second, 0.5 * first + 3 * second)
     )
     allowed = 4 * FRACTION[format] * both.max()
@@ -383,7 +378,7 @@ def test_the_edge_goes_on_beyond_itself(renderer: Renderer) -> None:
     image = flat(0.0, (40, 20))
     image[:, 20:] = 1.0
     settings = NORMALIZED.replace(format="rgba32float")
-    bloom = real(render(renderer, image, settings)["bloom"])
+    bloom = colours(render(renderer, image, settings)["bloom"])
     assert (np.abs(bloom - bloom[:1]) < 1e-5).all()
     np.testing.assert_allclose(bloom[:, :14], 0.0, atol=1e-6)
     np.testing.assert_allclose(bloom[:, 26:], 1.0, rtol=1e-5)

@@ -15,14 +15,22 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 from vkbloom import Frames, Separable
+from vkbloom.cli.compare import tolerances_of
 from vkbloom.cli.program import program
 from vkbloom.io.image_writing import save
 from vkbloom.io.images import Picture
 from vkbloom.io.srgb import decode_srgb
-from vkbloom.views.comparison import Comparison, Limits, compare, difference, flip_map
+from vkbloom.views.comparison import Comparison, compare, difference, flip_map
+from vkbloom.views.tolerances import Tolerances, failures
 
 oiio = pytest.importorskip("OpenImageIO")
 metrics = pytest.importorskip("skimage.metrics")
+
+
+def reasons(found: Comparison, tolerances: Tolerances | None = None) -> tuple[str, ...]:
+    tolerances = tolerances or tolerances_of()
+    return tuple(reason for _, reason in failures(found, tolerances, tolerances.metrics))
+
 
 FIGURES = ("max_error", "mean_error", "percent_over", "ssim", "psnr", "flip")
 
@@ -48,7 +56,7 @@ class TestFigures:
         a = image(*shape, dtype=dtype)
         found = compare(a, a.copy())
         assert found.identical
-        assert found.failures() == ()
+        assert reasons(found) == ()
         assert (found.max_error, found.mean_error, found.percent_over) == (0, 0, 0)
         assert (found.max_error_at, found.max_error_values) == (None, None)
         assert (found.psnr, found.flip) == (math.inf, 0)
@@ -65,7 +73,8 @@ class TestFigures:
         assert found.mean_error == pytest.approx(0.75 / a.size, rel=1e-12)
         assert found.percent_over == pytest.approx(100 * 2 / 240, rel=1e-12)
         assert not found.identical
-        assert found.failures() == ("the images differ",)
+        (reason,) = reasons(found)
+        assert " % of the pixels differ; largest difference " in reason
 
     def test_pixels_over_a_threshold(self) -> None:
         a = np.zeros((10, 10, 3), np.float32)
@@ -81,7 +90,7 @@ class TestFigures:
         a = np.repeat(np.arange(largest, dtype=dtype)[:, None], 8, axis=1)
         found = compare(a, a + np.ones_like(a))
         assert found.max_error == 1 / largest
-        assert found.failures(Limits(max_error=1 / largest)) == ()
+        assert reasons(found, tolerances_of(max_error=1 / largest)) == ()
 
     def test_8_bits_against_16(self) -> None:
         a = image(16, 16, 3, dtype="uint8")
@@ -146,7 +155,8 @@ class TestFigures:
         found = compare(a, changed(a, (3, 4, 3), a[3, 4, 3] + 1))
         assert found.max_error_at == (4, 3, 3)
         assert found.flip == 0
-        assert found.failures() == ("the images differ",)
+        (reason,) = reasons(found)
+        assert " % of the pixels differ; largest difference " in reason
 
     @pytest.mark.parametrize("shape", [(1, 1, 3), (6, 100, 3), (100, 6, 1)])
     def test_ssim_needs_7_pixels(self, shape: tuple[int, ...]) -> None:
@@ -156,9 +166,9 @@ class TestFigures:
         assert found.not_computed == {"ssim": "a side is under the window's 7 pixels"}
         assert found.psnr is not None
         assert found.flip is not None
-        assert found.failures(Limits(max_error=1)) == ()
-        (reason,) = found.failures(Limits(min_ssim=-1))
-        assert reason.startswith("ssim has a limit and is not computed: a side is under")
+        assert reasons(found, tolerances_of(max_error=1)) == ()
+        (reason,) = reasons(found, tolerances_of(min_ssim=-1))
+        assert reason.startswith("SSIM is not computed: a side is under")
 
     def test_an_openimageio_without_flip(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delattr(oiio.ImageBufAlgo, "FLIP_diff")
@@ -166,7 +176,7 @@ class TestFigures:
         found = compare(a, a)
         assert (found.flip, found.identical) == (None, True)
         assert found.not_computed == {"flip": "OpenImageIO 3.2 is needed"}
-        assert len(found.failures(Limits(max_flip=1))) == 1
+        assert len(reasons(found, tolerances_of(max_flip=1))) == 1
 
     def test_extreme_values(self) -> None:
         a = np.full((8, 8, 3), 1.7e308)
@@ -174,7 +184,7 @@ class TestFigures:
         assert found.max_error == math.inf
         assert found.ssim is None
         assert found.psnr is None
-        assert found.failures(Limits(max_error=1e308, min_ssim=-1, min_psnr=-1e300))
+        assert reasons(found, tolerances_of(max_error=1e308, min_ssim=-1, min_psnr=-1e300))
         picture, scale = difference(a, -a)
         assert (picture == 1).all()
         assert 0 < scale < 1
@@ -246,10 +256,10 @@ class TestMismatches:
         found = compare(a, b, allow_nan=True)
         assert found.mismatches == (reason,)
         assert not found.identical
-        generous = Limits(max_error=math.inf, min_ssim=-1, max_flip=1, fail_percent=100)
-        assert found.failures(Limits(max_error=1e9)) == (reason,)
-        assert found.failures() == (reason,)
-        assert reason in compare(a, b, threshold=math.inf).failures(generous)
+        generous = tolerances_of(max_error=math.inf, min_ssim=-1, max_flip=1, fail_percent=100)
+        assert reasons(found, tolerances_of(max_error=1e9)) == (reason,)
+        assert reasons(found) == (reason,)
+        assert reason in reasons(compare(a, b, threshold=math.inf), generous)
         assert all(getattr(found, name) is None for name in FIGURES)
         with pytest.raises(ValueError, match=f"there is no difference picture: {reason}"):
             difference(a, b)
@@ -266,7 +276,7 @@ class TestMismatches:
         found = compare(*(pair[::-1] if swapped else pair), allow_nan=allow_nan)
         reason = "NaN or infinity in one image only, 1 values, the first at x 5, y 4, channel 1"
         assert found.mismatches == (reason,)
-        assert found.failures(Limits(max_error=math.inf)) == (reason,)
+        assert reasons(found, tolerances_of(max_error=math.inf)) == (reason,)
         assert not found.identical
         assert found.percent_over == pytest.approx(100 / 120, rel=1e-12)
         # The figures are of all the others.
@@ -278,15 +288,15 @@ class TestMismatches:
             found = compare(
                 changed(a, (0, 0, 0), one), changed(a, (0, 0, 0), other), allow_nan=True
             )
-            assert "in one image only" in found.failures()[0]
+            assert "in one image only" in reasons(found)[0]
 
     @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
     def test_in_both_images(self, value: float) -> None:
         a = changed(image(10, 12, 3), (4, 5, 1), value)
         b = changed(a, (0, 0, 0), a[0, 0, 0] + 0.5)
         reason = "NaN or infinity in both images, 1 values, the first at x 5, y 4, channel 1"
-        assert compare(a, a).failures(Limits(max_error=1)) == (reason,)
-        assert compare(a, a).failures() == (reason,)
+        assert reasons(compare(a, a), tolerances_of(max_error=1)) == (reason,)
+        assert reasons(compare(a, a)) == (reason,)
         assert compare(a, a, allow_nan=True).identical
         found = compare(a, b, allow_nan=True)
         assert found.mismatches == ()
@@ -294,17 +304,19 @@ class TestMismatches:
         assert found.mean_error == pytest.approx(0.5 / (a.size - 1), rel=1e-6)
         for name in FIGURES:
             assert math.isfinite(getattr(found, name))
-        assert found.failures(Limits(max_error=0.6)) == ()
+        assert reasons(found, tolerances_of(max_error=0.6)) == ()
 
     def test_nothing_but_nan(self) -> None:
         a = np.full((8, 8, 3), np.nan, np.float32)
-        assert compare(a, a, allow_nan=True).failures() == ()
+        assert reasons(compare(a, a, allow_nan=True)) == ()
         found = compare(a, a, allow_nan=True)
         assert (found.max_error, found.mean_error, found.psnr) == (None, None, None)
-        assert len(found.failures(Limits(max_error=1, min_psnr=1))) == 2
+        assert reasons(found, tolerances_of(max_error=1, min_psnr=1)) == (
+            "PSNR is not computed: no values to compare",
+        )
 
 
-class TestLimits:
+class TestTolerances:
     A = np.full((20, 20, 3), 0.5, np.float32)
 
     @pytest.mark.parametrize(
@@ -320,33 +332,34 @@ class TestLimits:
         a, b = image(20, 20, 3), np.clip(image(20, 20, 3) * np.float32(0.9), 0, 1)
         found = compare(a, b)
         value = getattr(found, figure)
-        assert found.failures(Limits(**{limit: value})) == ()
-        assert found.failures(Limits(**{limit: value - 1e-6 * towards})) == ()
-        (reason,) = found.failures(Limits(**{limit: value + 1e-6 * towards}))
-        assert reason.startswith(f"{figure.replace('_', ' ')} {value:.6g} is ")
+        assert reasons(found, tolerances_of(**{limit: value})) == ()
+        assert reasons(found, tolerances_of(**{limit: value - 1e-6 * towards})) == ()
+        (reason,) = reasons(found, tolerances_of(**{limit: value + 1e-6 * towards}))
+        name = "largest difference" if figure == "max_error" else figure.upper()
+        assert reason.startswith(f"{name} {value:.6g} ")
 
     def test_percentages(self) -> None:
         b = self.A.copy()
         b[:2, :, 0] += np.float32(0.25)
         b[0, :, 1] = 0
         found = compare(self.A, b)
-        assert found.failures(Limits(fail_percent=10)) == ()
-        (reason,) = found.failures(Limits(fail_percent=9.9))
-        assert reason == "percentage of pixels 10 is over 9.9"
+        assert reasons(found, tolerances_of(fail_percent=10)) == ()
+        (reason,) = reasons(found, tolerances_of(fail_percent=9.9))
+        assert reason.startswith(
+            "10 % of the pixels differ, 9.9 % allowed; largest difference 0.5 "
+        )
         # With it, max_error says from which difference on pixels count.
         some = compare(self.A, b, threshold=0.25)
-        assert some.failures(Limits(max_error=0.25, fail_percent=5)) == ()
-        assert len(some.failures(Limits(max_error=0.25, fail_percent=4))) == 1
-        with pytest.raises(ValueError, match=r"max_error: 0\.3 is not the threshold 0\.25"):
-            some.failures(Limits(max_error=0.3, fail_percent=5))
+        assert reasons(some, tolerances_of(max_error=0.25, fail_percent=5)) == ()
+        assert len(reasons(some, tolerances_of(max_error=0.25, fail_percent=4))) == 1
 
     def test_all_that_fail_are_told(self) -> None:
         found = compare(self.A, image(20, 20, 3))
-        limits = Limits(max_error=0, min_ssim=1, min_psnr=99, max_flip=0)
-        assert len(found.failures(limits)) == 4
+        limits = tolerances_of(max_error=0, min_ssim=1, min_psnr=99, max_flip=0)
+        assert len(reasons(found, limits)) == 4
 
     def test_psnr_of_equals_passes_any_limit(self) -> None:
-        assert compare(self.A, self.A).failures(Limits(min_psnr=math.inf)) == ()
+        assert reasons(compare(self.A, self.A), tolerances_of(min_psnr=math.inf)) == ()
 
     @pytest.mark.parametrize(
         ("name", "value"),
@@ -363,12 +376,15 @@ class TestLimits:
         ],
     )
     def test_ranges(self, name: str, value: float) -> None:
-        with pytest.raises(ValueError, match=rf"{name}: .* is out of range"):
-            Limits(**{name: value})
+        with pytest.raises(
+            ValueError,
+            match=rf"{name.removeprefix('min_').removeprefix('max_')}: .* is out of range",
+        ):
+            tolerances_of(**{name: value})
 
     def test_types(self) -> None:
         with pytest.raises(TypeError, match="max_error"):
-            Limits(max_error="0.1")  # type: ignore[arg-type]
+            tolerances_of(max_error="0.1")  # type: ignore[arg-type]
 
 
 class TestArguments:
@@ -491,7 +507,7 @@ class TestCommand:
     def test_any_difference_fails_without_limits(self, files: dict[str, Path]) -> None:
         result = run(files["a.png"], files["b.png"])
         assert (result.exit_code, result.stderr) == (1, "")
-        assert result.stdout.endswith("\nFAILED: the images differ\n")
+        assert "\nFAILED: 0.2604 % of the pixels differ; largest difference 0.003" in result.stdout
         assert re.search(r"max error  0\.00392157 at x 7, y 3, channel B: ", result.stdout)
         assert "pixels     0.260417 % differ\n" in result.stdout
         assert all(re.search(rf"^  {name} +\d", result.stdout, re.M) for name in ("SSIM", "FLIP"))
@@ -587,7 +603,9 @@ class TestCommand:
         assert (result.exit_code, result.stderr) == (1, "")
         assert (found["a"], found["b"]) == (str(files["a.png"]), str(files["b.png"]))
         assert (found["passed"], found["identical"]) == (False, False)
-        assert found["failures"] == ["max error 0.00392157 is over 0.001"]
+        (reason,) = found["failures"]
+        assert reason.startswith("largest difference 0.00392157 at x 7, y 3, channel 2: ")
+        assert reason.endswith(", over 0.001, the most allowed")
         assert found["max_error"] == 1 / 255
         assert found["max_error_at"] == [7, 3, 2]
         assert len(found["max_error_values"]) == 2
@@ -630,7 +648,7 @@ class TestCommand:
             ("a.png b.png --subimage 1", 1, "a.png: there is no part 1, only 0 to 0"),
             ("a.png b.png --subimage -1", 2, "--subimage"),
             ("a.png", 2, "Missing argument 'B'"),
-            ("a.png b.png --min-ssim 2", 2, "min_ssim: 2.0 is out of range, -1 to 1"),
+            ("a.png b.png --min-ssim 2", 2, "ssim: 2.0 is out of range, -1 to 1"),
             ("a.png b.png --max-error nan", 2, "max_error: nan is out of range"),
             ("a.png b.png --min-ssim high", 2, "'--min-ssim': 'high'"),
             ("a.png b.png --data-range 0", 2, "data_range: 0.0 is out of range"),

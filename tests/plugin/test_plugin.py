@@ -376,7 +376,7 @@ class TestChecks:
             (
                 "spot",
                 "atol=0.1, fail_percent=1, hard_fail=0.4",
-                "*(tolerances): largest difference 0.5* at x 3, y 2,*, over hard_fail 0.4*",
+                "*(tolerances): largest difference 0.5* at x 3, y 2,*, over 0.4, the most allowed*",
             ),
             ("np.flip(image, 0)", "atol=9, ssim=0.9", "*(SSIM): SSIM * is under 0.9*"),
             ("np.flip(image, 0)", "atol=9, flip=0.01", "*(FLIP): FLIP * is over 0.01*"),

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
-from tests.scene.test_gltf import Document
+from tests.scene.deferred_frames import BLURRED, GBUFFER, LIT, SIZE, deferred, rgb
+from tests.scene.gltf_documents import Document
 from tests.screens import DISTANCE, NOTHING, noise, screen
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
@@ -31,26 +32,8 @@ from vkbloom.scene import Mesh
 
 Array = NDArray[Any]
 
-SIZE = (320, 180)
-GBUFFER = ["albedo", "normal", "position", "brightness", "depth"]
-BLURRED = ["blur_vertical", "bloom"]
-LIT = ["scene", "final"]
 HALF = 2.0**-11  # half of the last bit of a half float, relative
 WHITE = np.ones((1, 1, 3))
-
-
-def deferred(
-    renderer: Renderer,
-    scene: Scene,
-    settings: Settings | None = None,
-    size: tuple[int, int] = SIZE,
-    **more: Any,
-) -> Frames:
-    return renderer.render(scene, settings, size, shading="deferred", **more)
-
-
-def rgb(image: Array) -> NDArray[np.float64]:
-    return image[..., :3].astype(np.float64)
 
 
 def lamps(scene: Scene) -> Scene:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.core.test_graph import (
+from tests.core.dependencies import (
     COLOR_OUTPUT,
     FRAGMENT_SHADER,
     READ_BEFORE_WRITE,
     WRITE_BEFORE_READ,
 )
-from tests.scene.test_deferred import BLURRED, GBUFFER, LIT, SIZE, deferred, rgb
+from tests.scene.deferred_frames import BLURRED, GBUFFER, LIT, SIZE, deferred, rgb
 from vkbloom import Renderer, Scene, Separable, Settings, _core, presets
 
 # Passes

@@ -19,7 +19,7 @@ import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
-from tests.scene.test_gltf import (
+from tests.scene.gltf_documents import (
     BYTE,
     FLOAT,
     ODD_VALUES,

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.scene.deferred_frames import rgb
 from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
 from vkbloom import Frames, Renderer, Scene, Separable, reference
 from vkbloom.scene import Mesh
@@ -26,7 +27,7 @@ FILTERED = 2 / 256 + HALF
 MODES = ("repeat", "mirror-repeat", "clamp-to-edge")
 
 
-def picture(width: int, height: int, *, highest: float = 1.0) -> NDArray[np.float16]:
+def half_colours(width: int, height: int, *, highest: float = 1.0) -> NDArray[np.float16]:
     """Return random linear colours (height, width, 4) that half floats hold, with alpha 1."""
     colours = np.ones((height, width, 4), np.float16)
     generator = np.random.default_rng((width, height))
@@ -41,10 +42,6 @@ def texture(colours: NDArray[np.float16], filter: Any = "nearest", **more: Any) 
 def deferred(renderer: Renderer, body: Mesh, size: tuple[int, int], **more: Any) -> Frames:
     scene = Scene(body=body, camera=CAMERA, **more)
     return renderer.render(scene, None, size, shading="deferred")
-
-
-def rgb(image: Array) -> NDArray[np.float64]:
-    return image[..., :3].astype(np.float64)
 
 
 def wrapped(texel: Array, side: int, mode: str) -> Array:
@@ -93,7 +90,7 @@ def sampled(
 def test_texels_are_exact_at_whole_scales(
     renderer: Renderer, side: tuple[int, int], scale: tuple[int, int]
 ) -> None:
-    colours, lights = picture(*side), picture(*side[::-1], highest=9)
+    colours, lights = half_colours(*side), half_colours(*side[::-1], highest=9)
     size = (side[0] * scale[0], side[1] * scale[1])
     shown = deferred(renderer, panel(size, texture(colours)), size)
     expected = np.repeat(np.repeat(colours, scale[1], axis=0), scale[0], axis=1)
@@ -111,7 +108,7 @@ def test_texels_are_exact_at_whole_scales(
 @pytest.mark.parametrize("filter", ["nearest", "linear"])
 @pytest.mark.parametrize("modes", list(itertools.product(MODES, MODES)), ids="-".join)
 def test_wrapping_and_filters(renderer: Renderer, modes: tuple[str, str], filter: str) -> None:
-    colours, size = picture(5, 4), (96, 72)
+    colours, size = half_colours(5, 4), (96, 72)
     # Over two repetitions to both sides; no pixel's centre is at an edge between two texels.
     places = (-2.137, -1.713, 3.271, 2.609)
     base = texture(colours, filter, address_mode=modes)
@@ -122,7 +119,7 @@ def test_wrapping_and_filters(renderer: Renderer, modes: tuple[str, str], filter
 
 
 def test_colour_times_texture(renderer: Renderer) -> None:
-    colours, size = picture(8, 8), (8, 8)
+    colours, size = half_colours(8, 8), (8, 8)
     body = panel(size, texture(colours), texture(colours), colour=(0.5, 3, 0), radiance=(7, 0, 0.3))
     shown = deferred(renderer, body, size)
     for name, factor in (("albedo", (0.5, 3, 0)), ("brightness", (7, 0, 0.3))):
@@ -131,7 +128,7 @@ def test_colour_times_texture(renderer: Renderer) -> None:
 
 
 def test_both_textures_have_places_of_their_own(renderer: Renderer) -> None:
-    colours, size = picture(6, 6), (6, 6)
+    colours, size = half_colours(6, 6), (6, 6)
     body = panel(size, texture(colours), texture(colours), radiance=(1.0, 1.0, 1.0))
     assert body.texcoords is not None
     # The second one is turned by half a turn.
@@ -153,7 +150,7 @@ def test_without_a_texture_it_is_white(renderer: Renderer) -> None:
 
 def test_the_forward_system_lights_texels_as_it_lights_vertex_colours(renderer: Renderer) -> None:
     # Some over 0.9, from where on a colour counts as a lamp.
-    colours = picture(12, 8, highest=1.2)
+    colours = half_colours(12, 8, highest=1.2)
     by_vertex = screen(rgb(colours), (96, 64)).glow
     assert by_vertex is not None
     expected, shown = (
@@ -168,7 +165,7 @@ def test_the_forward_system_lights_texels_as_it_lights_vertex_colours(renderer: 
 
 def test_both_shadings_show_the_same(renderer: Renderer) -> None:
     size = (64, 48)
-    body = panel(size, texture(picture(5, 7), "linear"), places=(0, 0, 2, 2))
+    body = panel(size, texture(half_colours(5, 7), "linear"), places=(0, 0, 2, 2))
     forward = renderer.render(Scene(body=body, camera=CAMERA), Separable(bloom=False), size)
     shown = deferred(renderer, body, size)
     difference = np.abs(np.clip(rgb(shown["scene"]), 0, 1) * 255 - forward["scene"][..., :3])
@@ -183,7 +180,7 @@ def test_both_shadings_show_the_same(renderer: Renderer) -> None:
 
 
 def test_a_glow_mesh_with_a_texture(renderer: Renderer) -> None:
-    colours, size = picture(16, 9), (16, 9)
+    colours, size = half_colours(16, 9), (16, 9)
     scene = Scene(body=NOTHING, glow=panel(size, texture(colours)), camera=CAMERA)
     settings = Separable(bloom_size=size, format="rgba16float")
     np.testing.assert_array_equal(renderer.render(scene, settings, size)["glow"], colours)
@@ -193,7 +190,7 @@ def test_a_glow_mesh_with_a_texture(renderer: Renderer) -> None:
 
 
 def test_emission_by_texture_and_a_glow_mesh_are_added(renderer: Renderer) -> None:
-    colours, size = picture(16, 9), (16, 9)
+    colours, size = half_colours(16, 9), (16, 9)
     body = panel(size, emission=texture(colours), radiance=(3.0, 3.0, 3.0))
     shown = deferred(renderer, body, size, glow=panel(size, texture(colours)))
     expected = 4 * rgb(colours)
@@ -210,7 +207,7 @@ def test_emission_by_texture_and_a_glow_mesh_are_added(renderer: Renderer) -> No
 def test_surfaces_with_textures_of_several_sizes_beside_plain_triangles(renderer: Renderer) -> None:
     size = (30, 8)
     sides = [(10, 8), (5, 4)]
-    pictures = [picture(*side) for side in sides]
+    pictures = [half_colours(*side) for side in sides]
     parts = [
         dataclasses.replace(panel(size, across=(2 / 3, 1), colour=(0.5, 0.5, 0.5)), surfaces=()),
         panel(size, texture(pictures[0]), across=(0, 1 / 3)),
@@ -253,9 +250,9 @@ def test_scenes_with_and_without_textures_take_turns(new_renderer: Callable[[], 
     scenes = [
         Scene(body=body, camera=CAMERA)
         for body in (
-            panel(size, texture(picture(8, 8))),
+            panel(size, texture(half_colours(8, 8))),
             dataclasses.replace(panel(size), surfaces=()),
-            panel(size, texture(picture(4, 4))),
+            panel(size, texture(half_colours(4, 4))),
         )
     ]
     first = [renderer.render(scene, None, size, shading="deferred") for scene in scenes]
@@ -280,7 +277,7 @@ def covered_means(line: Array, count: int) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("side", [(8, 8), (7, 5), (1, 9), (13, 1), (1, 1), (6, 31)])
 def test_a_mip_level_is_the_mean_of_what_it_covers(side: tuple[int, int]) -> None:
-    levels = mip_levels(picture(*side))
+    levels = mip_levels(half_colours(*side))
     for index, level in enumerate(levels):
         height, width = (max(1, length >> index) for length in side[::-1])
         assert level.shape == (height, width, 4)
@@ -297,7 +294,7 @@ def test_a_mip_level_is_the_mean_of_what_it_covers(side: tuple[int, int]) -> Non
 
 @pytest.mark.parametrize("scale", [2, 8])
 def test_a_pixel_is_the_mean_of_its_texels(renderer: Renderer, scale: int) -> None:
-    colours, size = picture(64, 64), (64 // scale, 64 // scale)
+    colours, size = half_colours(64, 64), (64 // scale, 64 // scale)
     body = panel(size, Texture(mip_levels(colours)))
     shown = rgb(deferred(renderer, body, size)["albedo"])
     blocks = rgb(colours).reshape(size[1], scale, size[0], scale, 3)
@@ -336,7 +333,7 @@ def test_filters_between_levels(renderer: Renderer) -> None:
 
 
 def test_a_texture_keeps_its_own_read_only_levels() -> None:
-    colours = picture(4, 3)
+    colours = half_colours(4, 3)
     made = Texture((colours,))
     colours[...] = 0
     assert made.levels[0].any()
@@ -346,7 +343,7 @@ def test_a_texture_keeps_its_own_read_only_levels() -> None:
 
 def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
     size = (8, 8)
-    base = texture(picture(8, 8), address_mode=("clamp-to-edge", "repeat"))
+    base = texture(half_colours(8, 8), address_mode=("clamp-to-edge", "repeat"))
     body = panel(size, base, base, radiance=(1.0, 1.0, 1.0))
     again = pickle.loads(pickle.dumps(body))
     (surface,) = again.surfaces
@@ -357,7 +354,7 @@ def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
     assert body.summary == "4 triangles, 4 vertices, textures: 1"
 
 
-GOOD = picture(4, 4)
+GOOD = half_colours(4, 4)
 
 
 @pytest.mark.parametrize(

@@ -99,14 +99,14 @@ static struct renderer *open_renderer(void)
 
     if (!renderer || !(renderer->memory = vkb_alloc(&error, 1, sizeof *renderer->memory))
         || !vkb_device_create(&renderer->device, "software", false, &error)
-        || !vkb_frame_create(&renderer->device, NULL, 0, &renderer->frame, &error))
+        || !vkb_frame_create(&renderer->device, NULL, 0, &renderer->frame, &error)
+        || !vkb_forms_by_name("auto", &renderer->device, &renderer->forms, &error))
         die("open", &error);
     pthread_mutex_init(&renderer->lock, NULL);
     renderer->memory->pages.device = &renderer->device;
     renderer->memory->references = 1;
     renderer->device.interrupted = interrupted;
     renderer->device.frame_seconds = 300.0;
-    renderer->forms = vkb_forms_by_name("auto", &renderer->device);
     renderer->references = 1;
     renderer->open = true;
     return renderer;
@@ -185,7 +185,7 @@ static void close_renderer(struct renderer *renderer)
 
     enter(renderer);
     if (renderer->open) {
-        if (!vkb_frame_land(&renderer->device, &renderer->frame, &error))
+        if (!vkb_frame_end(&renderer->device, &renderer->frame, &error))
             die("close", &error);
         renderer->open = false;
         vkb_frame_destroy(&renderer->device, &renderer->frame);

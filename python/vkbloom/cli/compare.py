@@ -5,17 +5,57 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Callable
 from typing import Any
 
 import click
 from rich.console import Console
 
+from vkbloom.checks import check_number
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import check_part_is_given, note, read, subimage_option
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.io import image_writing
 from vkbloom.io.images import Picture, StoredImage
-from vkbloom.views.comparison import Comparison, Limits, compare, difference
+from vkbloom.views.comparison import Comparison, compare, difference
+from vkbloom.views.tolerances import Tolerances, failures
+
+
+def _limit(name: str, text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make an option of a limit, which is a number or none."""
+    return click.option(
+        f"--{name.replace('_', '-')}",
+        type=fields.form_of(float | None),
+        help=f"{text} [default none]",
+    )
+
+
+def tolerances_of(
+    *,
+    max_error: float | None = None,
+    min_ssim: float | None = None,
+    min_psnr: float | None = None,
+    max_flip: float | None = None,
+    fail_percent: float | None = None,
+) -> Tolerances:
+    """Return what the limits of the command line mean; without any, all values must be equal."""
+    if max_error is not None:
+        check_number("max_error", max_error, 0.0, math.inf)
+    if fail_percent is not None:
+        # `max_error` says from which difference on a pixel counts.
+        atol, hard_fail = max_error or 0.0, None
+    else:
+        atol, hard_fail = 0.0, max_error
+        has_none = (max_error, min_ssim, min_psnr, max_flip) == (None, None, None, None)
+        fail_percent = 0.0 if has_none else 100.0
+    return Tolerances(
+        atol=atol,
+        fail_percent=fail_percent,
+        hard_fail=hard_fail,
+        ssim=min_ssim,
+        psnr=min_psnr,
+        flip=max_flip,
+    )
 
 
 @click.command()
@@ -47,7 +87,15 @@ from vkbloom.views.comparison import Comparison, Limits, compare, difference
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @subimage_option
-@fields.options({"": Limits}, "chosen")
+@_limit("max_error", "Largest difference of a value that is allowed, integers counting as 0 to 1")
+@_limit("min_ssim", "Smallest structural similarity that is allowed, -1 to 1")
+@_limit("min_psnr", "Smallest peak signal-to-noise ratio that is allowed, in dB")
+@_limit("max_flip", "Largest mean FLIP that is allowed, 0 to 1")
+@_limit(
+    "fail_percent",
+    "Percentage of pixels that may differ by more than max_error (by anything without one), "
+    "0 to 100",
+)
 def command(
     *,
     first: str,
@@ -58,7 +106,7 @@ def command(
     data_range: float | None,
     as_json: bool,
     subimage: int,
-    chosen: dict[str, Any],
+    **limits: float | None,
 ) -> int:
     """Compare the image files A, the reference, and B.
 
@@ -75,7 +123,7 @@ def command(
     image under 7 pixels, fails too.
     """
     with blaming_the_call():
-        limits = Limits(**chosen)
+        tolerances = tolerances_of(**limits)
         if diff is not None:
             image_writing.check_writable(diff)
     if diff is None and diff_scale is not None:
@@ -88,25 +136,25 @@ def command(
         found = compare(
             a.pixels,
             b.pixels,
-            threshold=0.0 if limits.fail_percent is None else limits.max_error or 0.0,
+            threshold=tolerances.atol or 0.0,
             allow_nan=allow_nan,
             data_range=data_range,
         )
     found = _with_windows(found, a, b)
-    failures = found.failures(limits)
+    failed = tuple(reason for _, reason in failures(found, tolerances, tolerances.metrics))
     scale = None
     if diff is not None and found.max_error is None:
         note(f"{diff} is not written: there are no differences of single values")
     elif diff is not None:
         scale = _write_difference(a, b, diff, diff_scale)
     if as_json:
-        click.echo(json.dumps(_object(first, second, found, failures, scale), indent=2))
+        click.echo(json.dumps(_object(first, second, found, failed, scale), indent=2))
     else:
-        for line in _lines(first, second, a, found, failures):
+        for line in _lines(first, second, a, found, failed):
             click.echo(line)
         if scale is not None:
             click.echo(f"wrote {diff}, differences times {scale:.6g}")
-    return 1 if failures else 0
+    return 1 if failed else 0
 
 
 def _with_windows(found: Comparison, a: StoredImage, b: StoredImage) -> Comparison:
@@ -135,7 +183,7 @@ def _object(
     first: str,
     second: str,
     found: Comparison,
-    failures: tuple[str, ...],
+    failed: tuple[str, ...],
     scale: float | None,
 ) -> dict[str, Any]:
     """Return what --json prints; JSON has no infinity, so that it becomes None."""
@@ -146,8 +194,8 @@ def _object(
     return {
         "a": first,
         "b": second,
-        "passed": not failures,
-        "failures": failures,
+        "passed": not failed,
+        "failures": failed,
         "identical": found.identical,
         **figures,
         "diff_scale": scale,
@@ -159,7 +207,7 @@ def _lines(
     second: str,
     a: StoredImage,
     found: Comparison,
-    failures: tuple[str, ...],
+    failed: tuple[str, ...],
 ) -> list[str]:
     """Return the report for people."""
     height, width = a.pixels.shape[:2]
@@ -167,9 +215,9 @@ def _lines(
     lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")
     if found.percent_over is not None:
         lines += _figures(found, a.channels)
-    for reason in failures:
+    for reason in failed:
         lines.append(f"FAILED: {reason}")
-    if not failures:
+    if not failed:
         lines.append("identical" if found.identical else "passed")
     return lines
 

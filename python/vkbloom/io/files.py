@@ -75,14 +75,14 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
     files: list[tuple[Path, Path]] = []
     try:
         for file, names in plan.items():
-            arrays = [frames[name] for name in names]
-            files.append((safe_writing.reserve(file, arrays), file))
+            size = sum(frames[name].nbytes for name in names)
+            files.append((safe_writing.reserve(file, size), file))
             if not _is_exr(file):
                 if _write_image(oiio, frames, names[0], *files[-1]):
                     continue
                 files.pop()[0].unlink()
                 beside = file.with_suffix(".exr")
-                files.append((safe_writing.reserve(beside, arrays), beside))
+                files.append((safe_writing.reserve(beside, size), beside))
             _write_exr(oiio, frames, names, *files[-1])
         for temporary, file in files:
             safe_writing.put_in_place(temporary, file)

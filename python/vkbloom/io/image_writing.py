@@ -93,7 +93,7 @@ def save(
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
-    temporary = safe_writing.reserve(target, [picture.values])
+    temporary = safe_writing.reserve(target, picture.values.nbytes)
     try:
         notes = _write(oiio, picture, colour, temporary, target, attributes=attributes or {})
         safe_writing.check_complete(oiio, temporary, target)

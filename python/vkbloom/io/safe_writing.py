@@ -15,13 +15,12 @@ import contextlib
 import errno
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.io.images import check_name
 
@@ -42,6 +41,7 @@ __all__ = [
 _FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
 
 _LARGEST_HEADER: Final = 65536  # bytes; what a file may hold beside the pixels
+_ZEROS: Final = 1 << 20  # bytes written at a time
 
 
 def check_extension(oiio: ModuleType, suffix: str) -> None:
@@ -66,8 +66,8 @@ def check_extension(oiio: ModuleType, suffix: str) -> None:
         raise ValueError(f"path: no image format for the extension {suffix!r} can be written")
 
 
-def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
-    """Make a file of a new name beside a file, as large as the arrays that it shall hold.
+def reserve(file: Path, size: int) -> Path:
+    """Make a file of a new name beside a file, with the disk space that it shall need.
 
     Doing it here gives the system's own reason where it fails, which OpenImageIO does not
     pass on. And on a full disk its JPEG writer would end the process and its WebP writer
@@ -77,8 +77,8 @@ def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
     ----------
     file : Path
         The file to write in the end, which is left alone.
-    arrays : iterable of ndarray
-        Of any shapes and dtypes.
+    size : int
+        Bytes of the pixels.
 
     Returns
     -------
@@ -92,21 +92,7 @@ def reserve(file: Path, arrays: Iterable[NDArray[Any]]) -> Path:
     OSError
         It cannot be made or the disk is full; it names `file`, and nothing is left.
     """
-    check_name(file)
-    temporary = _meant(file).with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
-    try:
-        with temporary.open("xb") as stream:
-            stream.write(bytes(_LARGEST_HEADER))
-            for array in arrays:
-                stream.write(np.ascontiguousarray(array).data)
-    except BaseException as error:
-        # Ctrl-C too, which a large file leaves time for.
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        if isinstance(error, OSError):
-            raise OSError(error.errno, error.strerror, str(file)) from error
-        raise
-    return temporary
+    return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
 
 
 def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> bool:
@@ -216,15 +202,42 @@ def write_whole(file: Path, content: bytes) -> None:
     OSError
         It cannot be written; it names `file`, which is as it was.
     """
-    temporary = reserve(file, [np.frombuffer(content, np.uint8)])
+    temporary = _filled(file, lambda stream: stream.write(content))
     try:
-        # Into the room that is there by now.
-        with temporary.open("r+b") as stream:
-            stream.write(content)
-            stream.truncate()
         put_in_place(temporary, file)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
+    """Make a temporary file beside a file and fill it; where that fails, nothing is left."""
+    check_name(file)
+    temporary = _meant(file).with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
+    try:
+        with temporary.open("xb") as stream:
+            fill(stream)
+    except BaseException as error:
+        # Ctrl-C too, which a large file leaves time for.
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror, str(file)) from error
+        raise
+    return temporary
+
+
+def _allocate(stream: BinaryIO, size: int) -> None:
+    """Give a new file disk space, without writing it where the system can."""
+    if hasattr(os, "posix_fallocate"):
+        try:
+            os.posix_fallocate(stream.fileno(), 0, size)
+            return
+        except OSError as error:
+            # What musl says where the file system cannot; glibc writes instead.
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                raise
+    for start in range(0, size, _ZEROS):
+        stream.write(bytes(min(_ZEROS, size - start)))
 
 
 def _meant(file: Path) -> Path:

@@ -7,7 +7,6 @@ The laws need no reference picture; they work on any callable that takes an imag
 from __future__ import annotations
 
 from vkbloom.testing.frame_files import read_frame
-from vkbloom.testing.judging import Tolerances
 from vkbloom.testing.laws import (
     assert_additive,
     assert_bounded_fireflies,
@@ -26,6 +25,7 @@ from vkbloom.testing.point_spread import (
 )
 from vkbloom.testing.probe import Probe
 from vkbloom.testing.regression import FrameDifferenceWarning, FrameRegression
+from vkbloom.views.tolerances import Tolerances
 
 __all__ = [
     "FrameDifferenceWarning",

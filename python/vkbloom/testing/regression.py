@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from vkbloom.frames import Frames
 from vkbloom.testing import report_parts
-from vkbloom.testing.judging import Tolerances, Verdict, first_failure, judge
+from vkbloom.testing.judging import Verdict, first_failure, judge
 from vkbloom.testing.records import Record
 from vkbloom.testing.references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
 from vkbloom.version import installed_version
+from vkbloom.views.tolerances import Tolerances
 
 __all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vkbloom.checks import check_number, import_extra
 from vkbloom.io.srgb import decode_srgb
 
-__all__ = ["Comparison", "Limits", "Metric", "compare", "difference", "flip_map"]
+__all__ = ["Comparison", "Metric", "compare", "difference", "flip_map"]
 
 Metric = Literal["ssim", "psnr", "flip"]
 
@@ -21,57 +21,6 @@ _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
 # Taps to a side of scikit-image's default window.
 _SSIM_WINDOW: Final = 7
 _METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """How much two images may differ.
-
-    Parameters
-    ----------
-    max_error : float or None
-        Largest difference of a value that is allowed, integers counting as 0 to 1. Only up to
-        `fail_percent` percent of the pixels may exceed it.
-    min_ssim : float or None
-        Smallest structural similarity that is allowed, -1 to 1.
-    min_psnr : float or None
-        Smallest peak signal-to-noise ratio that is allowed, in dB.
-    max_flip : float or None
-        Largest mean FLIP that is allowed, 0 to 1.
-    fail_percent : float or None
-        Percentage of pixels that may differ by more than `max_error` (by anything without one),
-        0 to 100.
-
-    Raises
-    ------
-    ValueError
-        A limit is out of its range; names the field, the value and the range.
-    TypeError
-        A limit is no number.
-    """
-
-    max_error: float | None = None
-    min_ssim: float | None = None
-    min_psnr: float | None = None
-    max_flip: float | None = None
-    fail_percent: float | None = None
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("max_error", 0.0, math.inf),
-            ("min_ssim", -1.0, 1.0),
-            ("min_psnr", -math.inf, math.inf),
-            ("max_flip", 0.0, 1.0),
-            ("fail_percent", 0.0, 100.0),
-        ):
-            value = getattr(self, name)
-            if value is not None:
-                check_number(name, value, low, high)
-
-    @property
-    def are_none(self) -> bool:
-        """Whether there is no limit at all."""
-        return all(getattr(self, field.name) is None for field in fields(self))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,60 +72,6 @@ class Comparison:
     def identical(self) -> bool:
         """Whether all values are equal."""
         return not self.mismatches and not self.max_error
-
-    def failures(self, limits: Limits | None = None) -> tuple[str, ...]:
-        """Tell what is beyond the limits.
-
-        Parameters
-        ----------
-        limits : Limits, optional
-            Without any, the images must be identical.
-
-        Returns
-        -------
-        tuple of str
-            One reason each; empty if the images pass. Mismatches always fail, and so does a
-            figure that has a limit but could not be computed.
-
-        Raises
-        ------
-        ValueError
-            `limits` has both `fail_percent` and `max_error`, and the comparison was not made with
-            the latter as `threshold`.
-        """
-        limits = limits or Limits()
-        reasons = list(self.mismatches)
-        if limits.are_none and self.max_error:
-            reasons.append("the images differ")
-        if limits.fail_percent is None:
-            reasons += self._beyond("max_error", limits.max_error, is_most=True)
-        else:
-            if self.threshold != (limits.max_error or 0.0):
-                raise ValueError(
-                    f"max_error: {limits.max_error!r} is not the threshold {self.threshold!r} of "
-                    "this comparison"
-                )
-            reasons += self._beyond("percent_over", limits.fail_percent, is_most=True)
-        reasons += self._beyond("ssim", limits.min_ssim, is_most=False)
-        reasons += self._beyond("psnr", limits.min_psnr, is_most=False)
-        reasons += self._beyond("flip", limits.max_flip, is_most=True)
-        return tuple(reasons)
-
-    def _beyond(self, name: str, limit: float | None, *, is_most: bool) -> list[str]:
-        """Return why a figure fails, an empty list if it does not."""
-        value = getattr(self, name)
-        label = "percentage of pixels" if name == "percent_over" else name.replace("_", " ")
-        if limit is None:
-            return []
-        if value is None:
-            # Of images that are no match, that is said already.
-            why = self.not_computed.get(name, "no values to compare")
-            return [] if self.mismatches else [f"{label} has a limit and is not computed: {why}"]
-        if is_most and value > limit:
-            return [f"{label} {value:.6g} is over {limit:.6g}"]
-        if not is_most and value < limit:
-            return [f"{label} {value:.6g} is under {limit:.6g}"]
-        return []
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,8 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
     early, late = (np.max(half, axis=0) for half in (cached[:500], cached[500:]))
     pipelines, framebuffers, image_bytes = late
     assert pipelines <= early[0]
-    assert framebuffers <= early[1]
+    # Of each image that is there: six levels down, five up, glow, bloom, final and the input.
+    assert framebuffers <= 2 * 15
     # 3 images of the size and the levels, all of them smaller.
     assert image_bytes <= 6 * 70 * 70 * 16
     assert created[-1] == created[499]

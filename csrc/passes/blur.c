@@ -1,0 +1,102 @@
+#include "passes/blur.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { DIRECTION, RADIUS, SAMPLING, CONSTANT_COUNT };
+
+static bool is_whole(double number)
+{
+    return floor(number) == number;
+}
+
+// Shares the taps out to the texels to both sides of them. False where the kernel is longer than a
+// line's.
+static bool move_to_texels(const struct vkb_blur *blur, double step, double weights[MAX_WEIGHTS],
+                           uint32_t *count)
+{
+    const double last = ceil((blur->count - 1) * step);
+
+    if (last > LINE_RADIUS)
+        return false;
+    memset(weights, 0, MAX_WEIGHTS * sizeof *weights);
+    weights[0] = blur->weights[0];
+    for (uint32_t tap = 1; tap < blur->count; ++tap) {
+        const double at = tap * step, part = at - floor(at);
+        const int texel = (int)floor(at);
+        // On the centre's texel both sides of the pair come together.
+        weights[texel] += (texel == 0 ? 2.0 : 1.0) * (1.0 - part) * blur->weights[tap];
+        if (part > 0.0)
+            weights[texel + 1] += part * blur->weights[tap];
+    }
+    *count = (uint32_t)last + 1;
+    while (*count > 1 && weights[*count - 1] == 0.0)
+        --*count;
+    return true;
+}
+
+struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
+                                 const struct vkb_blur *blur, uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_fullscreen_row(name, VKB_SHADER_blur_frag, to);
+    const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
+    const bool same_size = vkb_same_size(graph, from, to);
+    const bool vertical = blur->direction == DIRECTION_VERTICAL;
+    const double step = vertical ? blur->down : blur->across;
+    struct vkb_blur_params *params = &row.params.blur;
+    struct vkb_blur moved = *blur;
+
+    // Taps of one place are one tap, whatever the sizes are.
+    if (blur->direction != DIRECTION_BOTH && (step == 0.0 || (same_size && !is_whole(step)))
+        && move_to_texels(blur, step, moved.weights, &moved.count))
+        moved.across = moved.down = 1.0;
+    row.reads[0] = from;
+    row.read_count = 1;
+    row.block = VKB_BLOCK_blur;
+    params->step_across = blur->direction == DIRECTION_VERTICAL ? 0.0f : (float)moved.across;
+    params->step_down = blur->direction == DIRECTION_HORIZONTAL ? 0.0f : (float)moved.down;
+    params->target_width = sampling.width;
+    params->target_height = sampling.height;
+    params->limit = sampling.limit;
+    // In one direction part of the weights, so that variants need to know nothing of it.
+    params->gain = blur->direction == DIRECTION_BOTH ? (float)blur->gain : 1.0f;
+    for (uint32_t i = 0; i < moved.count; ++i) {
+        const double gain = blur->direction == DIRECTION_BOTH ? 1.0 : blur->gain;
+        params->weights[i / 4][i % 4] = (float)(gain * moved.weights[i]);
+    }
+    row.constants[DIRECTION] = blur->direction;
+    row.constants[RADIUS] = (int32_t)moved.count - 1;
+    row.constants[SAMPLING] =
+        same_size && is_whole(params->step_across) && is_whole(params->step_down) ? SAMPLING_WHOLE
+        : blur->filter                                                            ? SAMPLING_FILTER
+                                                                                  : SAMPLING_FETCH;
+    row.constant_count = CONSTANT_COUNT;
+    return row;
+}
+
+bool vkb_is_line_blur(const struct vkb_pass_row *pass)
+{
+    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader == VKB_SHADER_blur_frag
+        && pass->constants[DIRECTION] != DIRECTION_BOTH;
+}
+
+enum vkb_mode vkb_blur_direction(const struct vkb_pass_row *pass)
+{
+    return (enum vkb_mode)pass->constants[DIRECTION];
+}
+
+bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texel_kernel *kernel)
+{
+    const struct vkb_blur_params *params = &pass->params.blur;
+    const bool vertical = pass->constants[DIRECTION] == DIRECTION_VERTICAL;
+    const double step = vertical ? params->step_down : params->step_across;
+    const int taps = pass->constants[RADIUS];
+
+    if (!is_whole(step) || step < 0.0 || taps * step > limit)
+        return false;
+    memset(kernel, 0, sizeof *kernel);
+    kernel->radius = taps * (int)step;
+    for (int tap = 0; tap <= taps; ++tap)
+        kernel->weights[tap * (int)step] = params->weights[tap / 4][tap % 4];
+    return true;
+}

@@ -1,0 +1,33 @@
+// Blur passes: a symmetric kernel, in one direction or in both at once.
+#ifndef VKB_BLUR_H
+#define VKB_BLUR_H
+
+#include "methods/methods.h"
+
+// A kernel whose taps lie on the texels of its source.
+struct vkb_texel_kernel {
+    float weights[LINE_RADIUS + 4];  // the half-kernel, then zeros, in whole vec4s
+    int radius;
+};
+
+struct vkb_blur {
+    enum vkb_mode direction;
+    double weights[MAX_WEIGHTS];  // of the taps 0, 1, ... to each side
+    uint32_t count;
+    double gain;          // of what is added up
+    double across, down;  // the distance of two taps in a row and in a column, in source texels
+    bool filter;          // taps between texels go through the sampler, else they are fetched
+};
+
+// The row of a blur from one image to another. Where all pixels of the target lie on texels, taps
+// between texels are shared out to both, and no variant of the pass filters.
+struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
+                                 const struct vkb_blur *blur, uint32_t from, uint32_t to);
+
+// Accessors of a row that vkb_blur_row made.
+bool vkb_is_line_blur(const struct vkb_pass_row *pass);  // in one direction
+enum vkb_mode vkb_blur_direction(const struct vkb_pass_row *pass);
+// Its kernel on texels; false where taps lie between them, or where it is longer than `limit`.
+bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texel_kernel *kernel);
+
+#endif

@@ -1,0 +1,216 @@
+#include "vulkan/instance.h"
+
+#include "vulkan/messages.h"
+#include "vulkan/process.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define VALIDATION_LAYER "VK_LAYER_KHRONOS_validation"
+
+const char vkb_install_hint[] =
+    "On Debian or Ubuntu: apt install libvulkan1 mesa-vulkan-drivers (lavapipe, runs on any CPU); "
+    "for a GPU, install its vendor's Vulkan driver. `vkbloom doctor` tells more.";
+
+static struct vkb_lock lock;              // of what is below, and of volk's globals
+static struct vkb_instance instances[2];  // without and with validation
+static bool loader_open;
+// Whether this process was forked from one that had an instance. At exit Mesa (22.3.6) waits for
+// the threads of that one's drivers, which are not here, and so for any that got the memory of
+// their stacks since: none of the driver's own may be left then.
+static bool forked;
+
+static bool open_loader(struct vkb_error *error)
+{
+    if (!loader_open)
+        loader_open = VK_RESULT(volkInitialize()) == VK_SUCCESS;
+    return loader_open
+        || vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                    "no Vulkan adapter: the Vulkan loader (libvulkan.so.1) is missing. %s",
+                    vkb_install_hint);
+}
+
+static bool validation_available(void)
+{
+    VkLayerProperties layers[128];
+    uint32_t count = sizeof layers / sizeof layers[0];
+    VkResult result = VK_RESULT(vkEnumerateInstanceLayerProperties(&count, layers));
+
+    if (result != VK_SUCCESS && result != VK_INCOMPLETE)
+        return false;
+    for (uint32_t i = 0; i < count; ++i)
+        if (strcmp(layers[i].layerName, VALIDATION_LAYER) == 0)
+            return true;
+    return false;
+}
+
+static bool check_loader(bool validation, struct vkb_error *error)
+{
+    if (!open_loader(error))
+        return false;
+    if (vkEnumerateInstanceVersion == NULL)
+        return vkb_fail(
+            error, VKB_ERROR_ADAPTER_NOT_FOUND,
+            "no Vulkan adapter: the Vulkan loader knows only Vulkan 1.0, 1.1 is needed. %s",
+            vkb_install_hint);
+    if (validation && !validation_available())
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "validation was asked for, but %s is not installed. "
+                        "On Debian or Ubuntu: apt install vulkan-validationlayers",
+                        VALIDATION_LAYER);
+    return true;
+}
+
+static void add_text(struct vkb_error *error, const char *text)
+{
+    const size_t length = strlen(error->message);
+
+    snprintf(error->message + length, sizeof error->message - length, "%s", text);
+}
+
+// What the loader answers where no adapter can be had is not always what is wrong.
+static bool check_created(VkResult result, struct vkb_error *error)
+{
+    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) {
+        vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                 "no Vulkan adapter: the loader found no driver that works. %s", vkb_install_hint);
+        error->result = result;
+        snprintf(error->call, sizeof error->call, "vkCreateInstance");
+        return false;
+    }
+    if (vkb_check(error, result, "vkCreateInstance"))
+        return true;
+    if (result == VK_ERROR_OUT_OF_HOST_MEMORY)
+        add_text(error, ". Unless memory is short, a driver's manifest (a JSON file) is damaged, "
+                        "which some loaders report so; `vkbloom doctor` names the file");
+    return false;
+}
+
+// The messenger hears what the instance's own creation leads to as well.
+static bool create_handle(struct vkb_instance *instance,
+                          const VkDebugUtilsMessengerCreateInfoEXT *messenger,
+                          struct vkb_error *error)
+{
+    const VkValidationFeaturesEXT features = {
+        .sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT,
+        .pNext = messenger,
+        .enabledValidationFeatureCount = 1,
+        .pEnabledValidationFeatures =
+            (VkValidationFeatureEnableEXT[]){
+                VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT},
+    };
+
+    return check_created(
+        VK_RESULT(vkCreateInstance(
+            &(VkInstanceCreateInfo){
+                .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
+                .pNext = messenger ? &features : NULL,
+                .pApplicationInfo =
+                    &(VkApplicationInfo){
+                        .sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
+                        .pApplicationName = "vkbloom",
+                        .apiVersion = VK_API_VERSION_1_1,
+                    },
+                .enabledLayerCount = messenger ? 1 : 0,
+                .ppEnabledLayerNames = (const char *[]){VALIDATION_LAYER},
+                .enabledExtensionCount = messenger ? 1 : 0,
+                .ppEnabledExtensionNames = (const char *[]){VK_EXT_DEBUG_UTILS_EXTENSION_NAME},
+            },
+            NULL, &instance->handle)),
+        error);
+}
+
+static void load_functions(struct vkb_instance *instance)
+{
+#define LOAD(name) instance->vk.name = (PFN_##name)vkGetInstanceProcAddr(instance->handle, #name);
+    VKB_INSTANCE_FUNCTIONS(LOAD)
+#undef LOAD
+}
+
+static void destroy_instance(struct vkb_instance *instance)
+{
+    if (instance->messenger)
+        instance->vk.vkDestroyDebugUtilsMessengerEXT(instance->handle, instance->messenger, NULL);
+    if (instance->handle)
+        instance->vk.vkDestroyInstance(instance->handle, NULL);
+    *instance = (struct vkb_instance){0};
+}
+
+static bool create_instance(struct vkb_instance *instance, bool validation, struct vkb_error *error)
+{
+    const VkDebugUtilsMessengerCreateInfoEXT messenger = {
+        .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
+        .messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT
+                         | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
+        .messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
+        .pfnUserCallback = vkb_messages_receive,
+    };
+
+    *instance = (struct vkb_instance){.process = vkb_current_process()};
+    if (!check_loader(validation, error)
+        || !create_handle(instance, validation ? &messenger : NULL, error))
+        return false;
+    load_functions(instance);
+    if (!validation
+        || VK(error, instance->vk.vkCreateDebugUtilsMessengerEXT(instance->handle, &messenger, NULL,
+                                                                 &instance->messenger)))
+        return true;
+    destroy_instance(instance);
+    return false;
+}
+
+struct vkb_instance *vkb_instance_open(bool validation, struct vkb_error *error)
+{
+    struct vkb_instance *instance = &instances[validation];
+    const long process = vkb_current_process();
+
+    vkb_lock_acquire(&lock);
+    for (size_t i = 0; i < sizeof instances / sizeof instances[0]; ++i)
+        if (instances[i].handle && instances[i].process != process) {
+            instances[i] = (struct vkb_instance){0};
+            forked = true;
+        }
+    const bool done = instance->handle || create_instance(instance, validation, error);
+    instance->users += done;
+    vkb_lock_release(&lock);
+    return done ? instance : NULL;
+}
+
+void vkb_instance_close(struct vkb_instance *instance)
+{
+    vkb_lock_acquire(&lock);
+    if (--instance->users == 0 && forked)
+        destroy_instance(instance);
+    vkb_lock_release(&lock);
+}
+
+void vkb_instance_explain_fork(struct vkb_error *error)
+{
+    vkb_lock_acquire(&lock);
+    if (forked)
+        add_text(error, ". This process was forked from one that had used Vulkan, after which some "
+                        "drivers (NVIDIA's among them) do not work; start it by multiprocessing's "
+                        "method \"spawn\" or \"forkserver\"");
+    vkb_lock_release(&lock);
+}
+
+void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice device,
+                              struct VolkDeviceTable *table)
+{
+    vkb_lock_acquire(&lock);
+    // volk asks the function that is in its global.
+    vkGetDeviceProcAddr = instance->vk.vkGetDeviceProcAddr;
+    volkLoadDeviceTable(table, device);
+    vkb_lock_release(&lock);
+}
+
+#ifdef VKBLOOM_FAULTS
+void vkb_fault_forget_instances(void)
+{
+    vkb_lock_acquire(&lock);
+    for (size_t i = 0; i < sizeof instances / sizeof instances[0]; ++i)
+        destroy_instance(&instances[i]);
+    loader_open = false;
+    vkb_lock_release(&lock);
+}
+#endif

@@ -1,0 +1,174 @@
+"""How far an image may be from another, and which of the limits a comparison exceeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from vkbloom.checks import check_number
+from vkbloom.views.comparison import Comparison, Metric
+
+__all__ = ["DEFAULTS", "Stage", "Tolerances", "failures", "worst"]
+
+Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "PSNR", "FLIP"]
+
+#: (atol, rtol) of each dtype. Integers: one level, which is what a value near the middle of two
+#: levels moves by. Half: four roundings of 2**-11 each, and absolutely a fortieth of an 8-bit
+#: level, for what is left of larger values that cancel out. Float: what lavapipe's linear filter
+#: of rgba32float is exact to.
+DEFAULTS: Final[Mapping[str, tuple[float, float]]] = {
+    "uint8": (1 / 255, 0.0),
+    "uint16": (1 / 65535, 0.0),
+    "float16": (1e-4, 2e-3),
+    "float32": (1e-5, 1e-4),
+    "float64": (1e-5, 1e-4),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerances:
+    """How far an image may be from its reference, in the terms of OpenImageIO's `idiff`.
+
+    Integers count as 0 to 1 in all of them. Each that is set must hold; images that are equal pass
+    without further ado.
+
+    Parameters
+    ----------
+    atol, rtol : float or None
+        A pixel fails if a channel of it differs by more than atol + rtol * abs(reference):
+        `idiff`'s ``fail`` and ``failrelative``. None: `DEFAULTS` of the dtype if both are None,
+        else 0.
+    fail_percent : float
+        Percentage of pixels that may fail, 0 to 100: ``failpercent``.
+    hard_fail : float or None
+        Difference that no pixel may exceed, whatever `fail_percent` allows: ``hardfail``.
+    warn : float or None
+        Largest difference that passes without a warning: ``warn``.
+    ssim : float or None
+        Smallest structural similarity, -1 to 1.
+    psnr : float or None
+        Smallest peak signal-to-noise ratio, in dB.
+    flip : float or None
+        Largest mean FLIP, 0 to 1.
+    allow_nan : bool
+        Let NaN, and infinity of one sign, pass where both images have it.
+
+    Raises
+    ------
+    ValueError
+        A number is out of its range; names the field, the value and the range.
+    TypeError
+        A field is no number.
+    """
+
+    atol: float | None = None
+    rtol: float | None = None
+    fail_percent: float = 0.0
+    hard_fail: float | None = None
+    warn: float | None = None
+    ssim: float | None = None
+    psnr: float | None = None
+    flip: float | None = None
+    allow_nan: bool = False
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("atol", 0.0, math.inf),
+            ("rtol", 0.0, float(np.finfo(np.float64).max)),
+            ("fail_percent", 0.0, 100.0),
+            ("hard_fail", 0.0, math.inf),
+            ("warn", 0.0, math.inf),
+            ("ssim", -1.0, 1.0),
+            ("psnr", -math.inf, math.inf),
+            ("flip", 0.0, 1.0),
+        ):
+            value = getattr(self, name)
+            if value is not None:
+                check_number(name, value, low, high)
+
+    def of(self, dtype: np.dtype[Any]) -> tuple[float, float]:
+        """Return atol and rtol for images of a dtype."""
+        if self.atol is None and self.rtol is None:
+            return DEFAULTS[dtype.name]
+        return self.atol or 0.0, self.rtol or 0.0
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """The figures that have a limit, which `compare` has to compute."""
+        limits: dict[Metric, float | None] = {
+            "ssim": self.ssim,
+            "psnr": self.psnr,
+            "flip": self.flip,
+        }
+        return tuple(name for name, limit in limits.items() if limit is not None)
+
+
+def failures(
+    found: Comparison, tolerances: Tolerances, metrics: Collection[Metric]
+) -> list[tuple[Stage, str]]:
+    """Tell which limits a comparison exceeds.
+
+    Parameters
+    ----------
+    found : Comparison
+        Made with the `atol` and `rtol` of the tolerances as `threshold` and `relative`.
+    tolerances : Tolerances
+    metrics : collection of {"ssim", "psnr", "flip"}
+        The figures whose limits are held; one that could not be computed fails.
+
+    Returns
+    -------
+    list of (Stage, str)
+        The check and the reason, in the order of the checks; empty where the images pass.
+    """
+    failed: list[tuple[Stage, str]] = [("finiteness", reason) for reason in found.mismatches]
+    over = found.percent_over or 0.0
+    limits = (found.threshold, found.relative)
+    if over > tolerances.fail_percent:
+        stage: Stage = "tolerances" if any(limits) or tolerances.fail_percent else "exact"
+        allowed = f", {tolerances.fail_percent:.4g} % allowed" if tolerances.fail_percent else ""
+        reason = f"{over:.4g} % of the pixels {_limits_in_words(*limits)}{allowed}; {worst(found)}"
+        failed.append((stage, reason))
+    hard, largest = tolerances.hard_fail, found.max_error or 0.0
+    if hard is not None and largest > hard:
+        failed.append(("tolerances", f"{worst(found)}, over {hard:.6g}, the most allowed"))
+    figures: tuple[tuple[Metric, Stage, float | None, float | None, bool], ...] = (
+        ("ssim", "SSIM", found.ssim, tolerances.ssim, False),
+        ("psnr", "PSNR", found.psnr, tolerances.psnr, False),
+        ("flip", "FLIP", found.flip, tolerances.flip, True),
+    )
+    for metric, name, value, limit, is_most in figures:
+        if metric not in metrics or limit is None:
+            continue
+        if value is None:
+            # Of images that are no match, that is said already.
+            if not found.mismatches:
+                why = found.not_computed.get(metric, "no values to compare")
+                failed.append((name, f"{name} is not computed: {why}"))
+        elif is_most and value > limit:
+            failed.append((name, f"{name} {value:.6g} is over {limit:.6g}"))
+        elif not is_most and value < limit:
+            failed.append((name, f"{name} {value:.6g} is under {limit:.6g}"))
+    return failed
+
+
+def _limits_in_words(atol: float, rtol: float) -> str:
+    if rtol:
+        return f"differ by more than {atol:.4g} + {rtol:.4g} |reference|"
+    return f"differ by more than {atol:.4g}" if atol else "differ"
+
+
+def worst(found: Comparison) -> str:
+    """Describe the pixel with the largest difference."""
+    if found.max_error_at is None or found.max_error_values is None:
+        return "no finite value differs"
+    x, y, channel = found.max_error_at
+    expected, actual = found.max_error_values
+    return (
+        f"largest difference {found.max_error:.6g} at x {x}, y {y}, channel {channel}: "
+        f"{actual:.6g}, not {expected:.6g}"
+    )

@@ -1,0 +1,51 @@
+"""The shaders in the core, as SPIR-V: what every compiler has to be told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from vkbloom import _core
+
+MAGIC = 0x07230203
+HEADER_WORDS = 5
+DECORATE, FUNCTION, FUNCTION_END = 71, 54, 56
+NO_CONTRACTION = 42
+# OpFNegate, OpFAdd, OpFSub, OpFMul, OpFDiv, OpFRem, OpFMod, and from OpVectorTimesScalar to OpDot.
+FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
+
+
+def modules() -> Iterator[list[tuple[int, ...]]]:
+    """Yield the instructions of each module that the core holds."""
+    data = Path(_core.__file__).read_bytes()
+    words = np.frombuffer(data[: len(data) // 4 * 4], np.uint32)
+    for start in np.flatnonzero(words == MAGIC):
+        position = int(start) + HEADER_WORDS
+        instructions: list[tuple[int, ...]] = []
+        # A module ends with its last function.
+        while not (
+            instructions
+            and instructions[-1][0] & 0xFFFF == FUNCTION_END
+            and words[position] & 0xFFFF != FUNCTION
+        ):
+            length = int(words[position]) >> 16
+            instructions.append(tuple(map(int, words[position : position + length])))
+            position += length
+        yield instructions
+
+
+def test_no_operation_on_floats_may_be_contracted() -> None:
+    counts = []
+    for instructions in modules():
+        decorated = {
+            words[1]
+            for words in instructions
+            if words[0] & 0xFFFF == DECORATE and words[2] == NO_CONTRACTION
+        }
+        results = {words[2] for words in instructions if words[0] & 0xFFFF in FLOAT_ARITHMETIC}
+        assert results == decorated
+        counts.append(len(results))
+    assert len(counts) > 60, "modules were not found"
+    assert sum(counts) > 2000, "operations were not found"
