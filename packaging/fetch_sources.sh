@@ -22,7 +22,7 @@ done
 
 cd "/build/Python-$PYTHON"
 ./configure --quiet --prefix=/opt/python >/dev/null
-nice make -s -j2 >/build/python.log 2>&1
+make -s -j2 >/build/python.log 2>&1
 make -s altinstall >>/build/python.log 2>&1
 cd /build
 rm -rf "Python-$PYTHON" fetched

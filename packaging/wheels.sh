@@ -16,8 +16,10 @@ python3 -m pip download --quiet --no-deps --dest "$root/root/pypi" --only-binary
     --python-version 3.11 --implementation cp --abi cp311 --abi abi3 --abi none \
     --platform manylinux2014_x86_64 --platform manylinux_2_28_x86_64 \
     --requirement packaging/requirements.txt
-chroot "$root" /opt/python/bin/python3.11 -m pip install --quiet --no-index --no-deps \
-    --root-user-action=ignore --upgrade /root/pypi/*
+# pip's wheel can be run as it is: Debian's source of Python comes without it.
+chroot "$root" sh -c 'set -- /root/pypi/pip-*.whl
+    /opt/python/bin/python3.11 "$1/pip" install --quiet --no-index --no-deps \
+        --root-user-action=ignore --upgrade /root/pypi/*.whl'
 
 rm -rf "$root/build/vkbloom" "$root/build/wheels"
 mkdir -p "$root/build/vkbloom" "$root/build/wheels" dist

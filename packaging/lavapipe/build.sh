@@ -41,7 +41,7 @@ test -f /build/mesa/build.ninja || "$python" -m mesonbuild.mesonmain setup /buil
     -Dcpp_link_args='-static-libgcc -static-libstdc++ -Wl,--gc-sections,--as-needed,--version-script=/build/driver.sym' \
     >/build/mesa-setup.log
 library=src/gallium/targets/lavapipe/libvulkan_lvp.so
-nice ninja -C /build/mesa -j "${JOBS:-2}" "$library" >/build/mesa-build.log ||
+ninja -C /build/mesa -j "${JOBS:-2}" "$library" >/build/mesa-build.log ||
     { tail -n 40 /build/mesa-build.log; exit 1; }
 
 work=/build/vkbloom-lavapipe
