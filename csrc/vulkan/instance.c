@@ -73,16 +73,18 @@ static void add_text(struct vkb_error *error, const char *text)
 }
 
 // What the loader answers where no adapter can be had is not always what is wrong.
-static bool check_created(VkResult result, struct vkb_error *error)
+static bool check_created(VkResult result, bool direct, struct vkb_error *error)
 {
-    // Of the extensions that are asked for, only this may be missing. Loaders know it from 1.3.234
-    // on; some that do (1.3.239) do not list it.
-    if (result == VK_ERROR_EXTENSION_NOT_PRESENT)
-        return vkb_fail(error, VKB_ERROR_GENERAL,
-                        "validation of the bundled driver needs a Vulkan loader with "
-                        "VK_LUNARG_direct_driver_loading (1.3.234 or later), which the system's "
-                        "lacks. Install a newer one, or set VKBLOOM_DRIVER=system to validate with "
-                        "the system's driver");
+    // Loaders open single drivers from 1.3.234 on; some that know the extension (1.3.239) do not
+    // list it, and refuse it.
+    if (direct
+        && (result == VK_ERROR_EXTENSION_NOT_PRESENT || result == VK_ERROR_INCOMPATIBLE_DRIVER))
+        return vkb_fail(
+            error, VKB_ERROR_GENERAL,
+            "validation of the bundled driver needs a Vulkan loader with "
+            "VK_LUNARG_direct_driver_loading, which the system's lacks or refuses for "
+            "this driver. Install a newer one, or set VKBLOOM_DRIVER=system to validate with "
+            "the system's driver");
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER) {
         vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
                  "no Vulkan adapter: the loader found no driver that works. %s", vkb_install_hint);
@@ -166,7 +168,7 @@ static bool create_handle(struct vkb_instance *instance, PFN_vkGetInstanceProcAd
                                      VK_LUNARG_DIRECT_DRIVER_LOADING_EXTENSION_NAME},
             },
             NULL, &instance->handle)),
-        error);
+        driver != NULL, error);
 }
 
 static void load_functions(struct vkb_instance *instance)
