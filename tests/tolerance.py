@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom import Frames, Separable, Settings, reference
+from vkbloom import DualKawase, Frames, Pyramid, Separable, Settings, reference
 
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 _DTYPES = {format: dtype for dtype, format in FORMATS.items()}
@@ -22,6 +22,9 @@ _SINGLE = 1e-4
 # normal half, 2 ** -14.
 _HALF_ROUNDING = 2.0**-11
 _HALF_LEAST = 2.0**-25
+
+# What passes their threshold is their glow.
+_EXTRACTING = (Separable, Pyramid, DualKawase)
 
 # Framebuffers in which one 8-bit stage's rounding arrives, or that of the glow and one more.
 _FIRST_STAGES = ("glow", "blur_vertical", "down_0")
@@ -89,11 +92,19 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
     expected = reference.apply(image, settings)
     assert list(frames) == list(expected)
     format = settings.format or FORMATS[image.dtype.name]
+    if settings.threshold is not None and not isinstance(settings, _EXTRACTING):
+        # Its threshold comes after the glow, and magnifies what that was rounded by.
+        limit = tolerance(_DTYPES[format], expected["glow"], stages_of_8_bits=1)
+        assert_close("glow", frames["glow"], expected["glow"], limit)
+        height, width, _ = image.shape
+        expected |= reference.passes(frames["glow"], settings, (width, height), format)
+        expected["final"] = reference.composite(image, expected["bloom"], settings)
     passes_before_vertical = 2 * getattr(settings, "loops", 1) - 1
     hidden = passes_before_vertical - 1
     if isinstance(settings, Separable):
         hidden += len(settings.layers) - 1
-    magnitudes = reference.apply(np.abs(image), settings)
+    # A threshold takes away from a value, but not from what it was rounded by.
+    magnitudes = reference.apply(np.abs(image), settings.replace(threshold=None))
     limits = {}
     for index, (name, array) in enumerate(frames.items()):
         dtype = image.dtype if name == "final" else _DTYPES[format]
@@ -114,7 +125,8 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
         )
     if settings.bloom and _DTYPES[format] != image.dtype:
         # The coarser bloom's rounding goes through the composite into a finer final.
-        limits["final"] = limits["final"] + settings.intensity * limits["bloom"]
+        of_bloom = np.broadcast_to(limits["bloom"], frames["bloom"].shape)[..., : image.shape[2]]
+        limits["final"] = limits["final"] + settings.intensity * of_bloom
     for name, array in frames.items():
         assert_close(name, array, expected[name], limits[name])
         if name != "final":

@@ -1,6 +1,7 @@
 // Filament's bloom at its low quality. Source: google/filament, filament/src/PostProcessManager.cpp
 // @ 003e5005713c, bloom().
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -18,9 +19,10 @@ static void choose_sizes(struct vkb_levels *levels)
     const struct vkb_values *values = &levels->settings->values;
     const struct vkb_size frame = levels->source->buffers;
     const double height = values->resolution;
-    const uint32_t most = (uint32_t)floor(log2(height)) + 1;
+    const double width = height * frame.width / frame.height;
+    const uint32_t most = (uint32_t)log2(floor(fmax(width, height))) + 1;
     const uint32_t wanted = (uint32_t)values->levels, count = wanted < most ? wanted : most;
-    struct vkb_size size = {stepped(height * frame.width / frame.height), stepped(height)};
+    struct vkb_size size = {stepped(width), stepped(height)};
 
     for (; levels->count < count; size = vkb_halved(size))
         levels->sizes[levels->count++] = size;
@@ -34,7 +36,7 @@ static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32
         vkb_prefilter_row(levels, VKB_SHADER_filament_prefilter_frag, from, to);
 
     if (from != levels->source->glow)
-        row.constants[1] = 0;
+        row.constants.thresholded = 0;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

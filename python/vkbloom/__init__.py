@@ -20,6 +20,7 @@ from vkbloom._core import (
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
+from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
@@ -59,16 +60,19 @@ __all__ = [
     "AdapterInfo",
     "AdapterNotFoundError",
     "BevyBloom",
+    "BlenderGlare",
     "Camera",
     "DeviceLostError",
     "DualKawase",
     "Error",
     "FilamentBloom",
     "Frames",
+    "GodotBloom",
     "GridReport",
     "HdrpBloom",
     "KinoBloom",
     "OutOfMemoryError",
+    "PygfxBloom",
     "Pyramid",
     "Renderer",
     "Scene",

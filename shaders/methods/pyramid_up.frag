@@ -9,10 +9,6 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/doubling.glsl"
 
-layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
-layout(constant_id = 1) const int ADD_OWN = 1;
-layout(constant_id = 2) const int UPSAMPLE = UPSAMPLE_TENT;
-
 layout(set = 0, binding = 1) uniform sampler2D smaller;
 layout(set = 0, binding = 2) uniform sampler2D own;
 
@@ -30,6 +26,20 @@ vec3 tent(Place place)
             sum += weight * sample_at(smaller, place, offset, SAMPLING).rgb;
         }
     return sum;
+}
+
+// HDRP's border: no place beyond the middle of the last two texels, no tap of the cubic filter beyond
+// 1 - 1 / size of the target.
+vec3 upsample_inset(Place place)
+{
+    ivec2 size = textureSize(smaller, 0);
+    bvec2 beyond = greaterThan(vec2(place.texel - size + 2) + place.part, vec2(0.5));
+    Place kept = Place(mix(place.texel, size - 2, beyond), mix(place.part, vec2(0.5), beyond));
+    if (UPSAMPLE == UPSAMPLE_INSET_LINEAR)
+        return sample_at(smaller, kept, vec2(0.0), SAMPLING).rgb;
+    vec2 ratio = vec2(size) / vec2(params.target_width, params.target_height);
+    vec2 furthest = vec2(size - 1 - kept.texel) + 0.5 - ratio;
+    return sample_cubic_within(smaller, kept, furthest, SAMPLING);
 }
 
 // The same, or one bilinear tap, where the level is exactly twice as large as the smaller one.
@@ -54,6 +64,8 @@ vec3 upsample(Place place)
         return sample_at(smaller, place, vec2(0.0), SAMPLING).rgb;
     if (UPSAMPLE == UPSAMPLE_CUBIC)
         return sample_cubic(smaller, place);
+    if (UPSAMPLE == UPSAMPLE_INSET_LINEAR || UPSAMPLE == UPSAMPLE_INSET_CUBIC)
+        return upsample_inset(place);
     return tent(place);
 }
 
