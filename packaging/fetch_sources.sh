@@ -24,6 +24,8 @@ cd "/build/Python-$PYTHON"
 ./configure --quiet --prefix=/opt/python >/dev/null
 make -s -j2 >/build/python.log 2>&1
 make -s altinstall >>/build/python.log 2>&1
+# Debian 12's packages are downloaded only: one installed would bring its newer glibc.
+rm /etc/apt/sources.list.d/sources.list
 cd /build
 rm -rf "Python-$PYTHON" fetched
 apt-get clean

@@ -6,7 +6,7 @@ start=$(date +%s)
 "$1" -m venv --without-pip venv
 set -- /srv/wheels/pip-*.whl
 venv/bin/python "$1/pip" install --quiet --no-index --find-links /srv/wheels \
-    "vkbloom[software,cli,pytest]"
+    "vkbloom[software,scenes,cli,pytest]"
 echo "installed in $(($(date +%s) - start)) s"
 PATH=$PWD/venv/bin:$PATH
 vkbloom adapters

@@ -28,7 +28,7 @@ mkdir -p "$wheels"
 python3 -m pip download --quiet --dest "$wheels" --only-binary=:all: --python-version "$version" \
     --implementation cp --platform manylinux2014_x86_64 --platform manylinux_2_28_x86_64 \
     --platform manylinux_2_31_x86_64 --find-links dist \
-    "vkbloom[software,cli,pytest]==$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)" pip
+    "vkbloom[software,scenes,cli,pytest]==$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)" pip
 echo "download: $(du -cb "$wheels"/*.whl | tail -n 1 | cut -f 1) bytes in all, of which" \
     "$(du -cb "$wheels"/vkbloom*.whl "$wheels"/numpy*.whl | tail -n 1 | cut -f 1)" \
     "for the renderer with its driver and NumPy"

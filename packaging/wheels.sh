@@ -30,5 +30,12 @@ for step in core.sh lavapipe/build.sh; do
     chroot "$root" /usr/bin/env -i PATH=/usr/bin:/bin LANG=C.UTF-8 JOBS="${JOBS:-2}" \
         sh "/build/vkbloom/packaging/$step" "$folder" /build/wheels
 done
+# Names that promise more than the files keep must not leave here.
+chroot "$root" sh -c 'for library in /build/vkbloom/build/lib*/vkbloom/_core.abi3.so \
+        /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so; do
+    newest=$(objdump -T "$library" | grep -o "GLIBC_[0-9.]*" | sort -uV | tail -n 1)
+    echo "$library needs $newest"
+    test "$(printf "%s\n" "$newest" GLIBC_2.31 | sort -V | tail -n 1)" = GLIBC_2.31 || exit 1
+done'
 cp "$root"/build/wheels/*.whl dist/
 ls -l dist
