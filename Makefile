@@ -2,6 +2,7 @@
 # make test: the same for the tests, and runs them. Both are quick the second time.
 # make check: while you work: lint of the changed files and a fast part of the tests.
 # make docs: the documentation into build/docs; a warning is a failure.
+# make wheels: the wheels of vkbloom and of its driver into dist/ (docs/releasing.md); as root.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
@@ -18,7 +19,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test check docs bench lint format sanitize clean
+.PHONY: demo test check docs bench wheels lint format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -41,6 +42,10 @@ check: build/stamp/core build/stamp/test build/stamp/lint
 docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
+
+# The build root and Mesa are made once, in build/wheels.
+wheels:
+	packaging/wheels.sh
 
 # BENCH: more options of python -m benchmarks.
 bench: build/stamp/core build/stamp/peers

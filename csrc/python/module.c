@@ -49,25 +49,28 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
 {
-    return Py_BuildValue("(ssssNy#)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
+    return Py_BuildValue("(ssssNy#N)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
                          adapter->driver_info,
                          PyUnicode_FromFormat("%u.%u.%u",
                                               VK_API_VERSION_MAJOR(adapter->api_version),
                                               VK_API_VERSION_MINOR(adapter->api_version),
                                               VK_API_VERSION_PATCH(adapter->api_version)),
-                         (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE);
+                         (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE,
+                         PyBool_FromLong(adapter->bundled));
 }
 
-static PyObject *adapters(PyObject *module, PyObject *unused)
+static PyObject *adapters(PyObject *module, PyObject *arguments)
 {
+    const char *driver;
     struct vkb_adapter_info found[VKB_MAX_ADAPTERS];
     struct vkb_error error = {0};
     uint32_t count = 0;
     bool done;
 
-    (void)unused;
+    if (!PyArg_ParseTuple(arguments, "s:adapters", &driver))
+        return NULL;
     Py_BEGIN_ALLOW_THREADS
-    struct vkb_instance *instance = vkb_instance_open(false, &error);
+    struct vkb_instance *instance = vkb_instance_open(driver, false, &error);
     done = instance && vkb_adapters_list(instance, found, &count, &error);
     if (instance)
         vkb_instance_close(instance);
@@ -88,7 +91,8 @@ static PyObject *adapters(PyObject *module, PyObject *unused)
 }
 
 static PyMethodDef functions[] = {
-    {"adapters", adapters, METH_NOARGS, "Describes the adapters that can run vkbloom."},
+    {"adapters", adapters, METH_VARARGS,
+     "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
     {"image_source", vkb_image_source, METH_O, "image_source(array) -> Source"},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},

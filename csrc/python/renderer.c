@@ -127,17 +127,18 @@ bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vk
     return vkb_messages_check(&self->device.messages, error) && done;
 }
 
-// create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
-// earlier run's pipeline cache, or None.
-static bool create(struct vkb_renderer *self, const char *adapter, bool validation,
-                   const char *forms, PyObject *read_cache, struct vkb_error *error)
+// create(adapter, driver, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes
+// of an earlier run's pipeline cache, or None.
+static bool create(struct vkb_renderer *self, const char *adapter, const char *driver,
+                   bool validation, const char *forms, PyObject *read_cache,
+                   struct vkb_error *error)
 {
     bool done;
     char *data = NULL;
     Py_ssize_t size = 0;
 
     Py_BEGIN_ALLOW_THREADS
-    done = vkb_device_create(&self->device, adapter, validation, error);
+    done = vkb_device_create(&self->device, adapter, driver, validation, error);
     Py_END_ALLOW_THREADS
     if (!done)
         return false;
@@ -169,7 +170,7 @@ static bool create(struct vkb_renderer *self, const char *adapter, bool validati
 
 static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject *keywords)
 {
-    const char *adapter, *forms;
+    const char *adapter, *driver, *forms;
     int validation;
     double frame_seconds;
     PyObject *read_cache;
@@ -179,7 +180,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(arguments, "spsdO:Renderer", &adapter, &validation, &forms,
+    if (!PyArg_ParseTuple(arguments, "sspsdO:Renderer", &adapter, &driver, &validation, &forms,
                           &frame_seconds, &read_cache))
         return NULL;
     if (!(frame_seconds > 0.0)) {
@@ -197,7 +198,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     if (!self->lock)
         PyErr_NoMemory();
     else if ((self->pages = vkb_pages_create(&self->device, &error)))
-        self->open = create(self, adapter, validation, forms, read_cache, &error);
+        self->open = create(self, adapter, driver, validation, forms, read_cache, &error);
     if (self->open) {
         self->device.interrupted = interrupted;
         self->device.asked = self;

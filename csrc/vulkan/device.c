@@ -133,12 +133,11 @@ static void read_properties(struct vkb_device *device)
     device->timestamp_mask = timestamp_mask(device);
 }
 
-static bool create_handle(struct vkb_device *device, const char *adapter_choice, bool validation,
-                          struct vkb_error *error)
+static bool create_handle(struct vkb_device *device, const char *adapter_choice, const char *driver,
+                          bool validation, struct vkb_error *error)
 {
-    device->instance = vkb_instance_open(validation, error);
-    if (!device->instance
-        || !vkb_adapter_choose(device->instance, adapter_choice, &device->adapter, error)
+    if (!vkb_adapter_open(adapter_choice, driver, validation, &device->instance, &device->adapter,
+                          error)
         || !create_logical(device, error))
         return false;
     vkb_instance_load_device(device->instance, device->handle, &device->vk);
@@ -147,14 +146,14 @@ static bool create_handle(struct vkb_device *device, const char *adapter_choice,
     return true;
 }
 
-bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bool validation,
-                       struct vkb_error *error)
+bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, const char *driver,
+                       bool validation, struct vkb_error *error)
 {
     *device = (struct vkb_device){0};
     if (validation)
         vkb_messages_open(&device->messages);
     const struct vkb_messages *before = vkb_messages_begin(&device->messages);
-    const bool done = create_handle(device, adapter_choice, validation, error);
+    const bool done = create_handle(device, adapter_choice, driver, validation, error);
     vkb_messages_end(before);
     if (!done) {
         vkb_device_destroy(device);

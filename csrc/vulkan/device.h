@@ -34,8 +34,8 @@ struct vkb_device {
 // `device` must not move in memory while it lives, as the messages in it. Whoever calls Vulkan with
 // it is between vkb_messages_begin(&device->messages) and vkb_messages_end; these two do so
 // themselves.
-bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, bool validation,
-                       struct vkb_error *error);
+bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, const char *driver,
+                       bool validation, struct vkb_error *error);
 void vkb_device_destroy(struct vkb_device *device);
 
 // Whether images of `format` can be used in all the ways of `features` with optimal tiling.

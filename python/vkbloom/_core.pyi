@@ -9,7 +9,7 @@ CHOICES: dict[str, tuple[str, ...]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
 
-_Adapter = tuple[str, str, str, str, str, bytes]
+_Adapter = tuple[str, str, str, str, str, bytes, bool]
 _Array = NDArray[Any]
 _Camera = tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]
 _Texture = tuple[tuple[_Array, ...], str, str, str, str, str]
@@ -34,7 +34,7 @@ class OutOfMemoryError(Error, MemoryError): ...
 class ValidationError(Error): ...
 class ShaderError(Error): ...
 
-def adapters() -> list[_Adapter]: ...
+def adapters(driver: str, /) -> list[_Adapter]: ...
 def image_source(array: _Array, /) -> Source: ...
 def scene_source(
     scene: _Scene,
@@ -54,6 +54,7 @@ class Renderer:
     def __new__(
         cls,
         adapter: str,
+        driver: str,
         validation: bool,
         forms: str,
         frame_seconds: float,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom.adapter import AdapterInfo
+from vkbloom.adapter import bundled_driver, from_core
 from vkbloom.checks import check_attachments, check_image, check_size
 from vkbloom.frames import Frames
 from vkbloom.plans import Pass, Plan, framebuffers
@@ -92,7 +92,8 @@ class Renderer:
     adapter : str
         "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", or a
         part of an adapter's name, in any case. The environment variable VKBLOOM_ADAPTER replaces
-        "auto".
+        "auto". "software" is the driver of the package ``vkbloom-lavapipe`` where it is installed,
+        else the system's; VKBLOOM_DRIVER names another driver's library or manifest, or "system".
     validation : bool
         Turns the Khronos validation layer on, with synchronization validation; its first message
         raises `ValidationError` from the call that caused it.
@@ -139,10 +140,15 @@ class Renderer:
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(
-            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+            adapter,
+            bundled_driver(),
+            bool(validation),
+            forms,
+            _frame_seconds(),
+            pipeline_cache.read,
         )
-        *fields, self._driver_uuid = self._core.info
-        self.info = AdapterInfo(*fields)
+        self._driver_uuid = self._core.info[5]
+        self.info = from_core(self._core.info)
         self._made_by = {
             "adapter": self.info.name,
             "driver": self.info.driver_info or self.info.driver,

@@ -384,11 +384,11 @@ def test_a_renderer_takes_no_keywords() -> None:
         make("auto", validation=True)
     for seconds in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match="frame_seconds: a number above 0 is needed"):
-            _core.Renderer("auto", True, "auto", seconds, _no_cache)
+            _core.Renderer("auto", "", True, "auto", seconds, _no_cache)
     with pytest.raises(OSError, match="no cache"):
-        _core.Renderer("auto", True, "auto", 1.0, _no_cache)
+        _core.Renderer("auto", "", True, "auto", 1.0, _no_cache)
     with pytest.raises(TypeError):
-        _core.Renderer("auto", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
+        _core.Renderer("auto", "", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
 
 
 def _no_cache(uuid: bytes) -> bytes | None:
