@@ -119,9 +119,7 @@ def points() -> None:
                                     reduce={"mean": vkbloom.reductions.Mean()})  # fmt: skip
             seconds_reduced = time.perf_counter() - start
             del dataset
-            print(
-                f"  only the means, in memory: {total / seconds_reduced:.0f} points/s"
-            )
+            print(f"  only the means, in memory: {total / seconds_reduced:.0f} points/s")
     singles(image, values, total / seconds)
 
 

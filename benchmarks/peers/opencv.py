@@ -58,8 +58,8 @@ def _floats_bloom(
 ) -> Callable[[NDArray[Any], int], NDArray[Any]]:
     glow = np.empty(image.shape, np.float32)
     blurred = np.empty_like(glow)
-    # A product with a mask of all channels is twice as fast as compare and copyTo, whose masked copy
-    # uses one thread.
+    # A product with a mask of all channels is twice as fast as compare and copyTo, whose masked
+    # copy uses one thread.
     luminance = _luminance(image.shape[2], image.shape[2])
 
     def bloom(picture: NDArray[Any], depth: int) -> NDArray[Any]:
