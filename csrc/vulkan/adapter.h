@@ -1,4 +1,4 @@
-// The adapters that an instance finds, and the choice of one.
+// The adapters of an instance, and the selection of one.
 #ifndef VKB_ADAPTER_H
 #define VKB_ADAPTER_H
 
@@ -27,7 +27,7 @@ const char *vkb_adapter_type(const struct vkb_adapter_info *adapter);
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,
                        uint32_t *count, struct vkb_error *error);
 
-// The adapter that `choice` names: "auto", "software", "hardware", or a part of a name.
+// Selects an adapter. `choice` is "auto", "software", "hardware", or a part of a name.
 bool vkb_adapter_choose(const struct vkb_instance *instance, const char *choice,
                         struct vkb_adapter_info *chosen, struct vkb_error *error);
 

@@ -12,12 +12,12 @@ const char vkb_install_hint[] =
     "On Debian or Ubuntu: apt install libvulkan1 mesa-vulkan-drivers (lavapipe, runs on any CPU); "
     "for a GPU, install its vendor's Vulkan driver. `vkbloom doctor` tells more.";
 
-static struct vkb_lock lock;              // of what is below, and of volk's globals
+static struct vkb_lock lock;              // protects the instances and volk's globals
 static struct vkb_instance instances[2];  // without and with validation
 static bool loader_open;
-// Whether this process was forked from one that had an instance. At exit Mesa (22.3.6) waits for
-// the threads of that one's drivers, which are not here, and so for any that got the memory of
-// their stacks since: none of the driver's own may be left then.
+// Whether this process was forked from one with an instance. At exit Mesa (22.3.6) waits for the
+// driver threads of the parent, which do not exist here. It mistakes threads of the child for them
+// if their stacks have the same addresses. So no driver thread of the child may be left at exit.
 static bool forked;
 
 static bool open_loader(struct vkb_error *error)
@@ -68,7 +68,7 @@ static void add_text(struct vkb_error *error, const char *text)
     snprintf(error->message + length, sizeof error->message - length, "%s", text);
 }
 
-// What the loader answers where no adapter can be had is not always what is wrong.
+// The result of the loader does not always name the cause if there is no adapter.
 static bool check_created(VkResult result, struct vkb_error *error)
 {
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER) {
@@ -86,7 +86,7 @@ static bool check_created(VkResult result, struct vkb_error *error)
     return false;
 }
 
-// The messenger hears what the instance's own creation leads to as well.
+// The messenger also receives the messages of the instance's creation.
 static bool create_handle(struct vkb_instance *instance,
                           const VkDebugUtilsMessengerCreateInfoEXT *messenger,
                           struct vkb_error *error)
@@ -198,7 +198,7 @@ void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice devi
                               struct VolkDeviceTable *table)
 {
     vkb_lock_acquire(&lock);
-    // volk asks the function that is in its global.
+    // volk loads the table through its global function pointer.
     vkGetDeviceProcAddr = instance->vk.vkGetDeviceProcAddr;
     volkLoadDeviceTable(table, device);
     vkb_lock_release(&lock);

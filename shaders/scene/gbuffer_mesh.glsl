@@ -1,4 +1,4 @@
-// The mesh that is lit later, in view space, with the radiance that its material emits.
+// The mesh that is lit later, in view space, with the emission of its material.
 #include "lib/block.glsl"
 #include "scene/gbuffer.glsl"
 
