@@ -153,7 +153,7 @@ def kills() -> None:
     generator = random.Random(time.time_ns())
     with folder() as path:
         command = [sys.executable, str(script)]
-        subprocess.run([*command, str(path / "whole.zarr"), "100"], check=True)
+        subprocess.run([*command, str(path / "undisturbed.zarr"), "100"], check=True)
         killed, chunks = 0, path / "a.zarr" / "final"
         for number in range(10):
             before = len(list(chunks.glob("c.*")))
@@ -166,7 +166,7 @@ def kills() -> None:
             report = str(vkbloom.check_grid(path / "a.zarr")).splitlines()
             print(f"  after kill {number + 1}: {report[0]}, problems {len(report) - 1}")
         subprocess.run([*command, str(path / "a.zarr"), "100"], check=True)
-        found, expected = contents(path / "a.zarr"), contents(path / "whole.zarr")
+        found, expected = contents(path / "a.zarr"), contents(path / "undisturbed.zarr")
         print(f"{killed} of 10 runs killed while working; bit-equal to the undisturbed run: "
               f"{found == expected}, {len(found)} files")  # fmt: skip
 

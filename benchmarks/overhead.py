@@ -143,7 +143,7 @@ def _split(
     """Add the table of where calls spend their time."""
     watch = _Stopwatch(renderer._core)
     renderer._core = watch  # type: ignore[assignment]
-    whole: dict[str, Times] = {}
+    calls: dict[str, Times] = {}
     inside: dict[str, Times] = {}
     passes: dict[str, int] = {}
     device: dict[str, float] = {}
@@ -163,36 +163,36 @@ def _split(
             return wall
 
         # Not in turn: the work of a case depends on the call before.
-        whole[name] = alternate_seconds({name: once}, rounds, warm_up=3)[name]
+        calls[name] = alternate_seconds({name: once}, rounds, warm_up=3)[name]
         inside[name] = Times(tuple(core_seconds[3:]))
-    section.times["calls"] = whole
+    section.times["calls"] = calls
     section.times["calls, in the core"] = inside
     is_gpu = renderer.info.type != "cpu"
     rows = tuple(
         (
             name,
             str(passes[name]),
-            f"{1e6 * whole[name].median:.0f}",
+            f"{1e6 * calls[name].median:.0f}",
             f"{1e6 * inside[name].median:.0f}",
-            f"{1e6 * (whole[name].median - inside[name].median):.0f}",
+            f"{1e6 * (calls[name].median - inside[name].median):.0f}",
             *([f"{1e6 * device[name]:.0f}"] if is_gpu else []),
         )
-        for name in whole
+        for name in calls
     )
     header = ["", "passes", "call, us", "in the core, us", "in Python, us"]
     if is_gpu:
         header.append("on the device, us")
     section.tables.append(Table("Where a call spends its time", tuple(header), rows))
-    section.about.append(_reading(whole, passes, list(whole)))
+    section.about.append(_reading(calls, passes, list(calls)))
 
 
-def _reading(whole: dict[str, Times], passes: dict[str, int], names: list[str]) -> str:
+def _reading(calls: dict[str, Times], passes: dict[str, int], names: list[str]) -> str:
     nothing, _, _, another, all_read, loops = names
-    a_pass = (whole[loops].median - whole[another].median) / max(1, passes[loops] - passes[another])
+    a_pass = (calls[loops].median - calls[another].median) / max(1, passes[loops] - passes[another])
     return (
-        f"A call that runs no pass costs {1e6 * whole[nothing].median:.0f} us (checks, comparison "
+        f"A call that runs no pass costs {1e6 * calls[nothing].median:.0f} us (checks, comparison "
         f"of the image, submission, readback). Each pass of this size adds {1e6 * a_pass:.0f} us "
         f"(recording and running: {LOOPS} loops against one). Reading back all framebuffers in "
         "place of `final` adds "
-        f"{1e6 * (whole[all_read].median - whole[another].median):.0f} us."
+        f"{1e6 * (calls[all_read].median - calls[another].median):.0f} us."
     )

@@ -121,6 +121,6 @@ def _time_block(
         for frames in renderer.apply_many(image, settings, attachments=("final",)):
             ran += len(frames.timings)
     else:
-        for point in settings:
-            ran += len(renderer.apply(image, point, attachments=("final",)).timings)
+        for each in settings:
+            ran += len(renderer.apply(image, each, attachments=("final",)).timings)
     return time.perf_counter() - start, ran

@@ -133,20 +133,20 @@ def _import_table() -> Table:
     """Return the slowest modules of ``import vkbloom`` except numpy's, by ``-X importtime``."""
     lines = _child(["-X", "importtime", "-c", "import vkbloom"]).stderr.splitlines()
     own: dict[str, int] = {}
-    whole: dict[str, int] = {}
+    total: dict[str, int] = {}
     for line in lines:
         columns = line.removeprefix("import time:").split("|")
         if len(columns) == 3 and columns[0].strip().isdigit():
             name = columns[2].strip()
-            own[name], whole[name] = int(columns[0]), int(columns[1])
+            own[name], total[name] = int(columns[0]), int(columns[1])
     # Modules before `site` are Python's own.
     names = list(own)
     later = names[names.index("site") + 1 :] if "site" in names else names
     others = (name for name in later if name.split(".")[0] != "numpy")
     slowest = sorted(others, key=lambda name: -own[name])[:8]
-    rows = [("vkbloom, with all it imports", f"{whole['vkbloom'] / 1e3:.1f}", "")]
-    rows.append(("numpy, as a part of it", f"{whole.get('numpy', 0) / 1e3:.1f}", ""))
-    rows += [(name, f"{whole[name] / 1e3:.1f}", f"{own[name] / 1e3:.1f}") for name in slowest]
+    rows = [("vkbloom, with all it imports", f"{total['vkbloom'] / 1e3:.1f}", "")]
+    rows.append(("numpy, as a part of it", f"{total.get('numpy', 0) / 1e3:.1f}", ""))
+    rows += [(name, f"{total[name] / 1e3:.1f}", f"{own[name] / 1e3:.1f}") for name in slowest]
     header = ("module", "with its imports, ms", "itself, ms")
     return Table(
         "One run of `python -X importtime`, which itself slows imports down", header, tuple(rows)

@@ -85,8 +85,8 @@ def dithering(renderer: vkbloom.Renderer) -> list[NDArray[np.float64]]:
 def save(panels: list[NDArray[np.float64]], target: Path) -> None:
     """Write panels, two in each row, as a JPEG file."""
     rows = [np.concatenate(panels[row : row + 2], 1) for row in range(0, len(panels), 2)]
-    whole = np.concatenate(rows, 0)
-    picture = np.round(np.clip(whole, 0, 1) * 255).astype(np.uint8)
+    sheet = np.concatenate(rows, 0)
+    picture = np.round(np.clip(sheet, 0, 1) * 255).astype(np.uint8)
     buffer = oiio.ImageBuf(np.ascontiguousarray(picture))
     buffer.specmod().attribute("Compression", "jpeg:85")
     if not buffer.write(str(target)):

@@ -2,8 +2,8 @@
 
 python tools/docs_pictures.py docs/pictures
 
-- flow_forward.png, flow_deferred.png: every framebuffer, and which are made from which, as the
-  core's own description of its passes says
+- flow_forward.png, flow_deferred.png: every framebuffer with those that it is made from, by the
+  core's description of its passes
 - gallery.jpg: the saucer with each preset
 - profiles.png: how the light of a point falls off with each preset
 """

@@ -8,7 +8,7 @@ layout(location = 3) out vec4 brightness;
 
 // Blending does not clamp. So each of the emitters that are added is clamped to its part of the
 // range.
-vec3 in_its_part(vec3 light)
+vec3 clamp_to_part(vec3 light)
 {
     const float most = HALF_LIMIT / float(EMITTERS);
     return clamp(light, -most, most);

@@ -11,5 +11,5 @@ void main()
     albedo = vec4(0.0);
     normal = vec4(0.0);
     position = vec4(0.0);
-    brightness = vec4(in_its_part(texelFetch(glow, ivec2(gl_FragCoord.xy), 0).rgb), 0.0);
+    brightness = vec4(clamp_to_part(texelFetch(glow, ivec2(gl_FragCoord.xy), 0).rgb), 0.0);
 }

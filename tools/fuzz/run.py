@@ -1,12 +1,12 @@
 """Fuzz a reader: ``python tools/fuzz/run.py TARGET [--seconds N] [--corpus FOLDER]``.
 
-The run starts from the target's whole files and from ``corpus/TARGET.zip``, inputs that reached
-something new in earlier runs; what this one adds to them stays in FOLDER, if one is given.
+The run starts from the target's valid files and from ``corpus/TARGET.zip``, the inputs that earlier
+runs saved. New inputs of this run are saved in FOLDER, if it is given.
 
-With atheris the inputs are guided by the coverage of the package's Python code; without it (or with
---plain) they are mutations of whole files. What a reader does not promise to raise ends the run, as
-does an input for which the process would need more than MIB over what it had at the start; the
-input lies in the folder then, as ``finding-TARGET``.
+With atheris the inputs are guided by the coverage of the package's Python code. Without it, or with
+--plain, they are mutations of valid files. The run ends with a finding: an exception that the
+reader does not document, or more than MIB of additional memory. The input is then written to the
+folder as ``finding-TARGET``.
 """
 
 from __future__ import annotations

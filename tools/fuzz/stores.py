@@ -147,16 +147,16 @@ class Stores:
 
     def __init__(self, folder: Path) -> None:
         self._changed = folder / "changed.zarr"
-        whole = folder / "whole.zarr"
-        _made(whole, chunks=CHUNKS)
-        self._whole = _contents(whole)
-        self._keys = [*self._whole, *FOREIGN]
+        complete = folder / "complete.zarr"
+        _made(complete, chunks=CHUNKS)
+        self._complete = _contents(complete)
+        self._keys = [*self._complete, *FOREIGN]
 
     def seeds(self) -> list[bytes]:
         """Return inputs with one change each."""
         found = [bytes([flags]) for flags in range(5)]
         for number, key in enumerate(self._keys):
-            content = self._whole.get(key, b"{}")
+            content = self._complete.get(key, b"{}")
             if "/c." in key:
                 # With a correct checksum, they are changed but not damaged.
                 found.append(b"\1" + _record(number, 1, content[:-4]))
@@ -166,7 +166,7 @@ class Stores:
             number = self._keys.index(key)
             found += [b"\1" + _record(number, kind, b"") for kind in (0, 2, 3)]
         wanted = ["attributes", "vkbloom_grid", "chunk", "grid", "axes", "variables"]
-        for place, (inner, key) in enumerate(_places(json.loads(self._whole[ROOT]))):
+        for place, (inner, key) in enumerate(_places(json.loads(self._complete[ROOT]))):
             if key in wanted:
                 wanted.remove(key)
                 text = struct.pack("<H", place) + json.dumps(inner[key]).encode()
@@ -187,7 +187,7 @@ class Stores:
         return [*found, *(bytes([LOOK]) + one[1:] for one in found[5:])]
 
     def _decoded(self, key: str) -> bytes:
-        return bytes(Zstd().decode(self._whole[key][:-4]))
+        return bytes(Zstd().decode(self._complete[key][:-4]))
 
     def run(self, data: bytes) -> None:
         """Check a changed store, or continue it."""
@@ -216,7 +216,7 @@ class Stores:
 
     def _change(self, data: bytes) -> None:
         """Write the valid store with the changes of the records."""
-        contents: dict[str, bytes | None] = dict(self._whole)
+        contents: dict[str, bytes | None] = dict(self._complete)
         for number, kind, payload in _records(data):
             key = self._keys[number % len(self._keys)]
             match kind % KINDS:
@@ -237,7 +237,7 @@ class Stores:
                     contents[key] = _summed(bytes(Zstd(level=1).encode(payload or b"\0")))
                 case _:
                     source = self._keys[(payload or b"\0")[0] % len(self._keys)]
-                    contents[key] = self._whole.get(source, b"")
+                    contents[key] = self._complete.get(source, b"")
         shutil.rmtree(self._changed, ignore_errors=True)
         self._changed.mkdir()
         for key, content in contents.items():

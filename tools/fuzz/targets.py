@@ -1,7 +1,7 @@
 """The readers of the package, as functions of bytes; each may raise only documented exceptions.
 
-A target writes the bytes where its reader looks for them and calls it. OSError and ValueError are
-what the contract has for files that do not load; anything else is a finding.
+A target writes the bytes to the file of its reader and calls it. Files that do not load may raise
+OSError and ValueError; any other exception is a finding.
 """
 
 from __future__ import annotations
