@@ -114,13 +114,16 @@ def write_spirv() -> None:
     for module in built:
         dispatch = f"{module.shader.stem}_dispatch"
         twin = dispatch if dispatch in names else module.name
-        rows += f"    {{{module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n"
+        rows += (
+            f'    {{"{module.name}", {module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n'
+        )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
         "#include <stddef.h>\n#include <stdint.h>\n\n"
         f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
         "// `dispatch`: the same pass as a compute shader, or itself where there is none.\n"
-        "struct vkb_spirv { const uint32_t *code; size_t size; enum vkb_shader dispatch; };\n"
+        "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
+        "    enum vkb_shader dispatch;\n};\n"
         "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
     )
     (SPIRV / "spirv.c").write_text(

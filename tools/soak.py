@@ -95,7 +95,7 @@ def main(total: int) -> int:
                 renderer.render(scene, None, (16, 16))
             renderer.apply(np.zeros((8, 8, 3), np.float32))
             # One array replaces all idle pages, so that each count sees the same number of them.
-            renderer._core.new_array(np.empty, (256 << 20,), "uint8")
+            renderer._core.pages(256 << 20)
             rows.append(counts())
             shown = ", ".join(f"{value} {name}" for name, value in rows[-1].items())
             print(f"{(step + 1) * (total // STEPS):>8} frames: {shown}", flush=True)

@@ -174,7 +174,8 @@ def settings_from(*arguments: str) -> Any:
 @pytest.mark.parametrize("kind", METHODS.values(), ids=list(METHODS))
 def test_every_field_of_every_method_is_an_option(kind: type[vkbloom.Settings]) -> None:
     names = {option for parameter in chosen.params for option in parameter.opts}
-    assert names >= {f"--{field.name.replace('_', '-')}" for field in dataclasses.fields(kind)}
+    options = (field.metadata.get("option", field.name) for field in dataclasses.fields(kind))
+    assert names >= {f"--{option.replace('_', '-')}" for option in options}
 
 
 def test_every_method_is_there() -> None:
