@@ -2,8 +2,8 @@
 
 python tools/docs_pictures.py docs/pictures
 
-- flow_forward.png, flow_deferred.png: every framebuffer, and which are made from which, as the
-  renderer's plan says
+- flow_forward.png, flow_deferred.png: every framebuffer with those that it is made from, by the
+  renderer's plan
 - gallery.jpg: the saucer with each preset
 - the flowchart of docs/plans.md, from a plan
 - profiles.png: how the light of a point falls off with each preset
@@ -29,7 +29,7 @@ mpl.use("agg")
 from matplotlib import pyplot as plt
 
 SIZE = (640, 360)
-# Pages of both themes show them.
+# A colour that is readable in the light and the dark theme.
 INK = "#8a929a"
 
 
@@ -72,9 +72,9 @@ _ACROSS, _DOWN = 2.2, 1.6  # from box to box
 
 
 def edge(box: tuple[float, float], towards: tuple[float, float]) -> tuple[float, float]:
-    """Return where a line from the middle of a box to another leaves it."""
+    """Return the point where a line between the centres of two boxes leaves the first."""
     x, y = towards[0] - box[0], towards[1] - box[1]
-    # Below the picture is its name.
+    # The name is below the picture.
     high = _HEIGHT / 2 + 0.05 + (_CAPTION if y < 0 else 0)
     share = min((_WIDTH / 2 + 0.05) / abs(x) if x else np.inf, high / abs(y) if y else np.inf)
     return box[0] + share * x, box[1] + share * y
@@ -87,7 +87,7 @@ def draw_flow(
     layout: dict[str, tuple[float, float]],
     path: Path,
 ) -> None:
-    """Draw framebuffers, with arrows to what is made from them."""
+    """Draw framebuffers, with arrows to those made from them."""
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=3.0)
     frames = renderer.render(scene, settings, SIZE, shading=shading)
     plan = renderer.plan(scene, settings, SIZE, shading=shading)
@@ -109,7 +109,7 @@ def draw_flow(
         text = f"{name}\n{array.shape[1]} x {array.shape[0]}, {array.dtype}"
         axes.text(x, y - _HEIGHT / 2 - 0.05, text, ha="center", va="top", color=INK, fontsize=7)
     for name, reads in edges(plan).items():
-        # Images that are no framebuffers, such as the deferred glow, are passed over.
+        # Skip images that are not framebuffers, such as the deferred glow.
         for read in reads & set(frames) if name in frames else ():
             ends = edge(places[name], places[read]), edge(places[read], places[name])
             axes.annotate("", *ends, arrowprops={"arrowstyle": "->", "color": INK, "lw": 1.2})
@@ -150,7 +150,7 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
     width, height = SIZE
     image = np.zeros((height, width, 3), np.float32)
     y, x = height // 2, width // 2
-    # KinoBloom takes a single pixel for a firefly.
+    # KinoBloom removes a single pixel as a firefly.
     image[y - 1 : y + 2, x - 1 : x + 2] = 1000
     figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
     for index, (name, settings) in enumerate(vkbloom.presets.items()):

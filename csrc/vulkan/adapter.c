@@ -20,7 +20,7 @@ const char *vkb_adapter_type(const struct vkb_adapter_info *adapter)
     }
 }
 
-// A queue family that draws, computes and so can copy as well; UINT32_MAX where there is none.
+// A queue family with graphics and compute, which implies transfer; UINT32_MAX if there is none.
 static uint32_t find_queue_family(const struct vkb_instance *instance, VkPhysicalDevice physical)
 {
     VkQueueFamilyProperties families[16];
@@ -52,7 +52,7 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     instance->vk.vkGetPhysicalDeviceProperties(physical, &plain);
     if (plain.apiVersion < VK_API_VERSION_1_1)
         return false;
-    // The driver's name is core from 1.2 on only.
+    // Driver properties are core since Vulkan 1.2.
     if (plain.apiVersion >= VK_API_VERSION_1_2)
         id.pNext = &driver;
     instance->vk.vkGetPhysicalDeviceProperties2(physical, &properties);
@@ -81,7 +81,7 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
         instance->vk.vkEnumeratePhysicalDevices(instance->handle, &device_count, devices));
 
     *count = 0;
-    // Some loaders answer so where they have no driver at all.
+    // Some loaders return this if they have no driver.
     if (result == VK_ERROR_INITIALIZATION_FAILED)
         return true;
     if (result != VK_INCOMPLETE && !vkb_check(error, result, "vkEnumeratePhysicalDevices"))
@@ -91,7 +91,7 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
     return true;
 }
 
-// Lower is better; the order of "auto".
+// The rank of an adapter for "auto"; lower is better.
 static int preference(const struct vkb_adapter_info *adapter)
 {
     switch (adapter->device_type) {

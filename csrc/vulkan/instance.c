@@ -16,12 +16,12 @@ const char vkb_install_hint[] =
 
 enum { MAX_INSTANCES = 8 };
 
-static struct vkb_lock lock;  // of what is below, and of volk's globals
+static struct vkb_lock lock;  // protects the instances and volk's globals
 static struct vkb_instance instances[MAX_INSTANCES];
 static bool loader_open;
-// Whether this process was forked from one that had an instance. At exit Mesa (22.3.6) waits for
-// the threads of that one's drivers, which are not here, and so for any that got the memory of
-// their stacks since: none of the driver's own may be left then.
+// Whether this process was forked from one with an instance. At exit Mesa (22.3.6) waits for the
+// driver threads of the parent, which do not exist here. It mistakes threads of the child for them
+// if their stacks have the same addresses. So no driver thread of the child may be left at exit.
 static bool forked;
 
 static bool open_loader(struct vkb_error *error)
@@ -72,7 +72,7 @@ static void add_text(struct vkb_error *error, const char *text)
     snprintf(error->message + length, sizeof error->message - length, "%s", text);
 }
 
-// What the loader answers where no adapter can be had is not always what is wrong.
+// The result of the loader does not always name the cause if there is no adapter.
 static bool check_created(VkResult result, bool direct, struct vkb_error *error)
 {
     // Loaders open single drivers from 1.3.234 on; some that know the extension (1.3.239) do not
@@ -100,7 +100,8 @@ static bool check_created(VkResult result, bool direct, struct vkb_error *error)
     return false;
 }
 
-// The functions that need no instance: the loader's, or for lack of validation the driver's own.
+// Finds the functions that need no instance: those of the loader, or without validation those of
+// the driver itself.
 static bool open_source(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr *driver,
                         struct vkb_error *error)
 {
@@ -122,7 +123,7 @@ static bool open_source(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr
     return true;
 }
 
-// The messenger hears what the instance's own creation leads to as well.
+// The messenger also receives the messages of the instance's creation.
 static bool create_handle(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr driver,
                           const VkDebugUtilsMessengerCreateInfoEXT *messenger,
                           struct vkb_error *error)
@@ -278,7 +279,7 @@ void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice devi
                               struct VolkDeviceTable *table)
 {
     vkb_lock_acquire(&lock);
-    // volk asks the function that is in its global.
+    // volk loads the table through its global function pointer.
     vkGetDeviceProcAddr = instance->vk.vkGetDeviceProcAddr;
     volkLoadDeviceTable(table, device);
     vkb_lock_release(&lock);

@@ -1,4 +1,4 @@
-// Reads an image by the cubic B-spline with its texels as control points.
+// Samples an image with a cubic B-spline whose control points are the texels.
 
 vec4 cubic_weights(float part)
 {
