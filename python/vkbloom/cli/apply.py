@@ -16,7 +16,7 @@ from vkbloom.cli.image_files import COLOURS, note, read_picture, subimage_option
 from vkbloom.cli.program import blaming_the_call
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.io import image_writing
-from vkbloom.io.images import Colour, Picture
+from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.settings import Encoding
 
 
@@ -57,7 +57,7 @@ def command(
     target: str,
     attachments: str,
     input_colour: Colour | None,
-    output_colour: Colour | None,
+    output_colour: SavedColour | None,
     raw: bool,
     subimage: int,
     adapter: str,

@@ -15,16 +15,13 @@ from numpy.typing import NDArray
 from vkbloom.checks import import_extra
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io import safe_writing
-from vkbloom.io.images import check_name
+from vkbloom.io.images import PIXEL_TYPES, check_name
 
 if TYPE_CHECKING:
     import OpenImageIO
 
 
 __all__ = ["save"]
-
-# OpenImageIO's names of the pixel types, by the array's dtype.
-_PIXEL_TYPES = {"uint8": "uint8", "float16": "half", "float32": "float"}
 
 
 def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
@@ -103,7 +100,7 @@ def _write_image(
         if not (pixels[:, :, 3] == opaque).all():
             return False
         pixels = pixels[:, :, :3]
-    if not safe_writing.holds(oiio, temporary, pixels.shape[2], _PIXEL_TYPES[str(pixels.dtype)]):
+    if not safe_writing.holds(oiio, temporary, pixels.shape[2], PIXEL_TYPES[str(pixels.dtype)]):
         return False
     spec = _spec(oiio, frames, pixels)
     # Otherwise OpenImageIO takes the colours for premultiplied and divides them by alpha.
@@ -154,7 +151,7 @@ def _spec(oiio: ModuleType, frames: Framebuffers, pixels: NDArray[Any]) -> OpenI
     """Describe an (H, W, C) array to OpenImageIO, with what the frames came from."""
     height, width, channels = pixels.shape
     spec: OpenImageIO.ImageSpec = oiio.ImageSpec(
-        width, height, channels, _PIXEL_TYPES[str(pixels.dtype)]
+        width, height, channels, PIXEL_TYPES[str(pixels.dtype)]
     )
     settings = json.dumps(frames.settings.as_dict())
     adapter = frames.info.get("adapter", "an unnamed adapter")
