@@ -28,12 +28,27 @@ BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
 
 
-def number_field(name: str, default: float | None = None, unit: str = "1") -> Any:
-    """Declare a field that is a number in the core's table, which gives its default and range."""
+def number_field(
+    name: str,
+    default: float | None = None,
+    unit: str = "1",
+    range: tuple[float, float] | None = None,
+) -> Any:
+    """Declare a field that is a number in the core's table, which gives its default and range.
+
+    A method whose source has a narrower range gives that one.
+    """
     initial, _, _ = _core.VALUES[name]
     return dataclasses.field(
-        default=initial if default is None else default, metadata={"unit": unit}
+        default=initial if default is None else default, metadata={"unit": unit, "range": range}
     )
+
+
+def field_range(field: dataclasses.Field[Any]) -> tuple[float, float]:
+    """Return the least and the largest value of a field that is a number."""
+    narrowed: tuple[float, float] | None = field.metadata.get("range")
+    _, low, high = _core.VALUES[field.name]
+    return narrowed or (low, high)
 
 
 def flag_field(name: str) -> Any:
@@ -132,8 +147,7 @@ class Settings:
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
         """Check a number and store it as what it is: NumPy's scalars hash and print otherwise."""
-        _, low, high = _core.VALUES[field.name]
-        number = check_number(field.name, value, low, high)
+        number = check_number(field.name, value, *field_range(field))
         if isinstance(field.default, int):
             whole = int(number)
             if whole != value:
@@ -213,7 +227,7 @@ class Separable(Settings):
         (scale, strength), 1 to 8 of them, each number 0 to 16: each is a whole blur at
         blur_scale * scale, added with its strength.
     first_tap : {1, 0}
-        0: the loop starts at the centre, which so gets w0 (1 + 2 strength).
+        0 or 1. 0: the loop starts at the centre, which so gets w0 (1 + 2 strength).
     texel : {"own", "x"}
         "x": the vertical step is 1 / width of the texture's height, as the horizontal one.
     direct : bool
