@@ -73,7 +73,8 @@ def pixels(path: Path) -> NDArray[Any]:
 
 def applied(image: NDArray[Any], settings: vkbloom.Settings | None = None) -> NDArray[Any]:
     with vkbloom.Renderer() as renderer:
-        return renderer.apply(image, settings, attachments="final")["final"]
+        chosen = settings or vkbloom.presets["bevy_natural"]
+        return renderer.apply(image, chosen, attachments="final")["final"]
 
 
 def linear(levels: NDArray[Any]) -> NDArray[np.float32]:
