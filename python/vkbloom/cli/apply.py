@@ -138,33 +138,33 @@ def command(
             checked = f"image.{pipe_format}" if out == PIPE else name
             image_writing.check_writable(checked)
             image_writing.check_quality(checked, quality)
-    # None: shown where standard error is a terminal.
-    disable = True if len(work) == 1 or sys.stderr is None else None
-    with (
-        vkbloom.Renderer(adapter, validation=validation) as renderer,
-        tempfile.TemporaryDirectory() as folder,
-    ):
-        _say(f"Rendering on {renderer.info.summary}", out)
-        for source, target in tqdm(work, unit="image", leave=False, disable=disable):
-            piped = Path(folder, f"output.{pipe_format}")
-            picture = read_picture(
-                _piped_in(folder) if source == PIPE else source,
-                subimage,
-                input_colour,
-                layer=layer,
-                raw=raw,
-            )
-            frames = _applied(renderer, picture, settings, attachments)
-            if len(work) > 1:
-                Path(target).parent.mkdir(exist_ok=True)
-            written = _written(
-                picture, frames, piped if out == PIPE else Path(target), output_colour, quality
-            )
-            if out == PIPE:
-                sys.stdout.buffer.write(piped.read_bytes())
-            elif len(work) == 1:
-                for path in written:
-                    click.echo(f"wrote {path}")
+    with tempfile.TemporaryDirectory() as folder:
+
+        def taken(source: str) -> Picture:
+            file = _piped_in(folder) if source == PIPE else source
+            return read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+
+        # Before the device is opened: the most likely failure comes at once.
+        picture = taken(work[0][0])
+        piped = Path(folder, f"output.{pipe_format}")
+        # None: shown where standard error is a terminal.
+        disable = True if len(work) == 1 or sys.stderr is None else None
+        with vkbloom.Renderer(adapter, validation=validation) as renderer:
+            _say(f"Rendering on {renderer.info.summary}", out)
+            for index, (source, target) in enumerate(
+                tqdm(work, unit="image", leave=False, disable=disable)
+            ):
+                picture = taken(source) if index else picture
+                frames = _applied(renderer, picture, settings, attachments)
+                if len(work) > 1:
+                    Path(target).parent.mkdir(exist_ok=True)
+                file = piped if out == PIPE else Path(target)
+                written = _written(picture, frames, file, output_colour, quality)
+                if out == PIPE:
+                    sys.stdout.buffer.write(piped.read_bytes())
+                elif len(work) == 1:
+                    for path in written:
+                        click.echo(f"wrote {path}")
     if len(work) > 1:
         click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
 
@@ -202,7 +202,7 @@ def _applied(
         frames = renderer.apply(
             picture.pixels, settings, attachments=[*wanted, *looked_at] or "all"
         )
-    if settings.bloom and not frames["bloom"].any():
+    if settings.bloom and not frames["bloom"][:, :, :3].any():
         note(_about_no_bloom(picture.pixels, settings))
     if not looked_at:
         return frames
@@ -243,7 +243,7 @@ def _written(
         colour,
         {
             "Software": f"vkbloom {vkbloom.__version__}",
-            "vkbloom:settings": json.dumps(frames.settings.as_dict()),
+            "vkbloom:settings": json.dumps(frames.settings.to_dict()),
         },
         quality,
     )

@@ -11,7 +11,7 @@ from typing import Any, Final
 import click
 import numpy as np
 
-from vkbloom.cli.program import blaming_the_call, given
+from vkbloom.cli.program import given
 from vkbloom.io import image_reading
 from vkbloom.io.colour import check_space
 from vkbloom.io.images import Colour, Picture, StoredImage
@@ -94,8 +94,10 @@ def read_picture(
         The file cannot be read, or not be given bloom.
     """
     if colour not in (None, *COLOURS):
-        with blaming_the_call():
+        try:
             check_space(colour)
+        except ValueError as error:
+            raise click.UsageError(f"--input-colour: {error}") from error
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
         raise click.UsageError(

@@ -146,7 +146,7 @@ class Viewer:
     def _setup(self, message: Mapping[str, Any]) -> Answer:
         return {
             **controls(),
-            "sides": {side: settings.as_dict() for side, settings in self.settings.items()},
+            "sides": {side: settings.to_dict() for side, settings in self.settings.items()},
             "animated": self._scene is not None,
             "own_size": self._own_size,
             "adapter": self.renderer.info.summary,
