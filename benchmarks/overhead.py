@@ -30,7 +30,7 @@ Case = Callable[[vkbloom.Renderer, int], vkbloom.Frames]
 
 
 class _Stopwatch:
-    """The core of a renderer, or a batch of it, with the seconds that were spent in its calls."""
+    """The core of a renderer, or a submission, with the seconds that were spent in its calls."""
 
     def __init__(self, core: Any, watch: _Stopwatch | None = None) -> None:
         self._core = core
@@ -46,17 +46,17 @@ class _Stopwatch:
         self._watch.seconds += time.perf_counter() - start
         return result
 
-    def apply(self, *arguments: Any) -> Any:
-        return _Stopwatch(self._call(self._core.apply, *arguments), self)
+    def plan(self, *arguments: Any) -> Any:
+        return self._call(self._core.plan, *arguments)
 
-    def add(self, *arguments: Any) -> Any:
-        return self._call(self._core.add, *arguments)
+    def pages(self, size: int) -> Any:
+        return self._call(self._core.pages, size)
 
-    def submit(self) -> Any:
-        return self._call(self._core.submit)
+    def run(self, *arguments: Any) -> Any:
+        return _Stopwatch(self._call(self._core.run, *arguments), self)
 
-    def collect(self) -> Any:
-        return self._call(self._core.collect)
+    def wait(self) -> Any:
+        return self._call(self._core.wait)
 
 
 def run(plan: Plan) -> Section:

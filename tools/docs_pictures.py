@@ -3,14 +3,16 @@
 python tools/docs_pictures.py docs/pictures
 
 - flow_forward.png, flow_deferred.png: every framebuffer, and which are made from which, as the
-  core's own description of its passes says
+  renderer's plan says
 - gallery.jpg: the saucer with each preset
+- the flowchart of docs/plans.md, from a plan
 - profiles.png: how the light of a point falls off with each preset
 """
 
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -21,7 +23,6 @@ import numpy as np
 import OpenImageIO as oiio
 
 import vkbloom
-from vkbloom import _core
 from vkbloom.views import pictures
 
 mpl.use("agg")
@@ -32,12 +33,12 @@ SIZE = (640, 360)
 INK = "#8a929a"
 
 
-def edges(settings: vkbloom.Settings, shading: str) -> dict[str, set[str]]:
+def edges(plan: vkbloom.Plan) -> dict[str, set[str]]:
     """Return which framebuffers each is made from, in the order that the data flows."""
     made_from: dict[str, set[str]] = defaultdict(set)
-    for row in _core.describe(settings, SIZE, True, shading)["passes"]:
-        for target in row["targets"]:
-            made_from[target] |= set(row["reads"]) - {target}
+    for one in plan.passes:
+        for target in one.writes:
+            made_from[target] |= set(one.reads) - {target}
     return dict(made_from)
 
 
@@ -89,6 +90,7 @@ def draw_flow(
     """Draw framebuffers, with arrows to what is made from them."""
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=3.0)
     frames = renderer.render(scene, settings, SIZE, shading=shading)
+    plan = renderer.plan(scene, settings, SIZE, shading=shading)
     places = {name: (_ACROSS * layout[name][0], -_DOWN * layout[name][1]) for name in frames}
     across = max(x for x, _ in places.values()) + _WIDTH + 0.2
     down = max(-y for _, y in places.values()) + _HEIGHT + _CAPTION + 0.2
@@ -106,7 +108,7 @@ def draw_flow(
         )
         text = f"{name}\n{array.shape[1]} x {array.shape[0]}, {array.dtype}"
         axes.text(x, y - _HEIGHT / 2 - 0.05, text, ha="center", va="top", color=INK, fontsize=7)
-    for name, reads in edges(settings, shading).items():
+    for name, reads in edges(plan).items():
         # Images that are no framebuffers, such as the deferred glow, are passed over.
         for read in reads & set(frames) if name in frames else ():
             ends = edge(places[name], places[read]), edge(places[read], places[name])
@@ -172,8 +174,19 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
     plt.close(figure)
 
 
+def write_flowchart(page: Path) -> None:
+    """Put the forward system's flowchart in the place of the one in a page."""
+    os.environ["VKBLOOM_FORM"] = "fragment"
+    with vkbloom.Renderer("software") as renderer:
+        plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Separable(), SIZE)
+    del os.environ["VKBLOOM_FORM"]
+    before, _, rest = page.read_text().partition("```mermaid\n")
+    page.write_text(f"{before}```mermaid\n{plan.to_mermaid()}\n```{rest.partition('```')[2]}")
+
+
 def main(folder: Path) -> None:
     """Write all pictures."""
+    write_flowchart(folder.parent / "plans.md")
     with vkbloom.Renderer("software") as renderer:
         draw_flow(renderer, "forward", vkbloom.Separable(), FORWARD, folder / "flow_forward.png")
         draw_flow(

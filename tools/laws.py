@@ -182,6 +182,9 @@ def ours(renderer: vkbloom.Renderer) -> Iterator[Subject]:
         vkbloom.HdrpBloom,
         vkbloom.UnrealBloom,
         vkbloom.KinoBloom,
+        vkbloom.GodotBloom,
+        vkbloom.BlenderGlare,
+        vkbloom.PygfxBloom,
     ):
         yield Subject(f"{name} `{method.__name__}`", bloom(method()), ENGINE)
     yield Subject(

@@ -65,7 +65,7 @@ def row(renderer: vkbloom.Renderer, name: str, settings: vkbloom.Settings, round
     cells = [
         f"`{name}`",
         f"{gain:.3g}",
-        f"{settings.intensity * gain:.3g}" if settings.composite == "add" else "mixed",
+        f"{settings.intensity * gain:.3g}" if settings.composite == "add" else settings.composite,
         f"{share:.3g}",
         *(f"{radius:.0f}" for radius in radii),
         str(len(flat.timings)),

@@ -170,8 +170,8 @@ def measure(count: int) -> dict[str, dict[str, float]]:
     return {
         "renderer": renderer_growth(count),
         "validated": renderer_growth(count // 5, validation=True),
-        "frame": growth(frame, count // 10),
-        "open": frame_growth(scene, 4 * count),
+        "frame": growth(frame, count // 4),
+        "open": frame_growth(scene, 20 * count),
     }
 
 

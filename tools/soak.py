@@ -94,7 +94,7 @@ def main(total: int) -> int:
                 renderer.render(scene, None, (16, 16))
             renderer.apply(np.zeros((8, 8, 3), np.float32))
             # As many idle pages, too: one array that is all of what may lie idle.
-            renderer._core.new_array(np.empty, (256 << 20,), "uint8")
+            renderer._core.pages(256 << 20)
             rows.append(counts())
             shown = ", ".join(f"{value} {name}" for name, value in rows[-1].items())
             print(f"{(step + 1) * (total // STEPS):>8} frames: {shown}", flush=True)

@@ -107,6 +107,25 @@ bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
     return pass->depth == image;
 }
 
+uint32_t vkb_pass_targets(const struct vkb_pass_row *pass, uint32_t *targets)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        targets[count++] = pass->targets[i];
+    if (pass->depth != VKB_NO_IMAGE)
+        targets[count++] = pass->depth;
+    return count;
+}
+
+const char *vkb_graph_timed_as(const struct vkb_graph *graph, uint32_t first)
+{
+    const struct vkb_pass_row *pass = &graph->passes[first];
+
+    return pass->geometry == VKB_GEOMETRY_DISPATCH ? pass->name
+                                                   : graph->images[pass->targets[0]].name;
+}
+
 bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)

@@ -53,6 +53,7 @@ enum vkb_blend { VKB_BLEND_NONE, VKB_BLEND_ADD };
 // render pass; the first one's load op counts.
 struct vkb_pass_row {
     char name[VKB_NAME_SIZE];
+    const char *variant;  // what runs in place of the method's own pass; NULL: that itself
     enum vkb_geometry geometry;
     bool textured;  // draws the mesh's triangles that have textures, not those that have none
     enum vkb_shader vertex, shader;  // a dispatch has no vertex shader
@@ -104,6 +105,14 @@ uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes);
 
 bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
+
+// The images that a pass writes, the depth last, into an array of VKB_MAX_TARGETS + 1; returns how
+// many.
+uint32_t vkb_pass_targets(const struct vkb_pass_row *pass, uint32_t *targets);
+
+// The name that the group of passes from `first` on is timed under: a render pass's is that of the
+// first image that it writes, a dispatch's its own.
+const char *vkb_graph_timed_as(const struct vkb_graph *graph, uint32_t first);
 
 // Whether a pass blends what it draws with what the image holds.
 bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image);

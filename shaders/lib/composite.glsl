@@ -21,11 +21,16 @@ vec3 composite(vec3 s, vec3 b)
 
 // NaN and infinity of the scene stay at their own pixels, whatever the curve makes of them, and
 // curves that mix the channels must not spread one channel's NaN to the others.
-vec4 finish(vec4 scene, vec3 bloom, ivec2 pixel)
+vec4 encoded(vec4 scene, vec3 toned, ivec2 pixel)
 {
-    vec3 result = composite(finite_or_zero(scene.rgb), bloom);
-    result = apply_encoding(apply_tonemap(result * exp2(params.exposure), TONEMAP), ENCODING);
+    vec3 result = apply_encoding(toned, ENCODING);
     if (DITHER != 0)
         result = dithered(result, pixel, params.noise_seed);
     return vec4(mix(scene.rgb, storable(result), is_finite(scene.rgb)), scene.a);
+}
+
+vec4 finish(vec4 scene, vec3 bloom, ivec2 pixel)
+{
+    vec3 result = composite(finite_or_zero(scene.rgb), bloom);
+    return encoded(scene, apply_tonemap(result * exp2(params.exposure), TONEMAP), pixel);
 }

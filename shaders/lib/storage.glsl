@@ -32,8 +32,26 @@ vec3 from_level(vec3 level, int format)
     return level * (257.0 / 65536.0) + level * (SHARE / 65536.0);
 }
 
+// The nearest floats with 5 bits of exponent and 6 of mantissa (of blue 5), ties to even: what images
+// of R11G11B10 hold. Negative values and NaN become 0, what is larger than the largest becomes that.
+vec3 nearest_ufloat(vec3 value)
+{
+    const uvec3 dropped = uvec3(17, 17, 18);
+    // The least normal one, 2^-14; below it the steps stay the same.
+    const float LEAST = 6.103515625e-5;
+    const vec3 steps = vec3(1048576.0, 1048576.0, 524288.0);
+    vec3 kept = mix(vec3(0.0), min(value, vec3(UFLOAT11_LIMIT, UFLOAT11_LIMIT, UFLOAT10_LIMIT)),
+                    greaterThan(value, vec3(0.0)));
+    uvec3 bits = floatBitsToUint(kept);
+    bits += (uvec3(1) << (dropped - 1u)) - 1u + ((bits >> dropped) & 1u);
+    vec3 normal = uintBitsToFloat((bits >> dropped) << dropped);
+    return mix(normal, roundEven(kept * steps) / steps, lessThan(kept, vec3(LEAST)));
+}
+
 vec3 storable(vec3 value)
 {
+    if (params.limit == UFLOAT11_LIMIT)
+        return nearest_ufloat(value);
     vec3 kept = clamp(value, -params.limit, params.limit);
     if (params.limit == UNORM_LIMIT)
         return from_level(nearest_level(kept), STORED_UNORM8);
@@ -48,5 +66,7 @@ vec3 as_stored(vec3 value, int format)
         return from_level(nearest_level(value), format);
     if (format == STORED_HALF)
         return nearest_half(clamp(value, -HALF_LIMIT, HALF_LIMIT));
+    if (format == STORED_UFLOAT)
+        return nearest_ufloat(value);
     return clamp(value, -SINGLE_LIMIT, SINGLE_LIMIT);
 }

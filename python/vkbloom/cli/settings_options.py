@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, Final
@@ -80,7 +81,9 @@ def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settin
     """
     foreign = [name for name in changes if not hasattr(begun, name)]
     if foreign:
-        names = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
+        declared = {one.name: one for kind in METHODS.values() for one in dataclasses.fields(kind)}
+        options = (declared[name].metadata.get("option", name) for name in foreign)
+        names = ", ".join(f"--{option.replace('_', '-')}" for option in options)
         having = " or ".join(
             method
             for method, kind in METHODS.items()
