@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from vkbloom.grid.curves import response_curves
     from vkbloom.grid.sheet import contact_sheet
     from vkbloom.grid.zarr_grid import grid_to_zarr
+    from vkbloom.io.array_files import read, write
     from vkbloom.scene import Camera, Scene
 
 #: Of the installed package; looked up when it is asked for.
@@ -53,7 +54,9 @@ _LATE = {
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
+    "read": "vkbloom.io.array_files",
     "response_curves": "vkbloom.grid.curves",
+    "write": "vkbloom.io.array_files",
 }
 
 __all__ = [
@@ -92,9 +95,11 @@ __all__ = [
     "gaussian_weights",
     "grid_to_zarr",
     "presets",
+    "read",
     "reductions",
     "reference",
     "response_curves",
+    "write",
 ]
 
 

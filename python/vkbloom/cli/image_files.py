@@ -13,9 +13,10 @@ import numpy as np
 
 from vkbloom.cli.program import given
 from vkbloom.io import image_reading
+from vkbloom.io.colour import check_space
 from vkbloom.io.images import Colour, Picture, StoredImage
 
-#: What the colours in a file can be said to be.
+#: What the colours of a written file can be.
 COLOURS: Final = ("linear", "srgb")
 
 _STANDARD_ERROR = 2
@@ -33,10 +34,30 @@ def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
     )(command)
 
 
-def read(path: str, subimage: int) -> StoredImage:
+def layer_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--layer``, the argument of `vkbloom.read`."""
+    return click.option(
+        "--layer",
+        metavar="NAME",
+        help="Which layer to read of an OpenEXR file that has several, such as ViewLayer.Combined.",
+    )(command)
+
+
+def input_colour_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--input-colour``, the argument `colour` of `vkbloom.io.image_reading.decode`."""
+    return click.option(
+        "--input-colour",
+        metavar="linear|srgb|SPACE",
+        help="What the colours in the file are; SPACE is one of OpenColorIO's built-in "
+        "configuration, such as ACEScg or 'Linear Rec.2020' [default linear for floats; for "
+        "integers what the file says, else srgb]",
+    )(command)
+
+
+def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
     """Read an image file; the only message of a failure is that of the exception."""
     with _silenced():
-        return image_reading.load(path, subimage)
+        return image_reading.load(path, subimage, layer)
 
 
 def check_part_is_given(path: str, stored: StoredImage) -> None:
@@ -56,18 +77,28 @@ def note(text: str) -> None:
 
 
 def read_picture(
-    source: str, subimage: int, colour: Colour | None, *, raw: bool = False
+    source: str,
+    subimage: int,
+    colour: Colour | None,
+    *,
+    layer: str | None = None,
+    raw: bool = False,
 ) -> Picture:
     """Read an image file as what a renderer takes, and tell what the user may want to know.
 
     Raises
     ------
     click.UsageError
-        `raw` is for 8-bit files, and this is none.
+        `raw` is for 8-bit files, and this is none; there is no such `colour`.
     OSError, ValueError
         The file cannot be read, or not be given bloom.
     """
-    stored = read(source, subimage)
+    if colour not in (None, *COLOURS):
+        try:
+            check_space(colour)
+        except ValueError as error:
+            raise click.UsageError(f"--input-colour: {error}") from error
+    stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
         raise click.UsageError(
             f"--raw is for files of 8-bit integers; {source} holds {stored.numbers[0]}"
@@ -76,7 +107,7 @@ def read_picture(
         picture = image_reading.decode(stored, colour, raw=raw)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
-    if len(stored.parts) > 1 and not given("subimage"):
+    if len(stored.parts) > 1 and layer is None and not given("subimage"):
         note(f"{source}: the first of its {_listed(stored)}; --subimage reads another")
     nan = int(np.isnan(picture.values).sum())
     infinite = int(np.isinf(picture.values).sum())

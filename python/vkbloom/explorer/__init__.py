@@ -48,7 +48,8 @@ def explore(
         What blooms. An image is as `Renderer.apply` takes it; where it is larger than it is shown,
         its pixels are averaged first, unless its own size is chosen on the page.
     settings : Settings, optional
-        To begin with; by default ``Separable()``.
+        To begin with; by default ``presets["bevy_natural"]`` for an image and
+        ``presets["tutorial"]`` for a scene.
     against : Settings, optional
         What B begins with; by default `settings` without bloom.
     size : (int, int)

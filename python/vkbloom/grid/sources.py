@@ -250,7 +250,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     ):
         if is_given:
             raise ValueError(f"{name}: only scenes have one, an image is given")
-    if isinstance(source, np.ndarray):
+    if hasattr(source, "__array__") or hasattr(source, "__dlpack__"):
         return ImageSource([check_image(source)])
     labels: list[Any]
     if isinstance(source, Mapping):
