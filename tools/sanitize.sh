@@ -12,7 +12,7 @@ if [ $# = 0 ]; then
     for name in faults frames mutations; do
         set -- "$@" "--ignore=tests/core/test_$name.py"
     done
-    for name in forms hdr_images reference; do
+    for name in variants hdr_images reference; do
         set -- "$@" "--ignore=tests/methods/test_$name.py"
     done
     for name in assets gltf gltf_textures scene skybox; do

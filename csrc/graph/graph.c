@@ -48,7 +48,7 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     PACK(reads);
     PACK(read_count);
     PACK(loads);
-    PACK(alternative);
+    PACK(fused);
     PACK(block_width);
     PACK(block_height);
     PACK(targets);
@@ -76,7 +76,7 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
 
 static bool share_targets(const struct vkb_pass_row *a, const struct vkb_pass_row *b)
 {
-    return !a->alternative && !b->alternative && a->geometry != VKB_GEOMETRY_DISPATCH
+    return !a->fused && !b->fused && a->geometry != VKB_GEOMETRY_DISPATCH
         && b->geometry != VKB_GEOMETRY_DISPATCH && a->target_count == b->target_count
         && a->depth == b->depth
         && memcmp(a->targets, b->targets, a->target_count * sizeof a->targets[0]) == 0;
@@ -247,8 +247,7 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
                         pass->name);
     // Earlier writers must share the render pass of this pass.
     for (uint32_t i = pass_index; i-- > 0;) {
-        if (vkb_graph_group_end(graph, i) > pass_index
-            || (pass->alternative && i == pass_index - 1))
+        if (vkb_graph_group_end(graph, i) > pass_index || (pass->fused && i == pass_index - 1))
             continue;
         if (vkb_pass_writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
             return vkb_fail(error, VKB_ERROR_GENERAL,
@@ -270,7 +269,7 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
                 || pass->block_width == 0 || pass->block_height == 0)))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
                         pass->name);
-    if (pass->alternative
+    if (pass->fused
         && (index == 0 || pass->target_count != 1
             || graph->passes[index - 1].targets[0] != pass->targets[0]))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s replaces no pass", pass->name);

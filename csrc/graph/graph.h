@@ -60,8 +60,8 @@ struct vkb_pass_row {
     struct vkb_constants constants;
     uint32_t reads[VKB_MAX_READS];
     uint32_t read_count;
-    bool loads;        // a dispatch that reads storage images instead of sampled ones
-    bool alternative;  // a fused pass: may replace the pass before it, with the same target
+    bool loads;  // a dispatch that reads storage images instead of sampled ones
+    bool fused;  // a fused pass: may replace the pass before it, with the same target
     uint32_t block_width, block_height;  // of a dispatch: pixels of a workgroup
     uint32_t targets[VKB_MAX_TARGETS];
     uint32_t target_count;

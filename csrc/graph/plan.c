@@ -208,10 +208,10 @@ static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step 
         return false;
     bool *plain = skipped + graph->pass_count;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        skipped[i] = graph->passes[i].alternative;
+        skipped[i] = graph->passes[i].fused;
     mark(step->plan, skipped, needed, wanted);
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        if (!graph->passes[i].alternative)
+        if (!graph->passes[i].fused)
             continue;
         memcpy(plain, needed, graph->pass_count * sizeof *plain);
         skipped[i] = false;

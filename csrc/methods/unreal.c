@@ -1,5 +1,5 @@
 // three.js' UnrealBloomPass. Source: mrdoob/three.js, examples/jsm/postprocessing/
-// UnrealBloomPass.js, the form with the kernels of #31528 and the factor of #32517.
+// UnrealBloomPass.js, the variant with the kernels of #31528 and the factor of #32517.
 #include "methods/methods.h"
 #include "passes/levels.h"
 

@@ -9,7 +9,7 @@
 
 #include "methods/source.h"
 #include "run/frame.h"
-#include "variants/forms.h"
+#include "variants/variants.h"
 #include "vulkan/process.h"
 
 #include <stdatomic.h>
@@ -34,8 +34,8 @@ extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submis
 // What a submission needs until the device is done with it. Once it is abandoned, because nobody
 // waits for it any more, the renderer has it.
 struct vkb_pending {
-    struct vkb_flight *flight;  // NULL: not submitted
-    PyObject *plans;            // a tuple: their graphs are read until then
+    struct vkb_submission *submission;  // NULL: not submitted
+    PyObject *plans;                    // a tuple: their graphs are read until then
     struct vkb_request *requests;
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
@@ -59,7 +59,7 @@ struct vkb_renderer {
     struct vkb_pages *pages;            // of large arrays; NULL: closed
     size_t pipeline_count;              // made so far; read and written with the GIL
     struct vkb_cached cached;           // read and written with the GIL
-    enum vkb_forms forms;
+    enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
 };

@@ -117,17 +117,18 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
     return tuple;
 }
 
-static bool build_graph(const struct vkb_device *device, enum vkb_forms forms,
+static bool build_graph(const struct vkb_device *device, enum vkb_variants variants,
                         const struct vkb_source *source, const struct vkb_settings *settings,
                         struct vkb_graph *graph, struct vkb_error *error)
 {
     return vkb_source_build(source, settings, device->max_side, graph, error)
-        && vkb_forms_choose(forms, device, graph, error)
-        && vkb_graph_check(graph, device->max_side, error) && vkb_slots_check(device, graph, error);
+        && vkb_variants_choose(variants, device, graph, error)
+        && vkb_graph_check(graph, device->max_side, error)
+        && vkb_image_cache_check(device, graph, error);
 }
 
 static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
-                          enum vkb_forms forms, uint64_t renderer, PyObject *source,
+                          enum vkb_variants variants, uint64_t renderer, PyObject *source,
                           const struct vkb_settings *settings, PyObject *names)
 {
     PyTypeObject *type = (PyTypeObject *)state->plan_type;
@@ -139,7 +140,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         return NULL;
     self->source = ((struct vkb_source_object *)source)->source;
     self->renderer = renderer;
-    if (!build_graph(device, forms, &self->source, settings, &self->plan.graph, &error)) {
+    if (!build_graph(device, variants, &self->source, settings, &self->plan.graph, &error)) {
         Py_DECREF(self);
         return vkb_raise(state, &error);
     }
@@ -164,8 +165,8 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
         return NULL;
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
-    return new_plan(state, &renderer->device, renderer->forms, renderer->serial, source, &settings,
-                    names);
+    return new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
+                    &settings, names);
 }
 
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
@@ -175,19 +176,20 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     struct vkb_settings settings;
     struct vkb_device device = any_device;
     struct vkb_error error = {0};
-    enum vkb_forms forms;
-    const char *variants;
+    enum vkb_variants variants;
+    const char *name;
 
     if (!PyArg_ParseTuple(arguments, "O!OOs:plan", state->source_type, &source, &settings_object,
-                          &names, &variants)
+                          &names, &name)
         || !vkb_read_settings(state, settings_object, &settings))
         return NULL;
-    if (!vkb_forms_by_name(variants, &device, &forms, &error))
+    if (!vkb_variants_by_name(name, &device, &variants, &error))
         return vkb_raise(state, &error);
     // What the variant is for.
-    device.adapter.device_type =
-        forms == VKB_FORMS_CPU ? VK_PHYSICAL_DEVICE_TYPE_CPU : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-    return new_plan(state, &device, forms, 0, source, &settings, names);
+    device.adapter.device_type = variants == VKB_VARIANTS_CPU
+                                   ? VK_PHYSICAL_DEVICE_TYPE_CPU
+                                   : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    return new_plan(state, &device, variants, 0, source, &settings, names);
 }
 
 static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)

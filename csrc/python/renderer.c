@@ -56,7 +56,7 @@ static struct vkb_pending *take_over(struct vkb_renderer *self)
         struct vkb_pending *pending = *link;
         // Without a device all is over; one that was left behind at work keeps what it has.
         if (self->device.handle
-            && !(self->open && vkb_frame_drop(&self->device, &self->frame, pending->flight))) {
+            && !(self->open && vkb_frame_drop(&self->device, &self->frame, pending->submission))) {
             link = &pending->next;
             continue;
         }
@@ -127,10 +127,10 @@ bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vk
     return vkb_messages_check(&self->device.messages, error) && done;
 }
 
-// create(adapter, driver, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes
-// of an earlier run's pipeline cache, or None.
+// create(adapter, driver, validation, variants, read_cache): read_cache(driver_uuid) gives the
+// bytes of an earlier run's pipeline cache, or None.
 static bool create(struct vkb_renderer *self, const char *adapter, const char *driver,
-                   bool validation, const char *forms, PyObject *read_cache,
+                   bool validation, const char *variants, PyObject *read_cache,
                    struct vkb_error *error)
 {
     bool done;
@@ -142,7 +142,7 @@ static bool create(struct vkb_renderer *self, const char *adapter, const char *d
     Py_END_ALLOW_THREADS
     if (!done)
         return false;
-    if (!vkb_forms_by_name(forms, &self->device, &self->forms, error)) {
+    if (!vkb_variants_by_name(variants, &self->device, &self->variants, error)) {
         vkb_device_destroy(&self->device);
         return false;
     }
@@ -170,7 +170,7 @@ static bool create(struct vkb_renderer *self, const char *adapter, const char *d
 
 static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject *keywords)
 {
-    const char *adapter, *driver, *forms;
+    const char *adapter, *driver, *variants;
     int validation;
     double frame_seconds;
     PyObject *read_cache;
@@ -180,7 +180,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(arguments, "sspsdO:Renderer", &adapter, &driver, &validation, &forms,
+    if (!PyArg_ParseTuple(arguments, "sspsdO:Renderer", &adapter, &driver, &validation, &variants,
                           &frame_seconds, &read_cache))
         return NULL;
     if (!(frame_seconds > 0.0)) {
@@ -198,7 +198,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     if (!self->lock)
         PyErr_NoMemory();
     else if ((self->pages = vkb_pages_create(&self->device, &error)))
-        self->open = create(self, adapter, driver, validation, forms, read_cache, &error);
+        self->open = create(self, adapter, driver, validation, variants, read_cache, &error);
     if (self->open) {
         self->device.interrupted = interrupted;
         self->device.asked = self;

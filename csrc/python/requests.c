@@ -187,7 +187,7 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
         return false;
     bool done = vkb_require_open(renderer, error)
              && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
-                                 pending->count, &pending->flight, error);
+                                 pending->count, &pending->submission, error);
     if (done && data.input)
         pending->specials = renderer->frame.upload.specials;
     done = vkb_renderer_check_messages(renderer, done, error);
@@ -272,9 +272,9 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
         vkb_renderer_leave(renderer);
         return refuse_to_wait();
     }
-    // A closed renderer has no flights.
+    // A closed renderer has no submissions.
     bool done = renderer->open ? vkb_frame_collect(&renderer->device, &renderer->frame,
-                                                   pending->flight, &over, &error)
+                                                   pending->submission, &over, &error)
                                : vkb_require_open(renderer, &error);
     done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
@@ -307,7 +307,7 @@ static int clear(PyObject *object)
 
     self->pending = NULL;
     // A forked process has no device that could write.
-    if (pending && pending->flight && vkb_renderer_is_ours(self->renderer))
+    if (pending && pending->submission && vkb_renderer_is_ours(self->renderer))
         vkb_renderer_abandon(self->renderer, pending);
     else if (pending)
         vkb_pending_release(pending);

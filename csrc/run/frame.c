@@ -13,8 +13,8 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
-    vkb_flights_destroy(device, &frame->flights);
-    vkb_slots_destroy(device, &frame->slots);
+    vkb_submissions_destroy(device, &frame->submissions);
+    vkb_image_cache_destroy(device, &frame->cache);
     vkb_upload_destroy(device, &frame->upload);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
@@ -25,13 +25,14 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    struct vkb_flight *flight = run->flight;
+    struct vkb_submission *submission = run->submission;
 
-    if (sets <= flight->descriptor_capacity)
-        return VK(error, vk->vkResetDescriptorPool(run->device->handle, flight->descriptors, 0));
-    vk->vkDestroyDescriptorPool(run->device->handle, flight->descriptors, NULL);
-    flight->descriptors = VK_NULL_HANDLE;
-    flight->descriptor_capacity = 0;
+    if (sets <= submission->descriptor_capacity)
+        return VK(error,
+                  vk->vkResetDescriptorPool(run->device->handle, submission->descriptors, 0));
+    vk->vkDestroyDescriptorPool(run->device->handle, submission->descriptors, NULL);
+    submission->descriptors = VK_NULL_HANDLE;
+    submission->descriptor_capacity = 0;
     if (!VK(error,
             vk->vkCreateDescriptorPool(
                 run->device->handle,
@@ -46,9 +47,9 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
                             {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_READS + 1)},
                         },
                 },
-                NULL, &flight->descriptors)))
+                NULL, &submission->descriptors)))
         return false;
-    flight->descriptor_capacity = sets;
+    submission->descriptor_capacity = sets;
     return true;
 }
 
@@ -60,7 +61,7 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
     const VkDeviceSize params = (sizeof(union vkb_params) + align - 1) / align * align;
     const struct vkb_scene *scene = &run->frame->scene;
     const uint32_t surfaces = scene->body.surface_count + scene->glow.surface_count;
-    struct vkb_flight *flight = run->flight;
+    struct vkb_submission *submission = run->submission;
     uint32_t passes = 0;
 
     for (uint32_t i = 0; i < request_count; ++i) {
@@ -68,37 +69,37 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
         passes += plan->graph.pass_count;
         for (uint32_t output = 0; output < plan->output_count; ++output) {
             const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
-            if (!vkb_readback_plan(run->device, &flight->readback, row->format, row->width,
+            if (!vkb_readback_plan(run->device, &submission->readback, row->format, row->width,
                                    row->height, &requests[i].outputs[output], error))
                 return false;
         }
     }
     return reserve_descriptors(run, passes + request_count * surfaces, error)
-        && vkb_timer_reserve(run->device, passes, &flight->timer, error)
+        && vkb_timer_reserve(run->device, passes, &submission->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
-                              params * passes, &flight->uniforms, error)
-        && vkb_readback_reserve(run->device, &flight->readback, error);
+                              params * passes, &submission->uniforms, error)
+        && vkb_readback_reserve(run->device, &submission->readback, error);
 }
 
-static void set_slot(struct vkb_run *run, uint32_t image, struct vkb_slot *slot)
+static void set_cached(struct vkb_run *run, uint32_t image, struct vkb_cached_image *cached)
 {
-    run->slots[image] = slot;
-    run->contents[image] = slot ? &slot->content : NULL;
+    run->images[image] = cached;
+    run->contents[image] = cached ? &cached->content : NULL;
 }
 
-// The slot of the graph's image. One that other commands may still use is replaced only when those
-// have run; the requests of this flight have the same images.
+// The cached of the graph's image. One that other commands may still use is replaced only when
+// those have run; the requests of this submission have the same images.
 static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
 {
     const struct vkb_image_row *row = &run->graph->images[image];
-    struct vkb_slots *slots = &run->frame->slots;
-    struct vkb_slot *slot;
+    struct vkb_image_cache *cache = &run->frame->cache;
+    struct vkb_cached_image *cached;
 
-    if ((vkb_slots_replaces(slots, row)
-         && !vkb_flights_land(run->device, &run->frame->flights, error))
-        || !vkb_slots_resolve(run->device, slots, row, &slot, error))
+    if ((vkb_image_cache_replaces(cache, row)
+         && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
+        || !vkb_image_cache_resolve(run->device, cache, row, &cached, error))
         return false;
-    set_slot(run, image, slot);
+    set_cached(run, image, cached);
     return true;
 }
 
@@ -106,15 +107,15 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
                        struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
-    struct vkb_flight *flight = run->flight;
+    struct vkb_submission *submission = run->submission;
     struct vkb_scene *scene = &run->frame->scene;
 
     if (scene->serial == data->serial)
         return true;
-    if (!vkb_flights_land(device, &run->frame->flights, error)
-        || !vkb_scene_begin(device, &flight->commands, data, scene, error)
-        || !vkb_flight_submit(device, flight, error)
-        || !vkb_flight_wait(device, &run->frame->flights, flight, error))
+    if (!vkb_submissions_wait(device, &run->frame->submissions, error)
+        || !vkb_scene_begin(device, &submission->commands, data, scene, error)
+        || !vkb_submission_submit(device, submission, error)
+        || !vkb_submission_wait(device, &run->frame->submissions, submission, error))
         return false;
     vkb_scene_end(device, data, scene);
     return true;
@@ -129,24 +130,24 @@ static bool stage_input(struct vkb_run *run, const struct vkb_input *input, stru
         if (run->graph->images[i].input) {
             if (!resolve(run, i, error))
                 return false;
-            run->input = run->slots[i];
+            run->input = run->images[i];
         }
     // An image that its last writing did not reach holds nothing to compare with.
     if (run->input->image.mapped && !run->input->content.valid)
         vkb_upload_forget(&run->frame->upload);
-    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->flights, input,
+    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->submissions, input,
                           &run->input->image, &changed, error))
         return false;
     run->send_input = changed || !run->input->content.valid;
     return !run->send_input
-        || vkb_content_begin_writing(&run->input->content, &run->frame->slots.clock, NULL, 0,
+        || vkb_content_begin_writing(&run->input->content, &run->frame->cache.clock, NULL, 0,
                                      error);
 }
 
 static void record_input(struct vkb_run *run)
 {
     if (!run->input->image.mapped)
-        vkb_upload_record(run->device, run->flight->commands.buffer, &run->frame->upload,
+        vkb_upload_record(run->device, run->submission->commands.buffer, &run->frame->upload,
                           &run->input->image);
     run->input->content.valid = true;
 }
@@ -160,7 +161,7 @@ static uint64_t source_version(const struct vkb_run *run)
 static bool record_request(struct vkb_run *run, struct vkb_request *request,
                            const struct vkb_request *next, struct vkb_error *error)
 {
-    struct vkb_flight *flight = run->flight;
+    struct vkb_submission *submission = run->submission;
     struct vkb_frame *frame = run->frame;
     const struct vkb_graph *graph = &request->plan->graph;
     const struct vkb_plan_step step = {
@@ -174,19 +175,19 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     run->request = request;
     run->graph = graph;
     request->timing_count = 0;
-    request->first_span = flight->timer.span_count;
+    request->first_span = submission->timer.span_count;
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        set_slot(run, i, vkb_slots_find(&frame->slots, &graph->images[i]));
+        set_cached(run, i, vkb_image_cache_find(&frame->cache, &graph->images[i]));
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i)
         if (frame->planner.wanted[i] && !resolve(run, i, error))
             return false;
-    if (!vkb_planner_run(&frame->planner, &step, &frame->slots.clock, vkb_record_group, run, error))
+    if (!vkb_planner_run(&frame->planner, &step, &frame->cache.clock, vkb_record_group, run, error))
         return false;
     for (uint32_t i = 0; i < request->plan->output_count; ++i)
-        vkb_readback_record(run->device, flight->commands.buffer, &flight->readback,
-                            &run->slots[request->plan->outputs[i]]->image, &request->outputs[i]);
+        vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
+                            &run->images[request->plan->outputs[i]]->image, &request->outputs[i]);
     return true;
 }
 
@@ -194,12 +195,12 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
                               uint32_t request_count, struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
-    struct vkb_flight *flight = run->flight;
-    VkCommandBuffer commands = flight->commands.buffer;
+    struct vkb_submission *submission = run->submission;
+    VkCommandBuffer commands = submission->commands.buffer;
 
-    if (!vkb_commands_begin(device, &flight->commands, error))
+    if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
-    vkb_timer_reset(device, commands, &flight->timer);
+    vkb_timer_reset(device, commands, &submission->timer);
     if (run->send_input)
         record_input(run);
     for (uint32_t i = 0; i < request_count; ++i)
@@ -207,8 +208,8 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
                             error))
             return false;
     vkb_barrier_record_host_read(device, commands);
-    return vkb_buffer_flush(device, &flight->uniforms, error)
-        && vkb_flight_submit(device, flight, error);
+    return vkb_buffer_flush(device, &submission->uniforms, error)
+        && vkb_submission_submit(device, submission, error);
 }
 
 static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
@@ -222,53 +223,54 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
 }
 
 // After a failure nothing is known of what the device did: images and commands are made anew. The
-// images later, when nothing is in the air: a wait here could not be interrupted.
+// images later, when nothing is pending: a wait here could not be interrupted.
 static void fail_frame(struct vkb_device *device, struct vkb_frame *frame,
-                       struct vkb_flight *flight, const struct vkb_error *error)
+                       struct vkb_submission *submission, const struct vkb_error *error)
 {
     frame->stale = true;
     device->lost = device->lost || error->kind == VKB_ERROR_DEVICE_LOST;
-    if (!flight->airborne)
-        vkb_commands_destroy(device, &flight->commands);
+    if (!submission->pending)
+        vkb_commands_destroy(device, &submission->commands);
 }
 
 static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
 {
     if (!frame->stale)
         return true;
-    if (!vkb_flights_land(device, &frame->flights, error))
+    if (!vkb_submissions_wait(device, &frame->submissions, error))
         return false;
-    vkb_slots_destroy(device, &frame->slots);
+    vkb_image_cache_destroy(device, &frame->cache);
     frame->stale = false;
     return true;
 }
 
 // Begins a submission: what no submission has used for long, and none may still use, goes.
 static void trim(const struct vkb_device *device, struct vkb_frame *frame,
-                 struct vkb_flight *flight)
+                 struct vkb_submission *submission)
 {
-    flight->number = ++frame->submissions;
+    submission->number = ++frame->submitted;
     const struct vkb_age age = {
-        .now = flight->number,
-        .pending = vkb_flights_pending(&frame->flights, flight->number),
+        .now = submission->number,
+        .pending = vkb_submissions_pending(&frame->submissions, submission->number),
     };
 
     vkb_pipelines_trim(device, &frame->pipelines, &age);
-    vkb_slots_trim(device, &frame->slots, &age);
+    vkb_image_cache_trim(device, &frame->cache, &age);
 }
 
 struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
 {
     return (struct vkb_cached){
         .pipelines = frame->pipelines.entry_count,
-        .framebuffers = frame->slots.framebuffer_count,
-        .image_bytes = vkb_slots_size(&frame->slots),
+        .framebuffers = frame->cache.framebuffer_count,
+        .image_bytes = vkb_image_cache_size(&frame->cache),
     };
 }
 
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
                       const struct vkb_frame_source *source, struct vkb_request *requests,
-                      uint32_t request_count, struct vkb_flight **flight, struct vkb_error *error)
+                      uint32_t request_count, struct vkb_submission **submission,
+                      struct vkb_error *error)
 {
     struct vkb_run run = {.device = device, .frame = frame};
     // All requests have the same images.
@@ -276,21 +278,21 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     bool done;
 
     if (!renew(device, frame, error)
-        || !vkb_flights_take(device, &frame->flights, &run.flight, error))
+        || !vkb_submissions_take(device, &frame->submissions, &run.submission, error))
         return false;
-    trim(device, frame, run.flight);
-    done = (run.slots = vkb_alloc(error, image_count, sizeof *run.slots))
+    trim(device, frame, run.submission);
+    done = (run.images = vkb_alloc(error, image_count, sizeof *run.images))
         && (run.contents = vkb_alloc(error, image_count, sizeof *run.contents))
         && submit(&run, source, requests, request_count, error);
-    vkb_free(run.slots);
+    vkb_free(run.images);
     vkb_free(run.contents);
     if (done) {
-        run.flight->requests = requests;
-        run.flight->request_count = request_count;
-        *flight = run.flight;
+        run.submission->requests = requests;
+        run.submission->request_count = request_count;
+        *submission = run.submission;
     } else {
-        fail_frame(device, frame, run.flight, error);
-        vkb_flights_give_back(device, &frame->flights, run.flight);
+        fail_frame(device, frame, run.submission, error);
+        vkb_submissions_give_back(device, &frame->submissions, run.submission);
     }
     return done;
 }
@@ -312,48 +314,49 @@ static void merge_timings(struct vkb_request *request)
     request->timing_count = count;
 }
 
-// What the device has left for the requests of a flight that is over.
-static void fetch(const struct vkb_device *device, const struct vkb_flight *flight)
+// What the device has left for the requests of a submission that is over.
+static void fetch(const struct vkb_device *device, const struct vkb_submission *submission)
 {
-    for (uint32_t i = 0; i < flight->request_count; ++i) {
-        struct vkb_request *request = &flight->requests[i];
+    for (uint32_t i = 0; i < submission->request_count; ++i) {
+        struct vkb_request *request = &submission->requests[i];
         for (uint32_t timing = 0; timing < request->timing_count; ++timing)
             request->timings[timing].seconds =
-                vkb_timer_seconds(device, &flight->timer, request->first_span + timing);
+                vkb_timer_seconds(device, &submission->timer, request->first_span + timing);
         merge_timings(request);
         for (uint32_t output = 0; output < request->plan->output_count; ++output)
-            vkb_readback_fetch(&flight->readback, &request->outputs[output]);
+            vkb_readback_fetch(&submission->readback, &request->outputs[output]);
     }
 }
 
 bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
-                       struct vkb_flight *flight, bool *over, struct vkb_error *error)
+                       struct vkb_submission *submission, bool *over, struct vkb_error *error)
 {
-    *over = vkb_flight_wait(device, &frame->flights, flight, error);
-    const bool done = *over && vkb_readback_end(device, &flight->readback, error)
-                   && vkb_timer_fetch(device, &flight->timer, error);
+    *over = vkb_submission_wait(device, &frame->submissions, submission, error);
+    const bool done = *over && vkb_readback_end(device, &submission->readback, error)
+                   && vkb_timer_fetch(device, &submission->timer, error);
 
     if (done)
-        fetch(device, flight);
+        fetch(device, submission);
     else if (error->kind != VKB_ERROR_INTERRUPTED)
-        fail_frame(device, frame, flight, error);
+        fail_frame(device, frame, submission, error);
     if (*over)
-        vkb_flights_give_back(device, &frame->flights, flight);
+        vkb_submissions_give_back(device, &frame->submissions, submission);
     return done;
 }
 
-bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame, struct vkb_flight *flight)
+bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
+                    struct vkb_submission *submission)
 {
     struct vkb_error error;
 
-    if (!vkb_flight_over(device, flight)
-        || !vkb_flight_wait(device, &frame->flights, flight, &error))
+    if (!vkb_submission_over(device, submission)
+        || !vkb_submission_wait(device, &frame->submissions, submission, &error))
         return false;
-    vkb_flights_give_back(device, &frame->flights, flight);
+    vkb_submissions_give_back(device, &frame->submissions, submission);
     return true;
 }
 
 bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
 {
-    return vkb_flights_end(device, &frame->flights, error);
+    return vkb_submissions_end(device, &frame->submissions, error);
 }

@@ -6,11 +6,11 @@
 static VkDeviceSize write_params(struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
-    const VkDeviceSize offset = run->flight->uniform_used;
+    const VkDeviceSize offset = run->submission->uniform_used;
     const size_t size = vkb_block_sizes[pass->block];
 
-    memcpy((char *)run->flight->uniforms.mapped + offset, &pass->params, size);
-    run->flight->uniform_used = (offset + size + align - 1) / align * align;
+    memcpy((char *)run->submission->uniforms.mapped + offset, &pass->params, size);
+    run->submission->uniform_used = (offset + size + align - 1) / align * align;
     return offset;
 }
 
@@ -28,7 +28,7 @@ static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct 
     } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
         image = &scene->sky;
     } else {
-        image = &run->slots[pass->reads[index]]->image;
+        image = &run->images[pass->reads[index]]->image;
     }
     return (VkDescriptorImageInfo){
         .sampler = texture
@@ -50,7 +50,7 @@ static void write_descriptors(const struct vkb_run *run, const struct vkb_pass_r
     VkWriteDescriptorSet writes[VKB_MAX_READS + 2];
     uint32_t write_count = 0;
     VkDescriptorBufferInfo params = {
-        .buffer = run->flight->uniforms.handle,
+        .buffer = run->submission->uniforms.handle,
         .offset = params_offset,
         .range = vkb_block_sizes[pass->block],
     };
@@ -76,7 +76,7 @@ static void write_descriptors(const struct vkb_run *run, const struct vkb_pass_r
         };
     }
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
-        const struct vkb_image *target = &run->slots[pass->targets[0]]->image;
+        const struct vkb_image *target = &run->images[pass->targets[0]]->image;
         images[image_count] = (VkDescriptorImageInfo){
             .imageView = target->view,
             .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
@@ -106,14 +106,14 @@ static bool bind_descriptors(struct vkb_run *run, const struct vkb_pass_row *pas
                        run->device->handle,
                        &(VkDescriptorSetAllocateInfo){
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                           .descriptorPool = run->flight->descriptors,
+                           .descriptorPool = run->submission->descriptors,
                            .descriptorSetCount = 1,
                            .pSetLayouts = &layout,
                        },
                        &set)))
         return false;
     write_descriptors(run, pass, params_offset, surface, set);
-    vk->vkCmdBindDescriptorSets(run->flight->commands.buffer, vkb_pass_bind_point(pass),
+    vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
                                 vkb_pipelines_layout(pipelines, pass), 0, 1, &set, 0, NULL);
     return true;
 }
@@ -121,7 +121,7 @@ static bool bind_descriptors(struct vkb_run *run, const struct vkb_pass_row *pas
 static void bind_mesh(const struct vkb_run *run, const struct vkb_mesh *mesh, bool textured)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->flight->commands.buffer;
+    VkCommandBuffer commands = run->submission->commands.buffer;
 
     vk->vkCmdBindVertexBuffers(commands, 0, 1, &mesh->vertices.handle, &(VkDeviceSize){0});
     if (textured)
@@ -140,7 +140,7 @@ static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
         const struct vkb_surface *surface = &mesh->surfaces[i];
         if (!bind_descriptors(run, pass, params, surface, error))
             return false;
-        run->device->vk.vkCmdDrawIndexed(run->flight->commands.buffer, surface->index_count, 1,
+        run->device->vk.vkCmdDrawIndexed(run->submission->commands.buffer, surface->index_count, 1,
                                          first, 0, 0);
         first += surface->index_count;
     }
@@ -151,16 +151,17 @@ static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
 
-    run->device->vk.vkCmdDispatch(
-        run->flight->commands.buffer, (target->width + pass->block_width - 1) / pass->block_width,
-        (target->height + pass->block_height - 1) / pass->block_height, 1);
+    run->device->vk.vkCmdDispatch(run->submission->commands.buffer,
+                                  (target->width + pass->block_width - 1) / pass->block_width,
+                                  (target->height + pass->block_height - 1) / pass->block_height,
+                                  1);
 }
 
 static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceSize params,
                  struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->flight->commands.buffer;
+    VkCommandBuffer commands = run->submission->commands.buffer;
     const struct vkb_scene *scene = &run->frame->scene;
     const struct vkb_mesh *mesh = pass->geometry == VKB_GEOMETRY_GLOW ? &scene->glow : &scene->body;
 
@@ -188,7 +189,7 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
                            error))
         return false;
-    run->device->vk.vkCmdBindPipeline(run->flight->commands.buffer, vkb_pass_bind_point(pass),
+    run->device->vk.vkCmdBindPipeline(run->submission->commands.buffer, vkb_pass_bind_point(pass),
                                       pipeline);
     return draw(run, pass, write_params(run, pass), error);
 }
@@ -198,8 +199,8 @@ static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
     for (uint32_t i = first; i < end; ++i) {
         const struct vkb_pass_row *pass = &run->graph->passes[i];
         for (uint32_t read = 0; read < pass->read_count; ++read)
-            vkb_image_transition(run->device, run->flight->commands.buffer,
-                                 &run->slots[pass->reads[read]]->image, vkb_pass_reads_as(pass));
+            vkb_image_transition(run->device, run->submission->commands.buffer,
+                                 &run->images[pass->reads[read]]->image, vkb_pass_reads_as(pass));
     }
 }
 
@@ -207,7 +208,7 @@ static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
 // from.
 static void transition_images(struct vkb_run *run, uint32_t first, uint32_t end)
 {
-    VkCommandBuffer commands = run->flight->commands.buffer;
+    VkCommandBuffer commands = run->submission->commands.buffer;
     const struct vkb_pass_row *pass = &run->graph->passes[first];
     struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
     const uint32_t use_count = vkb_graph_target_uses(run->graph, first, end, uses);
@@ -216,7 +217,7 @@ static void transition_images(struct vkb_run *run, uint32_t first, uint32_t end)
     transition_reads(run, first, end);
     for (uint32_t i = 0; i < use_count; ++i) {
         uint32_t target = i < depth_uses ? pass->depth : pass->targets[i - depth_uses];
-        struct vkb_image *image = &run->slots[target]->image;
+        struct vkb_image *image = &run->images[target]->image;
         // A new image has nothing to wait for; any other must be where its graph lets it rest.
         if (image->access != VKB_ACCESS_NONE && image->access != uses[i].before)
             vkb_image_transition(run->device, commands, image, uses[i].before);
@@ -229,7 +230,7 @@ static void begin_render_pass(const struct vkb_run *run, VkRenderPass render_pas
                               VkExtent2D extent)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->flight->commands.buffer;
+    VkCommandBuffer commands = run->submission->commands.buffer;
     VkClearValue clears[VKB_MAX_TARGETS + 1];
 
     for (uint32_t i = 0; i < pass->target_count; ++i)
@@ -264,28 +265,29 @@ static void add_timing(struct vkb_run *run, uint32_t first)
 static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
-    struct vkb_flight *flight = run->flight;
-    VkCommandBuffer commands = flight->commands.buffer;
+    struct vkb_submission *submission = run->submission;
+    VkCommandBuffer commands = submission->commands.buffer;
 
     // Started before the barriers: on lavapipe a timestamp is taken at the next barrier.
-    vkb_timer_start(device, commands, &flight->timer);
+    vkb_timer_start(device, commands, &submission->timer);
     transition_reads(run, index, index + 1);
-    vkb_image_transition(device, commands, &run->slots[run->graph->passes[index].targets[0]]->image,
+    vkb_image_transition(device, commands,
+                         &run->images[run->graph->passes[index].targets[0]]->image,
                          VKB_ACCESS_DISPATCH_STORED);
     if (!record_pass(run, index, VK_NULL_HANDLE, error))
         return false;
-    vkb_timer_stop(device, commands, &flight->timer);
+    vkb_timer_stop(device, commands, &submission->timer);
     return true;
 }
 
-static uint32_t target_slots(const struct vkb_run *run, const struct vkb_pass_row *pass,
-                             struct vkb_slot **slots)
+static uint32_t target_images(const struct vkb_run *run, const struct vkb_pass_row *pass,
+                              struct vkb_cached_image **cache)
 {
     uint32_t targets[VKB_MAX_TARGETS + 1];
     const uint32_t count = vkb_pass_targets(pass, targets);
 
     for (uint32_t i = 0; i < count; ++i)
-        slots[i] = run->slots[targets[i]];
+        cache[i] = run->images[targets[i]];
     return count;
 }
 
@@ -296,27 +298,27 @@ static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end
 {
     struct vkb_device *device = run->device;
     struct vkb_frame *frame = run->frame;
-    struct vkb_flight *flight = run->flight;
-    VkCommandBuffer commands = flight->commands.buffer;
-    struct vkb_slot *targets[VKB_MAX_TARGETS + 1];
-    const uint32_t target_count = target_slots(run, &run->graph->passes[first], targets);
+    struct vkb_submission *submission = run->submission;
+    VkCommandBuffer commands = submission->commands.buffer;
+    struct vkb_cached_image *targets[VKB_MAX_TARGETS + 1];
+    const uint32_t target_count = target_images(run, &run->graph->passes[first], targets);
     VkRenderPass render_pass;
     VkFramebuffer framebuffer;
 
     if (!vkb_pipelines_render_pass(device, &frame->pipelines, run->graph, first, end, &render_pass,
                                    error)
-        || !vkb_slots_framebuffer(device, &frame->slots, targets, target_count, render_pass,
-                                  &framebuffer, error))
+        || !vkb_image_cache_framebuffer(device, &frame->cache, targets, target_count, render_pass,
+                                        &framebuffer, error))
         return false;
     transition_images(run, first, end);
-    vkb_timer_start(device, commands, &flight->timer);
+    vkb_timer_start(device, commands, &submission->timer);
     begin_render_pass(run, render_pass, framebuffer, &run->graph->passes[first],
                       (VkExtent2D){targets[0]->image.width, targets[0]->image.height});
     for (uint32_t i = first; i < end; ++i)
         if (!record_pass(run, i, render_pass, error))
             return false;
     device->vk.vkCmdEndRenderPass(commands);
-    vkb_timer_stop(device, commands, &flight->timer);
+    vkb_timer_stop(device, commands, &submission->timer);
     return true;
 }
 

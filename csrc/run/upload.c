@@ -181,7 +181,7 @@ static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
 }
 
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
-                      struct vkb_flights *flights, const struct vkb_input *input,
+                      struct vkb_submissions *submissions, const struct vkb_input *input,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error)
 {
     const bool fresh = !holds_such(upload, input);
@@ -192,7 +192,7 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     *changed = first < input->height;
     if (!*changed)
         return true;
-    if (!vkb_flights_land(device, flights, error)
+    if (!vkb_submissions_wait(device, submissions, error)
         || (fresh && !prepare(device, upload, input, image, error)))
         return false;
     for (uint32_t y = first; y < input->height; ++y) {

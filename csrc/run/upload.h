@@ -3,7 +3,7 @@
 #ifndef VKB_UPLOAD_H
 #define VKB_UPLOAD_H
 
-#include "run/flight.h"
+#include "run/submission.h"
 
 #include <stddef.h>
 
@@ -37,11 +37,11 @@ void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *uplo
 void vkb_upload_forget(struct vkb_upload *upload);
 
 // Packs the image to RGBA, alpha 1 where it has none; *changed: it is another one than the last.
-// The flights may still read the last one: they are waited for before it is written over. `image`
-// is where the device will read it; if that is mapped, it has it now, else vkb_upload_record brings
-// it there.
+// The submissions may still read the last one: they are waited for before it is written over.
+// `image` is where the device will read it; if that is mapped, it has it now, else
+// vkb_upload_record brings it there.
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
-                      struct vkb_flights *flights, const struct vkb_input *input,
+                      struct vkb_submissions *submissions, const struct vkb_input *input,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error);
 
 // Records the copy of what is staged to the image.

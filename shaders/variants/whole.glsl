@@ -1,4 +1,4 @@
-// What the forms of an image's whole bloom in one pass share: their parameters, the bright part of a
+// What the variants of an image's whole bloom in one pass share: their parameters, the bright part of a
 // texel, the kernels. All is added up in the order of the passes that they stand for, and rounded as
 // those passes' images would.
 #include "lib/block.glsl"

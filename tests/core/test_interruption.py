@@ -148,7 +148,7 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
     del array
     gc.collect()
     assert not finished
-    # The next flight waits for the one that nobody wants any more, which is over then.
+    # The next submission waits for the abandoned one, which is finished then.
     renderer.apply(picture(9, 9), SHORT)
     assert finished == [True]
 

@@ -6,7 +6,7 @@
 #include "methods/methods.h"
 #include "run/frame.h"
 #include "run/pages.h"
-#include "variants/forms.h"
+#include "variants/variants.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -47,12 +47,12 @@ struct renderer {
     pthread_mutex_t lock;
     unsigned references;  // with the GIL
     atomic_bool open;
-    enum vkb_forms forms;
+    enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
     struct array_memory *memory;
-    struct job *adrift;  // with the GIL
-    size_t pipelines;    // with the GIL
+    struct job *abandoned;  // with the GIL
+    size_t pipelines;       // with the GIL
 };
 
 // batch.c's: points that go to the device together.
@@ -63,13 +63,13 @@ struct job {
     unsigned settings[POINTS];
     struct vkb_point points[POINTS];
     struct array_memory *memory;  // whose pages the arrays are in; NULL: they are plain
-    struct vkb_flight *flight;
+    struct vkb_submission *submission;
     struct job *next;
 };
 
 struct worker {
     unsigned number;
-    struct renderer **slots;  // its own one, then the shared ones
+    struct renderer **cache;  // its own one, then the shared ones
     unsigned seed;
     unsigned long frames, closed, left, pipelines;
 };
@@ -100,7 +100,7 @@ static struct renderer *open_renderer(void)
     if (!renderer || !(renderer->memory = vkb_alloc(&error, 1, sizeof *renderer->memory))
         || !vkb_device_create(&renderer->device, "software", "", false, &error)
         || !vkb_frame_create(&renderer->device, NULL, 0, &renderer->frame, &error)
-        || !vkb_forms_by_name("auto", &renderer->device, &renderer->forms, &error))
+        || !vkb_variants_by_name("auto", &renderer->device, &renderer->variants, &error))
         die("open", &error);
     pthread_mutex_init(&renderer->lock, NULL);
     renderer->memory->pages.device = &renderer->device;
@@ -148,13 +148,14 @@ static void release_job(struct job *job)
 }
 
 // With the lock and the GIL.
-static void release_adrift(struct renderer *renderer)
+static void release_abandoned(struct renderer *renderer)
 {
-    struct job **link = &renderer->adrift;
+    struct job **link = &renderer->abandoned;
 
     while (*link) {
         struct job *job = *link;
-        if (renderer->open && !vkb_frame_drop(&renderer->device, &renderer->frame, job->flight)) {
+        if (renderer->open
+            && !vkb_frame_drop(&renderer->device, &renderer->frame, job->submission)) {
             link = &job->next;
             continue;
         }
@@ -167,7 +168,7 @@ static void enter(struct renderer *renderer)
 {
     pthread_mutex_lock(&renderer->lock);
     pthread_mutex_lock(&gil);
-    release_adrift(renderer);
+    release_abandoned(renderer);
     pthread_mutex_unlock(&gil);
 }
 
@@ -196,7 +197,7 @@ static void close_renderer(struct renderer *renderer)
         pthread_mutex_unlock(&gil);
         vkb_device_destroy(&renderer->device);
         pthread_mutex_lock(&gil);
-        release_adrift(renderer);
+        release_abandoned(renderer);
         pthread_mutex_unlock(&gil);
     }
     leave(renderer);
@@ -219,7 +220,8 @@ static bool build_graph(const struct job *job, const struct vkb_settings *settin
                          : vkb_build_scene(job->source == SOURCE_FORWARD ? "forward" : "deferred",
                                            settings, &scene, graph, error);
 
-    return built && vkb_forms_choose(job->renderer->forms, &job->renderer->device, graph, error)
+    return built
+        && vkb_variants_choose(job->renderer->variants, &job->renderer->device, graph, error)
         && vkb_graph_check(graph, job->renderer->device.max_side, error);
 }
 
@@ -310,7 +312,7 @@ static bool submit(struct job *job)
     const bool open = renderer->open;
     if (open
         && !vkb_frame_submit(&renderer->device, &renderer->frame, &source, job->points, job->count,
-                             &job->flight, &error))
+                             &job->submission, &error))
         die("submit", &error);
     leave(renderer);
     return open;
@@ -321,23 +323,24 @@ static bool collect(struct job *job)
 {
     struct renderer *renderer = job->renderer;
     struct vkb_error error = {0};
-    bool landed;
+    bool finished;
 
     enter(renderer);
     const bool open = renderer->open;
     if (open
-        && !vkb_frame_collect(&renderer->device, &renderer->frame, job->flight, &landed, &error))
+        && !vkb_frame_collect(&renderer->device, &renderer->frame, job->submission, &finished,
+                              &error))
         die("collect", &error);
     leave(renderer);
     return open;
 }
 
 // Nobody wants it any more, and the device may be at work on it.
-static void set_adrift(struct job *job)
+static void set_abandoned(struct job *job)
 {
     pthread_mutex_lock(&gil);
-    job->next = job->renderer->adrift;
-    job->renderer->adrift = job;
+    job->next = job->renderer->abandoned;
+    job->renderer->abandoned = job;
     pthread_mutex_unlock(&gil);
     // As the next call would: a closed renderer has none.
     struct renderer *renderer = job->renderer;
@@ -387,22 +390,22 @@ static unsigned draw(struct worker *worker, unsigned below)
     return (unsigned)rand_r(&worker->seed) % below;
 }
 
-static struct renderer *take_renderer(unsigned slot)
+static struct renderer *take_renderer(unsigned cached)
 {
     pthread_mutex_lock(&gil);
-    struct renderer *renderer = renderers[slot];
+    struct renderer *renderer = renderers[cached];
     ++renderer->references;
     pthread_mutex_unlock(&gil);
     return renderer;
 }
 
-static void replace_renderer(struct worker *worker, unsigned slot)
+static void replace_renderer(struct worker *worker, unsigned cached)
 {
     struct renderer *fresh = open_renderer();
 
     pthread_mutex_lock(&gil);
-    struct renderer *old = renderers[slot];
-    renderers[slot] = fresh;
+    struct renderer *old = renderers[cached];
+    renderers[cached] = fresh;
     pthread_mutex_unlock(&gil);
     close_renderer(old);
     pthread_mutex_lock(&gil);
@@ -427,7 +430,7 @@ static void render(struct worker *worker, struct renderer *renderer, unsigned de
     }
     if (way == 0) {
         ++worker->left;
-        set_adrift(job);
+        set_abandoned(job);
         return;
     }
     // Others, and this thread, go on before it is read.
@@ -449,13 +452,13 @@ static void *work(void *argument)
     struct worker *worker = argument;
 
     while (!atomic_load(&over)) {
-        const unsigned slot =
+        const unsigned cached =
             draw(worker, 3) == 0 ? worker->number : THREADS + draw(worker, SHARED);
         if (draw(worker, 16) == 0) {
-            replace_renderer(worker, slot);
+            replace_renderer(worker, cached);
             continue;
         }
-        struct renderer *renderer = take_renderer(slot);
+        struct renderer *renderer = take_renderer(cached);
         render(worker, renderer, 0);
         pthread_mutex_lock(&gil);
         release_renderer(renderer);
@@ -589,7 +592,7 @@ int main(int count, char **arguments)
         for (unsigned settings = 0; settings < SETTINGS; ++settings)
             for (unsigned size = 0; size < SIZES; ++size)
                 vkb_free(right[source][settings][size].bytes);
-    printf("%d threads, %ld s: %lu frames read, all exact; %lu submissions left in the air; %lu "
+    printf("%d threads, %ld s: %lu frames read, all exact; %lu submissions left pending; %lu "
            "renderers closed\n",
            (int)THREADS, (long)length.tv_sec, frames, left, closed);
     return 0;

@@ -1,28 +1,29 @@
-// What the files of forms share: forms.c has the table, blur_forms.c and level_forms.c what stands
-// in it for blurs and for levels.
-#ifndef VKB_FORM_H
-#define VKB_FORM_H
+// What the files of variants share: variants.c has the table, blur_variants.c and level_variants.c
+// what stands in it for blurs and for levels.
+#ifndef VKB_VARIANT_H
+#define VKB_VARIANT_H
 
 #include "passes/composite.h"
 #include "passes/threshold.h"
-#include "variants/forms.h"
+#include "variants/variants.h"
 
-// The choice of forms for one graph: the passes of `plain` to those of `graph`.
-struct vkb_form_choice {
-    enum vkb_forms forms;
+// The choice of variants for one graph: the passes of `plain` to those of `graph`.
+struct vkb_variant_choice {
+    enum vkb_variants variants;
     const struct vkb_device *device;
     struct vkb_graph plain;
     struct vkb_graph *graph;
 };
 
-// A form adds what runs for a pass; false in *fits, and nothing added, where it does not suit it.
-typedef bool vkb_form_add(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
-                          bool *fits, struct vkb_error *error);
+// A variant adds what runs for a pass; false in *fits, and nothing added, where it does not suit
+// it.
+typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
+                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error);
 
 // A blur's lines and enlarged lines; an image's whole bloom in strips and tiles.
-vkb_form_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
+vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
 // Levels of exactly half and twice a size.
-vkb_form_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
+vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 
 // A shader that is compiled for each format that it loads from.
 #define VKB_BY_FORMAT(shader) \
@@ -47,7 +48,7 @@ void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_
                        uint32_t block_height);
 // A pass over all pixels of one target: on processors drawn, where its texels cannot be loaded, on
 // GPUs a compute shader, for some of them (made to compute) draw slowly.
-bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
+bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
                         const struct vkb_pass_row *pass, struct vkb_error *error);
 
 #endif

@@ -1,5 +1,5 @@
-// Forms of blurs, and of an image's whole bloom by one.
-#include "variants/form.h"
+// Variants of blurs, and of an image's whole bloom by one.
+#include "variants/variant.h"
 
 #include "passes/blur.h"
 
@@ -39,8 +39,8 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
 }
 
 // A blur whose source has the target's size, as a line.
-bool vkb_add_line(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass, bool *fits,
-                  struct vkb_error *error)
+bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                  bool *fits, struct vkb_error *error)
 {
     struct vkb_texel_kernel kernel;
 
@@ -57,7 +57,7 @@ bool vkb_add_line(const struct vkb_form_choice *choice, const struct vkb_pass_ro
 // A horizontal blur into a target of another size, its taps whole texels apart: such a blur
 // commutes with the filter between the sizes, so it runs in the source's size, and every pixel of
 // the target takes one sample of it instead of one a tap.
-bool vkb_add_enlarged(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                       bool *fits, struct vkb_error *error)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
@@ -95,7 +95,7 @@ bool vkb_add_enlarged(const struct vkb_form_choice *choice, const struct vkb_pas
     row.params.extract.target_height = sampling.height;
     row.params.extract.limit = sampling.limit;
     return vkb_graph_add_pass(choice->graph, &line, error)
-        && vkb_add_fullscreen(choice->forms, choice->graph, &row, error);
+        && vkb_add_fullscreen(choice->variants, choice->graph, &row, error);
 }
 
 // The chain of passes that gives an image its bloom where all have its size.
@@ -132,7 +132,7 @@ static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row 
         && vkb_blur_kernel(chain->across, radius, &chain->across_kernel);
 }
 
-static struct vkb_pass_row whole_row(const struct vkb_form_choice *choice,
+static struct vkb_pass_row whole_row(const struct vkb_variant_choice *choice,
                                      const struct chain *chain)
 {
     const struct vkb_graph *graph = &choice->plain;
@@ -144,7 +144,7 @@ static struct vkb_pass_row whole_row(const struct vkb_form_choice *choice,
     memset(&row.params, 0, sizeof row.params);
     row.read_count = 1;
     row.reads[1] = 0;
-    row.alternative = true;
+    row.fused = true;
     row.block = VKB_BLOCK_whole;
     VKB_TAKE_COMPOSITE(&row, whole, chain->composite);
     VKB_TAKE_THRESHOLD(&row, whole, chain->extract);
@@ -157,7 +157,7 @@ static struct vkb_pass_row whole_row(const struct vkb_form_choice *choice,
 }
 
 // The composite as it is, and after it the whole bloom in strips as its alternative.
-bool vkb_add_strips(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
     struct chain chain;
@@ -169,12 +169,12 @@ bool vkb_add_strips(const struct vkb_form_choice *choice, const struct vkb_pass_
     vkb_make_dispatch(&row, strip_shaders[choice->plain.images[pass->reads[0]].format],
                       ROW_INVOCATIONS * STRIP_COLUMNS, STRIP_ROWS);
     row.loads = true;
-    return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
+    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 // The composite as it is, and after it one that takes the bloom from the lines that end in it.
-bool vkb_add_from_lines(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         bool *fits, struct vkb_error *error)
 {
     const struct vkb_pass_row *enlarging = NULL;
@@ -192,13 +192,13 @@ bool vkb_add_from_lines(const struct vkb_form_choice *choice, const struct vkb_p
     row.constants.bloom = BLOOM_LINES;
     row.constants.format =
         vkb_stored_as(choice->device, choice->plain.images[pass->reads[1]].format);
-    row.alternative = true;
-    return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
-        && vkb_add_fullscreen(choice->forms, choice->graph, &row, error);
+    row.fused = true;
+    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
+        && vkb_add_fullscreen(choice->variants, choice->graph, &row, error);
 }
 
 // The same in tiles, for kernels of up to TILE_RADIUS in three steps.
-bool vkb_add_tiles(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                    bool *fits, struct vkb_error *error)
 {
     const size_t shared = 3 * sizeof(float) * TILE_ROWS * TILE_LOADED;
@@ -215,6 +215,6 @@ bool vkb_add_tiles(const struct vkb_form_choice *choice, const struct vkb_pass_r
     struct vkb_pass_row row = whole_row(choice, &chain);
     vkb_make_dispatch(&row, VKB_SHADER_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row.constants.radius = radius;
-    return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
+    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -1,34 +1,34 @@
-#include "variants/form.h"
+#include "variants/variant.h"
 
 #include <string.h>
 
-static const char *const form_names[VKB_FORMS_COUNT] = {
-    [VKB_FORMS_FRAGMENT] = "fragment",
-    [VKB_FORMS_CPU] = "cpu",
-    [VKB_FORMS_GPU] = "gpu",
+static const char *const variant_names[VKB_VARIANTS_COUNT] = {
+    [VKB_VARIANTS_FRAGMENT] = "fragment",
+    [VKB_VARIANTS_CPU] = "cpu",
+    [VKB_VARIANTS_GPU] = "gpu",
 };
 
-bool vkb_forms_by_name(const char *name, const struct vkb_device *device, enum vkb_forms *forms,
-                       struct vkb_error *error)
+bool vkb_variants_by_name(const char *name, const struct vkb_device *device,
+                          enum vkb_variants *variants, struct vkb_error *error)
 {
     int found = 0;
 
     if (strcmp(name, "auto") == 0)
-        found = !device->dispatch                                          ? VKB_FORMS_FRAGMENT
-              : device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_FORMS_CPU
-                                                                           : VKB_FORMS_GPU;
+        found = !device->dispatch                                          ? VKB_VARIANTS_FRAGMENT
+              : device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_VARIANTS_CPU
+                                                                           : VKB_VARIANTS_GPU;
     else
-        while (found < VKB_FORMS_COUNT && strcmp(form_names[found], name) != 0)
+        while (found < VKB_VARIANTS_COUNT && strcmp(variant_names[found], name) != 0)
             ++found;
-    if (found == VKB_FORMS_COUNT)
+    if (found == VKB_VARIANTS_COUNT)
         return vkb_fail(error, VKB_ERROR_VALUE,
                         "VKBLOOM_FORM: %s is not one of auto, fragment, cpu, gpu", name);
-    if (found != VKB_FORMS_FRAGMENT && !device->dispatch)
+    if (found != VKB_VARIANTS_FRAGMENT && !device->dispatch)
         return vkb_fail(error, VKB_ERROR_VALUE,
                         "VKBLOOM_FORM: the compute shaders of %s cannot write images, which %s "
                         "needs; use auto or fragment",
                         device->adapter.name, name);
-    *forms = (enum vkb_forms)found;
+    *variants = (enum vkb_variants)found;
     return true;
 }
 
@@ -101,14 +101,14 @@ static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader)
     row->loads = true;
 }
 
-bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
+bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
                         const struct vkb_pass_row *pass, struct vkb_error *error)
 {
     const enum vkb_format format = graph->images[pass->reads[0]].format;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    if (forms == VKB_FORMS_GPU)
+    if (variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
                           PIXEL_INVOCATIONS);
     else if (blends(graph, pass))
@@ -118,19 +118,19 @@ bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
     return vkb_graph_add_pass(graph, &row, error);
 }
 
-static bool add_pixels(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        bool *fits, struct vkb_error *error)
 {
     *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
          && vkb_spirv[pass->shader].dispatch != pass->shader
          && vkb_is_written_once(&choice->plain, pass->targets[0]);
-    return !*fits || vkb_add_fullscreen(choice->forms, choice->graph, pass, error);
+    return !*fits || vkb_add_fullscreen(choice->variants, choice->graph, pass, error);
 }
 
-struct form {
-    enum vkb_forms forms;
+struct variant {
+    enum vkb_variants variants;
     const char *name;
-    vkb_form_add *add;
+    vkb_variant_add *add;
     uint32_t least_pixels;  // of the target
 };
 
@@ -139,22 +139,22 @@ struct form {
 // 25 and 18; doubling to 1024 x 1024 33 and 45, to 512 x 512 29 and 15.
 enum { HALVE_STRIPS = 1 << 17, DOUBLE_STRIPS = 1 << 19 };
 
-static const struct form forms_table[] = {
-    {VKB_FORMS_CPU, "line", vkb_add_line, 0},
-    {VKB_FORMS_CPU, "enlarged", vkb_add_enlarged, 0},
-    {VKB_FORMS_CPU, "strips", vkb_add_strips, 0},
-    {VKB_FORMS_CPU, "from_lines", vkb_add_from_lines, 0},
-    {VKB_FORMS_CPU, "halved", vkb_add_halved, 0},
-    {VKB_FORMS_CPU, "doubled", vkb_add_doubled, 0},
-    {VKB_FORMS_CPU, "doubled_final", vkb_add_doubled_final, 0},
-    {VKB_FORMS_CPU, "pixels", add_pixels, 0},
-    {VKB_FORMS_GPU, "enlarged", vkb_add_enlarged, 0},
-    {VKB_FORMS_GPU, "from_lines", vkb_add_from_lines, 0},
-    {VKB_FORMS_GPU, "tiles", vkb_add_tiles, 0},
-    {VKB_FORMS_GPU, "halved", vkb_add_halved, HALVE_STRIPS},
-    {VKB_FORMS_GPU, "doubled", vkb_add_doubled, DOUBLE_STRIPS},
-    {VKB_FORMS_GPU, "doubled_final", vkb_add_doubled_final, DOUBLE_STRIPS},
-    {VKB_FORMS_GPU, "pixels", add_pixels, 0},
+static const struct variant variants_table[] = {
+    {VKB_VARIANTS_CPU, "line", vkb_add_line, 0},
+    {VKB_VARIANTS_CPU, "enlarged", vkb_add_enlarged, 0},
+    {VKB_VARIANTS_CPU, "strips", vkb_add_strips, 0},
+    {VKB_VARIANTS_CPU, "from_lines", vkb_add_from_lines, 0},
+    {VKB_VARIANTS_CPU, "halved", vkb_add_halved, 0},
+    {VKB_VARIANTS_CPU, "doubled", vkb_add_doubled, 0},
+    {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
+    {VKB_VARIANTS_CPU, "pixels", add_pixels, 0},
+    {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
+    {VKB_VARIANTS_GPU, "from_lines", vkb_add_from_lines, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_tiles, 0},
+    {VKB_VARIANTS_GPU, "halved", vkb_add_halved, HALVE_STRIPS},
+    {VKB_VARIANTS_GPU, "doubled", vkb_add_doubled, DOUBLE_STRIPS},
+    {VKB_VARIANTS_GPU, "doubled_final", vkb_add_doubled_final, DOUBLE_STRIPS},
+    {VKB_VARIANTS_GPU, "pixels", add_pixels, 0},
 };
 
 // The rows from `first` on, by what stands in the table; one before a fused pass is the method's
@@ -163,44 +163,45 @@ static void name_variant(struct vkb_graph *graph, uint32_t first, const char *na
 {
     for (uint32_t i = first; i < graph->pass_count; ++i) {
         struct vkb_pass_row *pass = &graph->passes[i];
-        const bool own = i + 1 < graph->pass_count && pass[1].alternative;
+        const bool own = i + 1 < graph->pass_count && pass[1].fused;
         pass->variant = !own ? name : pass->geometry == VKB_GEOMETRY_DISPATCH ? "pixels" : NULL;
     }
 }
 
-static bool add_in_its_form(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
-                            struct vkb_error *error)
+static bool add_variant(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const uint64_t pixels = (uint64_t)target->width * target->height;
 
-    for (size_t i = 0; i < sizeof forms_table / sizeof forms_table[0]; ++i) {
+    for (size_t i = 0; i < sizeof variants_table / sizeof variants_table[0]; ++i) {
         const uint32_t first = choice->graph->pass_count;
         bool fits = false;
-        if (forms_table[i].forms != choice->forms || pixels < forms_table[i].least_pixels)
+        if (variants_table[i].variants != choice->variants
+            || pixels < variants_table[i].least_pixels)
             continue;
-        if (!forms_table[i].add(choice, pass, &fits, error))
+        if (!variants_table[i].add(choice, pass, &fits, error))
             return false;
         if (!fits)
             continue;
-        name_variant(choice->graph, first, forms_table[i].name);
+        name_variant(choice->graph, first, variants_table[i].name);
         return true;
     }
     return vkb_graph_add_pass(choice->graph, pass, error);
 }
 
-bool vkb_forms_choose(enum vkb_forms forms, const struct vkb_device *device,
-                      struct vkb_graph *graph, struct vkb_error *error)
+bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *device,
+                         struct vkb_graph *graph, struct vkb_error *error)
 {
-    struct vkb_form_choice choice = {
-        .forms = forms,
+    struct vkb_variant_choice choice = {
+        .variants = variants,
         .device = device,
         .plain = *graph,
         .graph = graph,
     };
     bool done = true;
 
-    if (forms == VKB_FORMS_FRAGMENT)
+    if (variants == VKB_VARIANTS_FRAGMENT)
         return true;
     // The images stay, the passes are laid anew.
     graph->passes = NULL;
@@ -209,7 +210,7 @@ bool vkb_forms_choose(enum vkb_forms forms, const struct vkb_device *device,
     for (uint32_t i = 0; done && i < choice.plain.pass_count; ++i) {
         // Adding an image may move them all.
         choice.plain.images = graph->images;
-        done = add_in_its_form(&choice, &choice.plain.passes[i], error);
+        done = add_variant(&choice, &choice.plain.passes[i], error);
     }
     vkb_free(choice.plain.passes);
     return done;

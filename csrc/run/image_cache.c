@@ -1,4 +1,4 @@
-#include "run/slots.h"
+#include "run/image_cache.h"
 
 #include <string.h>
 
@@ -16,43 +16,43 @@ struct vkb_framebuffer_entry {
 };
 
 // Destroys the framebuffers of an image that goes; 0 is the id of no image.
-static void destroy_framebuffers(const struct vkb_device *device, struct vkb_slots *slots,
+static void destroy_framebuffers(const struct vkb_device *device, struct vkb_image_cache *cache,
                                  uint64_t image_id)
 {
-    for (size_t i = image_id ? slots->framebuffer_count : 0; i-- > 0;) {
-        struct vkb_framebuffer_entry *entry = &slots->framebuffers[i];
+    for (size_t i = image_id ? cache->framebuffer_count : 0; i-- > 0;) {
+        struct vkb_framebuffer_entry *entry = &cache->framebuffers[i];
         bool uses = false;
         for (uint32_t target = 0; target <= VKB_MAX_TARGETS; ++target)
             uses |= entry->key.images[target] == image_id;
         if (!uses)
             continue;
         device->vk.vkDestroyFramebuffer(device->handle, entry->handle, NULL);
-        *entry = slots->framebuffers[--slots->framebuffer_count];
+        *entry = cache->framebuffers[--cache->framebuffer_count];
     }
 }
 
-void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots)
+void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_cache *cache)
 {
-    for (size_t i = 0; i < slots->count; ++i) {
-        struct vkb_slot *slot = slots->slots[i];
-        destroy_framebuffers(device, slots, slot->image_id);
-        vkb_image_destroy(device, &slot->image);
-        vkb_free(slot->content.recipe);
-        vkb_free(slot);
+    for (size_t i = 0; i < cache->count; ++i) {
+        struct vkb_cached_image *cached = cache->images[i];
+        destroy_framebuffers(device, cache, cached->image_id);
+        vkb_image_destroy(device, &cached->image);
+        vkb_free(cached->content.recipe);
+        vkb_free(cached);
     }
-    vkb_free(slots->slots);
-    vkb_free(slots->framebuffers);
+    vkb_free(cache->images);
+    vkb_free(cache->framebuffers);
     // The clock goes on: nothing made later may be taken for something made before.
-    *slots = (struct vkb_slots){.clock = slots->clock, .now = slots->now};
+    *cache = (struct vkb_image_cache){.clock = cache->clock, .now = cache->now};
 }
 
-// The image goes, the slot stays: of names there are a few.
-static void destroy_image(const struct vkb_device *device, struct vkb_slots *slots,
-                          struct vkb_slot *slot)
+// The image goes, the cached stays: of names there are a few.
+static void destroy_image(const struct vkb_device *device, struct vkb_image_cache *cache,
+                          struct vkb_cached_image *cached)
 {
-    slot->content.valid = false;
-    destroy_framebuffers(device, slots, slot->image_id);
-    vkb_image_destroy(device, &slot->image);
+    cached->content.valid = false;
+    destroy_framebuffers(device, cache, cached->image_id);
+    vkb_image_destroy(device, &cached->image);
 }
 
 static uint64_t image_size(const struct vkb_image *image)
@@ -61,31 +61,32 @@ static uint64_t image_size(const struct vkb_image *image)
                          : 0;
 }
 
-uint64_t vkb_slots_size(const struct vkb_slots *slots)
+uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache)
 {
     uint64_t size = 0;
 
-    for (size_t i = 0; i < slots->count; ++i)
-        size += image_size(&slots->slots[i]->image);
+    for (size_t i = 0; i < cache->count; ++i)
+        size += image_size(&cache->images[i]->image);
     return size;
 }
 
-void vkb_slots_trim(const struct vkb_device *device, struct vkb_slots *slots,
-                    const struct vkb_age *age)
+void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
+                          const struct vkb_age *age)
 {
-    uint64_t size = vkb_slots_size(slots);
+    uint64_t size = vkb_image_cache_size(cache);
     const uint64_t left = size > VKB_KEPT_IMAGE_BYTES ? VKB_KEPT_IMAGE_BYTES / 2 : size;
 
-    slots->now = age->now;
+    cache->now = age->now;
     while (size > left) {
-        struct vkb_slot *oldest = NULL;
-        for (size_t i = 0; i < slots->count; ++i)
-            if (slots->slots[i]->image.handle && (!oldest || slots->slots[i]->used < oldest->used))
-                oldest = slots->slots[i];
+        struct vkb_cached_image *oldest = NULL;
+        for (size_t i = 0; i < cache->count; ++i)
+            if (cache->images[i]->image.handle
+                && (!oldest || cache->images[i]->used < oldest->used))
+                oldest = cache->images[i];
         if (!oldest || !vkb_is_old(oldest->used, age))
             return;
         size -= image_size(&oldest->image);
-        destroy_image(device, slots, oldest);
+        destroy_image(device, cache, oldest);
     }
 }
 
@@ -120,8 +121,8 @@ static bool check_format(const struct vkb_device *device, const struct vkb_graph
     return true;
 }
 
-bool vkb_slots_check(const struct vkb_device *device, const struct vkb_graph *graph,
-                     struct vkb_error *error)
+bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
+                           struct vkb_error *error)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
         if (!check_format(device, graph, i, error))
@@ -141,25 +142,26 @@ static bool is_mapped(const struct vkb_device *device, const struct vkb_image_ro
                                    features, row->width, row->height);
 }
 
-static struct vkb_slot *find_slot(const struct vkb_slots *slots, const char *name)
+static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache, const char *name)
 {
-    for (size_t i = 0; i < slots->count; ++i)
-        if (strcmp(slots->slots[i]->name, name) == 0)
-            return slots->slots[i];
+    for (size_t i = 0; i < cache->count; ++i)
+        if (strcmp(cache->images[i]->name, name) == 0)
+            return cache->images[i];
     return NULL;
 }
 
-static struct vkb_slot *add_slot(struct vkb_slots *slots, const char *name, struct vkb_error *error)
+static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache, const char *name,
+                                           struct vkb_error *error)
 {
-    struct vkb_slot *slot;
+    struct vkb_cached_image *cached;
 
-    if (!vkb_grow(error, &slots->slots, &slots->capacity, slots->count + 1,
-                  sizeof(struct vkb_slot *))
-        || !(slot = vkb_alloc(error, 1, sizeof *slot)))
+    if (!vkb_grow(error, &cache->images, &cache->capacity, cache->count + 1,
+                  sizeof(struct vkb_cached_image *))
+        || !(cached = vkb_alloc(error, 1, sizeof *cached)))
         return NULL;
-    memcpy(slot->name, name, sizeof slot->name);
-    slots->slots[slots->count++] = slot;
-    return slot;
+    memcpy(cached->name, name, sizeof cached->name);
+    cache->images[cache->count++] = cached;
+    return cached;
 }
 
 static bool fits(const struct vkb_image *image, const struct vkb_image_row *row)
@@ -168,34 +170,35 @@ static bool fits(const struct vkb_image *image, const struct vkb_image_row *row)
         && image->height == row->height;
 }
 
-bool vkb_slots_replaces(const struct vkb_slots *slots, const struct vkb_image_row *row)
+bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
 {
-    const struct vkb_slot *slot = find_slot(slots, row->name);
+    const struct vkb_cached_image *cached = find_cached(cache, row->name);
 
-    return slot && slot->image.handle && !fits(&slot->image, row);
+    return cached && cached->image.handle && !fits(&cached->image, row);
 }
 
-struct vkb_slot *vkb_slots_find(const struct vkb_slots *slots, const struct vkb_image_row *row)
+struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
+                                              const struct vkb_image_row *row)
 {
-    struct vkb_slot *slot = find_slot(slots, row->name);
+    struct vkb_cached_image *cached = find_cached(cache, row->name);
 
-    return slot && fits(&slot->image, row) ? slot : NULL;
+    return cached && fits(&cached->image, row) ? cached : NULL;
 }
 
-bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
-                       const struct vkb_image_row *row, struct vkb_slot **resolved,
-                       struct vkb_error *error)
+bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_cache *cache,
+                             const struct vkb_image_row *row, struct vkb_cached_image **resolved,
+                             struct vkb_error *error)
 {
-    struct vkb_slot *slot = find_slot(slots, row->name);
+    struct vkb_cached_image *cached = find_cached(cache, row->name);
 
-    if (!slot && !(slot = add_slot(slots, row->name, error)))
+    if (!cached && !(cached = add_cached(cache, row->name, error)))
         return false;
-    *resolved = slot;
-    slot->used = slots->now;
-    if (fits(&slot->image, row))
+    *resolved = cached;
+    cached->used = cache->now;
+    if (fits(&cached->image, row))
         return true;
-    destroy_image(device, slots, slot);
-    slot->image_id = ++slots->clock;
+    destroy_image(device, cache, cached);
+    cached->image_id = ++cache->clock;
     return vkb_image_create(device,
                             &(struct vkb_image_spec){
                                 .format = row->format,
@@ -206,13 +209,13 @@ bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
                                 .usage = image_usage(row->format),
                                 .mapped = is_mapped(device, row),
                             },
-                            &slot->image, error);
+                            &cached->image, error);
 }
 
-bool vkb_slots_framebuffer(const struct vkb_device *device, struct vkb_slots *slots,
-                           struct vkb_slot **targets, uint32_t target_count,
-                           VkRenderPass render_pass, VkFramebuffer *framebuffer,
-                           struct vkb_error *error)
+bool vkb_image_cache_framebuffer(const struct vkb_device *device, struct vkb_image_cache *cache,
+                                 struct vkb_cached_image **targets, uint32_t target_count,
+                                 VkRenderPass render_pass, VkFramebuffer *framebuffer,
+                                 struct vkb_error *error)
 {
     struct framebuffer_key key;
     VkImageView views[VKB_MAX_TARGETS + 1];
@@ -223,13 +226,13 @@ bool vkb_slots_framebuffer(const struct vkb_device *device, struct vkb_slots *sl
         views[i] = targets[i]->image.view;
         key.images[i] = targets[i]->image_id;
     }
-    for (size_t i = 0; i < slots->framebuffer_count; ++i)
-        if (memcmp(&slots->framebuffers[i].key, &key, sizeof key) == 0) {
-            *framebuffer = slots->framebuffers[i].handle;
+    for (size_t i = 0; i < cache->framebuffer_count; ++i)
+        if (memcmp(&cache->framebuffers[i].key, &key, sizeof key) == 0) {
+            *framebuffer = cache->framebuffers[i].handle;
             return true;
         }
-    if (!vkb_grow(error, &slots->framebuffers, &slots->framebuffer_capacity,
-                  slots->framebuffer_count + 1, sizeof *slots->framebuffers)
+    if (!vkb_grow(error, &cache->framebuffers, &cache->framebuffer_capacity,
+                  cache->framebuffer_count + 1, sizeof *cache->framebuffers)
         || !VK(error, device->vk.vkCreateFramebuffer(
                           device->handle,
                           &(VkFramebufferCreateInfo){
@@ -243,7 +246,7 @@ bool vkb_slots_framebuffer(const struct vkb_device *device, struct vkb_slots *sl
                           },
                           NULL, framebuffer)))
         return false;
-    struct vkb_framebuffer_entry *entry = &slots->framebuffers[slots->framebuffer_count++];
+    struct vkb_framebuffer_entry *entry = &cache->framebuffers[cache->framebuffer_count++];
     memcpy(&entry->key, &key, sizeof key);
     entry->handle = *framebuffer;
     return true;

@@ -1,5 +1,5 @@
-// Forms of a pyramid's levels that are exactly half or twice as large as the one before.
-#include "variants/form.h"
+// Variants of a pyramid's levels that are exactly half or twice as large as the one before.
+#include "variants/variant.h"
 
 #include "passes/levels.h"
 
@@ -20,8 +20,9 @@ static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uin
 
 // Where the larger level is what is extracted of an image: from the image itself, as an alternative
 // to `halving`, which `pass` became.
-static bool add_halved_image(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
-                             const struct vkb_pass_row *halving, struct vkb_error *error)
+static bool add_halved_image(const struct vkb_variant_choice *choice,
+                             const struct vkb_pass_row *pass, const struct vkb_pass_row *halving,
+                             struct vkb_error *error)
 {
     const struct vkb_pass_row *extract = vkb_extract_of(&choice->plain, pass->reads[0]);
     struct vkb_pass_row row;
@@ -30,7 +31,7 @@ static bool add_halved_image(const struct vkb_form_choice *choice, const struct 
         return true;
     memcpy(&row, halving, sizeof row);
     row.reads[0] = extract->reads[0];
-    row.alternative = true;
+    row.fused = true;
     row.constants.extract = true;
     row.constants.format =
         vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
@@ -38,7 +39,7 @@ static bool add_halved_image(const struct vkb_form_choice *choice, const struct 
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-bool vkb_add_halved(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
     const struct vkb_graph *plain = &choice->plain;
@@ -54,7 +55,7 @@ bool vkb_add_halved(const struct vkb_form_choice *choice, const struct vkb_pass_
         && add_halved_image(choice, pass, &row, error);
 }
 
-bool vkb_add_doubled(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                      bool *fits, struct vkb_error *error)
 {
     const struct vkb_graph *plain = &choice->plain;
@@ -71,7 +72,7 @@ bool vkb_add_doubled(const struct vkb_form_choice *choice, const struct vkb_pass
 }
 
 // The composite as it is, and after it one that doubles the last level itself.
-bool vkb_add_doubled_final(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
     const struct vkb_graph *plain = &choice->plain;
@@ -90,7 +91,7 @@ bool vkb_add_doubled_final(const struct vkb_form_choice *choice, const struct vk
     vkb_make_dispatch(&row, double_final_shaders[plain->images[up->reads[0]].format],
                       ROW_INVOCATIONS * DOUBLE_COLUMNS, DOUBLE_ROWS);
     row.loads = true;
-    row.alternative = true;
+    row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
     row.block = VKB_BLOCK_double_final;
@@ -98,6 +99,6 @@ bool vkb_add_doubled_final(const struct vkb_form_choice *choice, const struct vk
     VKB_TAKE_COMPOSITE(&row, double_final, pass);
     row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
     memcpy(params->taps, up->params.pyramid.taps, sizeof params->taps);
-    return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
+    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
