@@ -1,4 +1,4 @@
-"""The Vulkan adapters of this machine."""
+"""List the Vulkan adapters of this machine."""
 
 from __future__ import annotations
 
@@ -9,20 +9,31 @@ from vkbloom import _core
 
 @dataclasses.dataclass(frozen=True)
 class AdapterInfo:
-    """One adapter that can run vkbloom.
+    """An adapter that can run vkbloom.
 
     Attributes
     ----------
     name : str
-        As the driver calls the device.
+        The device's name, from the driver.
     type : str
         "cpu", "integrated", "discrete", "virtual" or "other".
     driver, driver_info : str
-        The driver and its version, in its own words; "" where it has none.
+        Name and version of the driver, as the driver reports them; "" if it reports none.
     api_version : str
-        Of Vulkan.
+        The Vulkan version of the device.
     summary : str
-        All of it on one line.
+        All of these on one line.
+
+    See Also
+    --------
+    adapters : Lists the adapters.
+    Renderer : Chooses an adapter by type or name.
+
+    Examples
+    --------
+    >>> info = vkbloom.AdapterInfo("llvmpipe", "cpu", "llvmpipe", "Mesa 25.0.7", "1.4.305")
+    >>> info.summary
+    'llvmpipe (cpu, Mesa 25.0.7, Vulkan 1.4.305)'
     """
 
     name: str
@@ -33,7 +44,7 @@ class AdapterInfo:
 
     @property
     def summary(self) -> str:
-        """All of it on one line."""
+        """All attributes on one line."""
         driver = self.driver_info or self.driver or "unnamed driver"
         return f"{self.name} ({self.type}, {driver}, Vulkan {self.api_version})"
 
@@ -44,12 +55,22 @@ def adapters() -> tuple[AdapterInfo, ...]:
     Returns
     -------
     tuple of AdapterInfo
-        Empty where no driver works, or where the Vulkan loader is missing.
+        Empty if no driver works, or if the Vulkan loader is missing.
 
     Raises
     ------
     Error
-        The loader is there, but fails.
+        The Vulkan loader fails.
+
+    See Also
+    --------
+    AdapterInfo : Describes an adapter.
+    Renderer : Chooses an adapter by type or name.
+
+    Examples
+    --------
+    >>> any(adapter.type == "cpu" for adapter in vkbloom.adapters())
+    True
     """
     try:
         found = _core.adapters()

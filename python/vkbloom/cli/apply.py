@@ -1,4 +1,4 @@
-"""``vkbloom apply``: an image file gets bloom."""
+"""``vkbloom apply``: add bloom to an image file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import COLOURS, note, read_picture, subimage_option
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.io import image_writing
 from vkbloom.io.images import Colour, Picture
@@ -28,25 +28,26 @@ from vkbloom.settings import Encoding
     metavar="all|NAME,...",
     default="final",
     show_default=True,
-    help="The framebuffers wanted. final is OUT; each other is written beside it as OUT's name "
-    "with _NAME, its values as they are, and as .exr where OUT's format cannot hold them.",
+    help="The framebuffers to write. final is written to OUT; each other framebuffer is written "
+    "beside it, as OUT's name with _NAME appended, its values not converted. A framebuffer that "
+    "OUT's format cannot hold is written as .exr.",
 )
 @click.option(
     "--input-colour",
     type=click.Choice(COLOURS),
-    help="What the colours in IN are [default linear for floats; for integers srgb, unless the "
-    "file says linear]",
+    help="Encoding of the colours in IN [default linear for floats; srgb for integers, unless "
+    "the file says linear]",
 )
 @click.option(
     "--output-colour",
     type=click.Choice(COLOURS),
-    help="What the colours in OUT shall be [default linear for floats, srgb for integers]",
+    help="Encoding of the colours in OUT [default linear for floats, srgb for integers]",
 )
 @click.option(
     "--raw",
     is_flag=True,
-    help="Take the values of an 8-bit file as they are, without decoding, through 8-bit buffers, "
-    "and write them so.",
+    help="Do not decode or encode colours: use the values of an 8-bit file unchanged, in 8-bit "
+    "buffers.",
 )
 @subimage_option
 @device_options
@@ -64,45 +65,44 @@ def command(
     validation: bool,
     settings: vkbloom.Settings,
 ) -> None:
-    """Give the image IN bloom and write it to OUT.
+    """Add bloom to the image IN and write the result to OUT.
 
-    The formats are those of OpenImageIO, by extension: OpenEXR, Radiance HDR, PNG, JPEG, TIFF and
-    others.
+    The file extension chooses the format: every format of OpenImageIO, such as OpenEXR, Radiance
+    HDR, PNG, JPEG and TIFF.
 
-    Colours are linear while they bloom. Files of 8 or 16 bit integers are decoded from sRGB to
-    32-bit floats, unless they say that they are linear. Files of floats are taken as linear;
-    half stays half, and float stays float. --input-colour says otherwise.
+    Bloom is computed on linear colours. Files of 8-bit or 16-bit integers are decoded from sRGB
+    to 32-bit floats, unless the file says that it is linear. Files of floats are read as linear;
+    half stays half, and float stays float. --input-colour overrides this.
 
-    OUT holds the same numbers as IN, or the next best that its format has: a PNG of a float image
+    OUT has the number type of IN, or the closest one that its format has: a PNG of a float image
     has 8 bits. Integers are encoded to sRGB and clipped to 0..1; floats (as in OpenEXR and
-    Radiance HDR) are written linear. --output-colour says otherwise. With an --encoding, the
-    values are encoded already and written as they come.
+    Radiance HDR) are written linear. --output-colour overrides this. With --encoding, the values
+    are already encoded and are written unchanged.
 
-    Alpha is kept, and colours are neither multiplied nor divided by it. Grey images become RGB
-    and grey again. Of an OpenEXR file whose data window is smaller than its display window, the
-    rest is black; a larger data window takes part, and is kept where OUT can have one. Images
-    are turned upright where the file has an orientation. Of files with several parts the first
-    is read, or --subimage; channels other than R, G, B and A are left out.
+    Alpha is kept, and colours are neither multiplied nor divided by it. A grey image is processed
+    as RGB and written as grey. If the data window of an OpenEXR file is smaller than its display
+    window, the rest is black; pixels outside the display window are included, and kept if the
+    format of OUT has a data window. An image whose file has an orientation is turned upright. If
+    a file has several parts, the first is read; --subimage chooses another. Channels other than
+    R, G, B and A are ignored.
 
-    OUT is replaced when it is complete; nothing is left of one that failed.
+    OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
     """
     if raw and (input_colour or output_colour):
         raise click.UsageError(
-            "--raw leaves colours as they are, so neither --input-colour nor "
-            "--output-colour goes with it"
+            "--raw does not convert colours; leave out --input-colour and --output-colour"
         )
     if settings.encoding != "none" and output_colour:
         raise click.UsageError(
-            f"the encoding {settings.encoding} says what the output's colours are, so "
-            "--output-colour does not go with it"
+            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
         )
-    with blaming_the_call():
+    with as_wrong_use():
         image_writing.check_writable(target)
     picture = read_picture(source, subimage, input_colour, raw=raw)
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
         click.echo(f"Rendering on {renderer.info.summary}")
         names = [name for name in attachments.split(",") if name != "final"]
-        with blaming_the_call():
+        with as_wrong_use():
             frames = renderer.apply(
                 picture.pixels,
                 settings,
@@ -125,7 +125,7 @@ def command(
 
 
 def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
-    """Write all framebuffers but final, each into a file of its own."""
+    """Write each framebuffer except `final` to its own file."""
     written: list[Path] = []
     for name, array in frames.items():
         if name != "final":
@@ -141,6 +141,6 @@ def _result(
     final: NDArray[Any],
     encoding: Encoding,
 ) -> Picture:
-    """Return the picture with its bloom, encoded or as it came."""
+    """Return the picture with its bloom, with the encoding that its pixels now have."""
     done = picture.encoding if encoding == "none" else encoding
     return dataclasses.replace(picture, pixels=final, encoding=done)

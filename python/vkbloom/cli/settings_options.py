@@ -1,4 +1,4 @@
-"""The options that choose a bloom: ``--method``, ``--preset``, and each field of the settings."""
+"""The options of the settings: ``--method``, ``--preset``, and one for each field."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import click
 
 import vkbloom
 from vkbloom.cli import fields
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 
-#: The settings of each method, by its name.
+#: Settings class of each method, by the method's name.
 METHODS: Final[dict[str, type[vkbloom.Settings]]] = {
     kind.method: kind for kind in vkbloom.Settings.__subclasses__()
 }
@@ -20,12 +20,12 @@ _DEFAULT_METHOD: Final = vkbloom.Separable.method
 
 
 def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of the settings to a command, which gets them as `settings`."""
+    """Add the options of the settings to a command; its argument `settings` has the result."""
 
     @click.option(
         "--preset",
         type=click.Choice(list(vkbloom.presets)),
-        help="Settings to begin with, under the name of where they were published.",
+        help="Published settings to start from; other options change them.",
     )
     @click.option(
         "--method",
@@ -48,7 +48,7 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _settings(preset: str | None, method: str | None, changes: dict[str, Any]) -> vkbloom.Settings:
-    """Return the settings that the options ask for.
+    """Make settings from the options.
 
     Raises
     ------
@@ -57,10 +57,12 @@ def _settings(preset: str | None, method: str | None, changes: dict[str, Any]) -
     """
     begun = METHODS[method or _DEFAULT_METHOD]() if preset is None else vkbloom.presets[preset]
     if method not in (None, begun.method):
-        raise click.UsageError(f"--preset {preset} is of the method {begun.method}, not {method}")
+        raise click.UsageError(
+            f"--method: the preset {preset} has the method {begun.method}, not {method}"
+        )
     foreign = [name for name in changes if name not in begun.as_dict()]
     if foreign:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
         raise click.UsageError(f"the method {begun.method} has no {names}")
-    with blaming_the_call():
+    with as_wrong_use():
         return begun.replace(**changes)

@@ -1,4 +1,4 @@
-"""What a grid is made of: a scene, an image or several images, driven through a renderer."""
+"""The source of a grid: a scene, an image or several images."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class FrameRenderer(Protocol):
         *,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Give an image bloom with one settings after the other."""
+        """Add bloom to an image with each of the settings."""
 
     def render_many(
         self,
@@ -72,7 +72,7 @@ class FrameRenderer(Protocol):
         time: float,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Render a scene with one settings after the other."""
+        """Render a scene with each of the settings."""
 
     def _survey_apply(self, image: NDArray[Any], settings: Settings) -> Framebuffers:
         """Return shape and dtype of all framebuffers that `apply` would give."""
@@ -89,20 +89,20 @@ def visit(
     points: Iterable[Point],
     attachments: str | Sequence[str],
 ) -> Iterator[tuple[Index, Frames]]:
-    """Render points in their order.
+    """Render points in the given order.
 
     Parameters
     ----------
     renderer : FrameRenderer
     source : Source
     points : iterable of Point
-        Drawn as they are needed, some ahead.
+        Consumed as needed, with some read-ahead.
     attachments : "all" or sequence of str
 
     Yields
     ------
     (tuple of int, Frames)
-        The index of each point, and its frames.
+        Index and frames of each point.
     """
     for place, group in itertools.groupby(points, key=lambda point: point.place):
         drawn: deque[Index] = deque()
@@ -111,7 +111,7 @@ def visit(
 
 
 def _noted(points: Iterable[Point], drawn: deque[Index]) -> Iterator[Settings]:
-    """Yield the settings of points, whose indices are noted as they are drawn."""
+    """Yield the settings of points, and append the index of each to `drawn`."""
     for point in points:
         drawn.append(point.index)
         yield point.settings
@@ -122,7 +122,7 @@ class ImageSource:
 
     has_time = False
     shading = "image"
-    #: Of points where no axis gives another.
+    #: Image of the points if there is no axis of images.
     place = 0.0
 
     def __init__(self, images: Sequence[NDArray[Any]], labels: tuple[Any, ...] = ()) -> None:
@@ -136,7 +136,7 @@ class ImageSource:
         place: float,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Yield the frames of some settings on one image."""
+        """Yield the frames of one image with each of the settings."""
         return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
 
     def survey(self, renderer: FrameRenderer, settings: Settings, place: float) -> Framebuffers:
@@ -160,7 +160,7 @@ class ImageSource:
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
-        """What identifies the source: shapes, dtypes and digests."""
+        """The identity of the source: shapes, dtypes and digests."""
         return {
             "kind": "image",
             "images": [
@@ -191,7 +191,7 @@ class SceneSource:
         place: float,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Yield the frames of some settings at one time."""
+        """Yield the frames of the scene at one time with each of the settings."""
         return renderer.render_many(
             self.scene,
             settings,
@@ -215,7 +215,7 @@ class SceneSource:
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
-        """What identifies the source: size, shading, time and a digest of the scene."""
+        """The identity of the source: size, shading, time and a digest of the scene."""
         return {
             "kind": "scene",
             "sha256": digest(self.scene),
@@ -229,18 +229,18 @@ Source: TypeAlias = ImageSource | SceneSource
 
 
 def read_source(source: object, size: tuple[int, int] | None, shading: str, time: float) -> Source:
-    """Check what a grid shall be made of.
+    """Check the source of a grid.
 
     Parameters
     ----------
     source : Scene, ndarray, or list or mapping of ndarray
         A mapping gives the images' labels.
     size : (int, int), optional
-        Of a scene's frame, by default (1280, 720). Images have their own.
+        Size of a scene's frame; default (1280, 720). Images have their own size.
     shading : {"forward", "deferred"}
-        Of a scene.
+        Shading of a scene.
     time : float
-        Of a scene, in turns.
+        Time of a scene's animation; its period is 1.
 
     Returns
     -------
@@ -249,7 +249,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     Raises
     ------
     TypeError, ValueError
-        The source is none of these, or an argument does not belong to it.
+        The source is something else, or an argument does not apply to it.
     """
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
@@ -264,7 +264,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         ("time", time != 0.0),
     ):
         if is_given:
-            raise ValueError(f"{name}: only scenes have one, an image is given")
+            raise ValueError(f"{name}: the source is not a scene; leave the argument out")
     if isinstance(source, np.ndarray):
         return ImageSource([check_image(source)])
     labels: list[Any]
@@ -274,7 +274,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         images, labels = list(source), list(range(len(source)))
     else:
         raise TypeError(
-            f"source: a Scene, an image or a list of images is needed, not {type(source).__name__}"
+            f"source: {type(source).__name__} is not a Scene, an image or a list of images"
         )
     if not images:
         raise ValueError("source: the list of images is empty")
@@ -282,7 +282,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
 
 
 def digest(value: object) -> str:
-    """Return a SHA-256 of plain values, arrays, and dataclasses of such."""
+    """Return the SHA-256 of plain values, arrays, and dataclasses and sequences of them."""
     found = hashlib.sha256()
 
     def add(part: object) -> None:
@@ -291,7 +291,7 @@ def digest(value: object) -> str:
             found.update(np.ascontiguousarray(part).data)
         elif dataclasses.is_dataclass(part):
             for field in dataclasses.fields(part):
-                # Fields that are no arguments, such as a serial number, say nothing.
+                # Fields that are not arguments, such as a serial number, are not content.
                 if field.init:
                     found.update(f"{field.name}:".encode())
                     add(getattr(part, field.name))

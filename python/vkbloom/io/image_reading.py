@@ -1,4 +1,4 @@
-"""Image files read: what they hold, and the linear values that bloom is made of."""
+"""Read image files, and decode them to the linear values that bloom is computed from."""
 
 from __future__ import annotations
 
@@ -31,55 +31,54 @@ if TYPE_CHECKING:
 __all__ = ["check_plausible", "decode", "load", "opened"]
 
 _LARGEST_SIDE: Final = 65536
-# What the largest texture of 16384 x 16384 holds; keeps a damaged header from being taken at
-# its word.
+# Pixels of the largest texture, 16384 x 16384. A damaged header may claim more.
 _LARGEST_AREA: Final = 1 << 28
-# So many bytes of pixels need a file that could hold them. Deflate, which PNG, TIFF and OpenEXR
-# have, makes 1032 bytes of one at the most (RFC 1951: 258 of two bits).
+# Above this size in bytes, the pixels must be plausible for the size of the file. Deflate, which
+# PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
-# That are listed. Some files have thousands, and each takes time.
+# Number of listed parts. Some files have thousands, and reading each header takes time.
 _MOST_PARTS: Final = 100
 
 
 @contextmanager
 def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
-    """Open an image file for as long as the context lasts.
+    """Open an image file; the context closes it.
 
     Parameters
     ----------
     path : str or path-like
-        Of any format that OpenImageIO reads.
+        A file of any format that OpenImageIO reads.
     purpose : str
-        What needs OpenImageIO, as the subject of the message where it is missing.
+        What needs OpenImageIO; the subject of the message if it is missing.
 
     Yields
     ------
     OpenImageIO.ImageInput
-        It gives colours as they are stored, not multiplied by alpha.
+        The open file. Colours are read as stored, not multiplied by alpha.
 
     Raises
     ------
     OSError
-        The file is not there, or cannot be opened; it names the file.
+        The file does not exist or cannot be opened; the error names it.
     ValueError
-        The file is no image, or its name not UTF-8; it names the file.
+        The file is not an image, or its name is not UTF-8; the error names it.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
     oiio = import_extra("OpenImageIO", "images", purpose)
     name = os.fspath(path)
     check_name(name)
-    # OpenImageIO says the same of missing and of damaged files; this has the system's own reason.
+    # OpenImageIO reports missing and damaged files alike; this raises the system's own reason.
     with open(name, "rb"):
         pass
-    # Without this, colours would be multiplied by alpha where the file has them plain.
+    # Otherwise OpenImageIO multiplies straight colours by alpha.
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
     reader = oiio.ImageInput.open(name, plain)
     if reader is None:
         reason = failure_of(oiio) or "unknown format"
-        raise ValueError(f"{name}: not an image that can be read: {reason}")
+        raise ValueError(f"{name}: is not a readable image: {reason}")
     try:
         yield reader
     finally:
@@ -88,7 +87,7 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
 
 
 def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -> None:
-    """Raise ValueError where a file is far too short for the pixels that its header promises."""
+    """Raise ValueError if a file is far too short for the pixels that its header claims."""
     size = spec.image_bytes()
     if size > max(_LARGE, _LARGEST_RATIO * os.path.getsize(path)):
         raise ValueError(
@@ -103,9 +102,9 @@ def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     Parameters
     ----------
     path : str or path-like
-        Of any format that OpenImageIO reads.
+        A file of any format that OpenImageIO reads.
     subimage : int, default 0
-        Which part of a file that has several (OpenEXR, TIFF, GIF), from 0 on.
+        Index of the part of a file with several parts (OpenEXR, TIFF, GIF).
 
     Returns
     -------
@@ -114,10 +113,10 @@ def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     Raises
     ------
     OSError
-        The file is not there, or cannot be opened; it names the file.
+        The file does not exist or cannot be opened; the error names it.
     ValueError
-        The file is damaged or no image, has no such part, is no flat image of 8 or 16 bit
-        integers or floats, or its name is not UTF-8; it names the file.
+        The file is damaged or not an image, has no such part, is not a flat image of 8-bit or
+        16-bit integers or floats, or its name is not UTF-8; the error names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
@@ -130,36 +129,39 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
         count = 0
         while reader.seek_subimage(count, 0):
             count += 1
-        raise ValueError(f"{name}: there is no part {subimage}, only 0 to {count - 1}")
+        raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
     spec = reader.spec()
     if spec.deep or spec.depth > 1:
-        raise ValueError(f"{name}: a flat image is needed, not a deep one or a volume")
+        raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
     stored_as = str(spec.format)
     if stored_as not in DTYPES:
         raise ValueError(
-            f"{name}: holds numbers of {stored_as}; 8 or 16 bit unsigned integers or floats are "
-            "needed"
+            f"{name}: numbers of {stored_as} are not supported; use unsigned integers of 8 or 16 "
+            "bits, or floats"
         )
     display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     left, top = min(spec.x, display[0]), min(spec.y, display[1])
     width = max(spec.x + spec.width, display[0] + display[2]) - left
     height = max(spec.y + spec.height, display[1] + display[3]) - top
     if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
-        raise ValueError(f"{name}: {width} x {height} pixels are too many")
+        raise ValueError(
+            f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
+            f"{_LARGEST_AREA} in all"
+        )
     check_plausible(spec, name)
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
-    # Of a JPEG that was cut off there are pixels, and an error.
+    # A truncated JPEG gives pixels and an error.
     reason = failure_of(reader)
     if data is None or reason:
         raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
     pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
     if pixels.shape[:2] != (height, width):
         row, column = spec.y - top, spec.x - left
-        whole = np.zeros((height, width, spec.nchannels), dtype)
-        whole[row : row + spec.height, column : column + spec.width] = pixels
-        pixels = whole
+        padded = np.zeros((height, width, spec.nchannels), dtype)
+        padded[row : row + spec.height, column : column + spec.width] = pixels
+        pixels = padded
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
         x, y = display[0] - left, display[1] - top
@@ -191,7 +193,7 @@ def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
 
 
 def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Undo an orientation of TIFF 6.0 (also Exif), 1 to 8: where the first row and column are."""
+    """Undo an orientation of TIFF 6.0 and Exif, 1 to 8: the sides of the first row and column."""
     if orientation in (5, 6, 7, 8):
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
@@ -202,51 +204,53 @@ def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
 
 
 def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = False) -> Picture:
-    """Make a picture of linear values out of what a file holds.
+    """Decode a stored image to a picture of linear values.
 
     Parameters
     ----------
     stored : StoredImage
     colour : {"linear", "srgb"}, optional
-        What the colours in the file are. By default floats are linear, and integers sRGB unless
+        Encoding of the colours in the file. Default: floats are linear; integers are sRGB unless
         the file says that they are linear.
     raw : bool, default False
-        Leave 8-bit values as they are.
+        Whether to keep 8-bit values without decoding.
 
     Returns
     -------
     Picture
-        Of float16 where the file has half, of float32 for all else; of uint8 if `raw`. Colours
-        are neither multiplied nor divided by alpha.
+        float16 if the file has half, otherwise float32; uint8 if `raw`. Colours are neither
+        multiplied nor divided by alpha.
 
     Raises
     ------
     ValueError
-        The channels are neither RGB, RGBA, grey nor grey with alpha; `raw` and the file does not
-        hold 8-bit integers, or `colour` is given as well.
+        The channels are not RGB, RGBA, grey or grey with alpha; or `raw` is set and the file does
+        not have 8-bit integers, or `colour` is given as well.
     """
     if raw and colour is not None:
-        raise ValueError(f"colour: {colour!r} has no meaning for raw values")
+        raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
     chosen, left_out = _chosen_channels(stored.channels)
     values = stored.pixels[:, :, chosen]
     kinds = {stored.numbers[index] for index in chosen}
     numbers = kinds.pop() if len(kinds) == 1 else "float"
     if raw and numbers != "uint8":
-        raise ValueError(f"raw: 8-bit integers are needed, not {numbers}")
+        raise ValueError(f"raw: {numbers} is not an 8-bit integer type")
     if numbers == "half":
-        # Another channel may have made the whole file float.
+        # OpenImageIO reads all channels as float if another channel is float.
         values = values.astype(np.float16, copy=False)
     notes = [f"left out the channels {', '.join(left_out)}"] if left_out else []
     encoding: Encoding | None = None
     if not raw:
         encoding = colour or _encoding_given_by(stored, values.dtype)
         if stored.space not in ("", *SPACES.values()) or stored.space == SPACES["gamma22"]:
-            notes.append(f"the file says {stored.space} of its colours; taken as {encoding}")
+            notes.append(
+                f"the file's colour space is {stored.space}; its colours are read as {encoding}"
+            )
         elif values.dtype.kind == "f" and stored.space == SPACES["srgb"] and colour is None:
-            notes.append("the file says srgb of its colours, which as floats are taken as linear")
+            notes.append("the file's colour space is srgb, but floats are read as linear")
         values = _linear(values, encoding, len(chosen) in (2, 4))
         if encoding != "srgb":
-            # A profile of what will be encoded otherwise.
+            # The ICC profile describes another encoding than the one that will be written.
             kept = {
                 name: stored.attributes[name]
                 for name in KEPT_ATTRIBUTES
@@ -268,9 +272,9 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
 
 
 def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
-    """Return the places of the colour and alpha, and the names of the channels left out."""
+    """Return the indices of the colour and alpha channels, and the names of the others."""
     layers = {name.rpartition(".")[0] for name in names}
-    # One layer's name before every channel says nothing.
+    # Remove the layer's name if all channels have the same one.
     plain = [name.rpartition(".")[2] if len(layers) == 1 else name for name in names]
     places = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
     alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
@@ -280,8 +284,8 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
         chosen = [index for index in range(len(names)) if index not in alpha] + alpha
     else:
         raise ValueError(
-            f"the channels are {', '.join(names)}; R, G, B or one, with or without alpha, are "
-            "needed"
+            f"the channels {', '.join(names)} are not R, G, B or a single one, with or without "
+            "alpha"
         )
     return chosen, [name for index, name in enumerate(names) if index not in chosen]
 
@@ -300,7 +304,7 @@ def _linear(values: NDArray[Any], encoding: Encoding, has_alpha: bool) -> NDArra
         with np.errstate(over="ignore"):
             linear[:, :, :colours] = decode_srgb(linear[:, :, :colours])
             return linear.astype(values.dtype)
-    # By table: exact for each of the few values that there are.
+    # A table with one entry per integer value, computed in float64.
     scale = np.iinfo(values.dtype).max
     plain = np.arange(scale + 1) / scale
     table = (decode_srgb(plain) if encoding == "srgb" else plain).astype(np.float32)

@@ -248,7 +248,7 @@ class ReferenceFolder:
 
     def _write_list(self, name: str, references: Sequence[Mapping[str, Any]]) -> None:
         text = json.dumps({"format": _FORMAT, "references": references}, indent=2)
-        safe_writing.write_whole(self.file(name), f"{text}\n".encode())
+        safe_writing.write_file(self.file(name), f"{text}\n".encode())
 
 
 def check_name(name: str) -> None:
