@@ -1,12 +1,27 @@
 // Every parameter of the pipeline, declared once.
 //
-// GLSL expands a block's rows into a std140 uniform block (block.glsl), C expands the same rows
-// into the matching struct and into the table of names, defaults and ranges that Python builds
-// its settings from (csrc/params.c). A row names its block B and is one of
+// SETTING_ROWS, COUNT_ROWS and REAL_ROWS are the numbers that a user sets: C makes struct vkb_values
+// of them and the table of names, defaults and ranges that Python builds its settings from
+// (csrc/graph/params.c). Each pass has a block of parameters: GLSL expands its rows into a std140
+// uniform block (block.glsl), C into the matching struct. A row names its block B and is one of
 //
-//   SETTING(B, name, default, min, max)   a float that the user sets, a field of the settings
-//   INPUT(B, type, name)                  a float or int that the core fills in for each pass
-//   VEC4S(B, name, count)                 an array of vec4 that the core fills in for each pass
+//   READS(B, name)         a setting of SETTING_ROWS, which the pass is out of date without
+//   INPUT(B, type, name)   a float or int that the core fills in for each pass
+//   VEC4S(B, name, count)  an array of vec4 that the core fills in for each pass
+//
+// A block of a fused pass has the rows of the passes that it stands for.
+
+// The settings that shaders read, and `radius`: floats, SETTING(name, default, min, max).
+#define SETTING_ROWS(SETTING) \
+    SETTING(threshold, 0.0, 0.0, 65504.0) \
+    SETTING(knee, 0.0, 0.0, 1.0) \
+    SETTING(radius, 1.0, 0.0, 16.0) \
+    SETTING(highlight, 1000.0, 10.0, 65504.0) \
+    SETTING(clamp_max, 65472.0, 0.0, 65504.0) \
+    SETTING(smooth_width, 0.01, 0.0001, 65504.0) \
+    SETTING(offset, 1.0, 0.0, 16.0) \
+    SETTING(intensity, 1.0, 0.0, 65504.0) \
+    SETTING(exposure, 0.0, -32.0, 32.0)
 
 // Of a pass that reads an image of another size: the size of its own target, and the largest value
 // that the target's format holds.
@@ -15,23 +30,29 @@
     INPUT(B, int, target_height) \
     INPUT(B, float, limit)
 
-#define THRESHOLD_ROWS(B, SETTING) \
-    SETTING(B, threshold, 0.0, 0.0, 65504.0) \
-    SETTING(B, knee, 0.0, 0.0, 1.0)
+// Of a pass with a threshold, and of one that makes the finished picture.
+#define THRESHOLD_ROWS(B, READS) \
+    READS(B, threshold) \
+    READS(B, knee)
+#define COMPOSITE_ROWS(B, READS, INPUT) \
+    READS(B, intensity) \
+    READS(B, exposure) \
+    INPUT(B, float, limit) \
+    INPUT(B, int, noise_seed)
 
 // The matrices of a mesh or skybox draw, and the largest value that the colour targets hold; the glow
 // mesh's colours, times their intensity, pass the threshold.
-#define MESH_BLOCK(B, SETTING, INPUT, VEC4S) \
+#define MESH_BLOCK(B, READS, INPUT, VEC4S) \
     VEC4S(B, projection, 4) \
     VEC4S(B, view, 4) \
     VEC4S(B, model, 4) \
     INPUT(B, float, limit) \
     INPUT(B, float, glow_intensity) \
-    THRESHOLD_ROWS(B, SETTING)
+    THRESHOLD_ROWS(B, READS)
 
 // A blur pass: the distances of its taps in texels of the source, and the half-kernel w0.. of what a
 // texel at each tap counts, four to a vec4. `gain` is of a blur in both directions.
-#define BLUR_BLOCK(B, SETTING, INPUT, VEC4S) \
+#define BLUR_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, step_across) \
     INPUT(B, float, step_down) \
     INPUT(B, float, gain) \
@@ -41,79 +62,66 @@
 // The same blur where the source's pixels are the target's: one symmetric kernel on whole texels,
 // from the first tap to the last, then zeros. `origin` is the place of the target's first pixel along the
 // line, in the source's.
-#define LINE_BLOCK(B, SETTING, INPUT, VEC4S) \
+#define LINE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, radius) \
     INPUT(B, int, origin) \
     INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 
 // An image's whole bloom in one pass: threshold, both blurs, composite. Kernels as above.
-#define WHOLE_BLOCK(B, SETTING, INPUT, VEC4S) \
-    INPUT(B, float, threshold) \
-    INPUT(B, float, knee) \
-    INPUT(B, float, intensity) \
-    INPUT(B, float, exposure) \
-    INPUT(B, float, limit) \
-    INPUT(B, int, noise_seed) \
+#define WHOLE_BLOCK(B, READS, INPUT, VEC4S) \
+    THRESHOLD_ROWS(B, READS) \
+    COMPOSITE_ROWS(B, READS, INPUT) \
     INPUT(B, int, down_radius) \
     INPUT(B, int, across_radius) \
     VEC4S(B, down, WHOLE_VEC4S) \
     VEC4S(B, across, WHOLE_VEC4S)
 
 // The reduction of an image to the bloom buffer, with the threshold.
-#define EXTRACT_BLOCK(B, SETTING, INPUT, VEC4S) \
+#define EXTRACT_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
-    THRESHOLD_ROWS(B, SETTING)
+    THRESHOLD_ROWS(B, READS)
 
 // A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
 // the steps the distance of the tent's taps in texels of the smaller level. `taps` are the same
 // weights on whole texels, where a level is exactly twice as large as the one below; the
 // threshold is of a first level that starts from the image itself.
-#define PYRAMID_BLOCK(B, SETTING, INPUT, VEC4S) \
-    SETTING(B, radius, 1.0, 0.0, 16.0) \
+#define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
-    INPUT(B, float, threshold) \
-    INPUT(B, float, knee) \
+    THRESHOLD_ROWS(B, READS) \
     VEC4S(B, taps, 1)
 
 // The end of a pyramid together with the composite.
-#define DOUBLE_FINAL_BLOCK(B, SETTING, INPUT, VEC4S) \
+#define DOUBLE_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, coarse) \
-    INPUT(B, float, intensity) \
-    INPUT(B, float, exposure) \
-    INPUT(B, float, limit) \
-    INPUT(B, int, noise_seed) \
+    COMPOSITE_ROWS(B, READS, INPUT) \
     VEC4S(B, taps, 1)
 
 // The first pass of a published method, from the frame.
-#define PREFILTER_BLOCK(B, SETTING, INPUT, VEC4S) \
+#define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
-    THRESHOLD_ROWS(B, SETTING) \
-    SETTING(B, highlight, 1000.0, 10.0, 65504.0) \
-    SETTING(B, clamp_max, 65472.0, 0.0, 65504.0) \
-    SETTING(B, smooth_width, 0.01, 0.0001, 65504.0)
+    THRESHOLD_ROWS(B, READS) \
+    READS(B, highlight) \
+    READS(B, clamp_max) \
+    READS(B, smooth_width)
 
 // Levels of several sizes into one image, with their weights.
-#define GATHER_BLOCK(B, SETTING, INPUT, VEC4S) \
+#define GATHER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, shares, 2)
 
-#define KAWASE_BLOCK(B, SETTING, INPUT, VEC4S) \
-    SETTING(B, offset, 1.0, 0.0, 16.0) \
+#define KAWASE_BLOCK(B, READS, INPUT, VEC4S) \
+    READS(B, offset) \
     SAMPLING_ROWS(B, INPUT)
 
 // The light of the deferred system.
-#define LIGHTING_BLOCK(B, SETTING, INPUT, VEC4S) INPUT(B, float, limit)
+#define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
 
-#define COMPOSITE_BLOCK(B, SETTING, INPUT, VEC4S) \
-    SETTING(B, intensity, 1.0, 0.0, 65504.0) \
-    SETTING(B, exposure, 0.0, -32.0, 32.0) \
-    INPUT(B, float, limit) \
-    INPUT(B, int, noise_seed)
+#define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
@@ -196,6 +204,29 @@
 
 // The levels that one pass gathers.
 #define GATHERED_LEVELS 5
+
+// The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an int,
+// and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as an image of
+// that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for loops that a compiler
+// can unroll; with EXTRACT, halving starts from the image itself, past the threshold.
+#define SPECIALIZATION_CONSTANTS(CONSTANT) \
+    CONSTANT(0, SAMPLING, sampling) \
+    CONSTANT(1, COMPOSITE, composite) \
+    CONSTANT(2, TONEMAP, tonemap) \
+    CONSTANT(3, ENCODING, encoding) \
+    CONSTANT(4, DITHER, dither) \
+    CONSTANT(5, BLOOM, bloom) \
+    CONSTANT(6, FORMAT, format) \
+    CONSTANT(7, THRESHOLD_MODE, threshold_mode) \
+    CONSTANT(8, THRESHOLDED, thresholded) \
+    CONSTANT(9, ANTI_FLICKER, anti_flicker) \
+    CONSTANT(10, FIREFLY_FILTER, firefly_filter) \
+    CONSTANT(11, DIRECTION, direction) \
+    CONSTANT(12, RADIUS, radius) \
+    CONSTANT(13, ADD_OWN, add_own) \
+    CONSTANT(14, UPSAMPLE, upsample) \
+    CONSTANT(15, EXTRACT, extract) \
+    CONSTANT(16, EMITTERS, emitters)
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -45,7 +45,6 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     PACK(vertex);
     PACK(shader);
     PACK(constants);
-    PACK(constant_count);
     PACK(reads);
     PACK(read_count);
     PACK(loads);
@@ -246,7 +245,6 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
 
     if (pass->target_count > VKB_MAX_TARGETS
         || pass->read_count > (pass->loads ? VKB_MAX_LOADS : VKB_MAX_READS)
-        || pass->constant_count > VKB_MAX_CONSTANTS
         || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
         || (pass->geometry == VKB_GEOMETRY_DISPATCH
             && (pass->target_count != 1 || pass->depth != VKB_NO_IMAGE || pass->blend

@@ -14,7 +14,6 @@ enum {
     // As storage images. With the target one less than the four that every device can bind.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
-    VKB_MAX_CONSTANTS = 7,
 };
 
 #define VKB_NO_IMAGE UINT32_MAX
@@ -56,9 +55,8 @@ struct vkb_pass_row {
     char name[VKB_NAME_SIZE];
     enum vkb_geometry geometry;
     bool textured;  // draws the mesh's triangles that have textures, not those that have none
-    enum vkb_shader vertex, shader;        // a dispatch has no vertex shader
-    int32_t constants[VKB_MAX_CONSTANTS];  // specialization constants 0, 1, ...
-    uint32_t constant_count;
+    enum vkb_shader vertex, shader;  // a dispatch has no vertex shader
+    struct vkb_constants constants;
     uint32_t reads[VKB_MAX_READS];
     uint32_t read_count;
     bool loads;        // a dispatch that reads storage images, without a sampler

@@ -4,15 +4,14 @@
 
 #define SKIP_INPUT(block, type, name)
 #define SKIP_VEC4S(block, name, count)
-#define SETTING_ROW(block, name, initial, low, high) \
-    {#name, VKB_VALUE_FLOAT, offsetof(struct vkb_values, block.name), initial, low, high},
-#define BLOCK_ROWS(block, ROWS) ROWS(block, SETTING_ROW, SKIP_INPUT, SKIP_VEC4S)
+#define SETTING_ROW(name, initial, low, high) \
+    {#name, VKB_VALUE_FLOAT, offsetof(struct vkb_values, name), initial, low, high},
 #define COUNT_ROW(name, initial, low, high) \
     {#name, VKB_VALUE_INT, offsetof(struct vkb_values, name), initial, low, high},
 #define REAL_ROW(name, initial, low, high) \
     {#name, VKB_VALUE_DOUBLE, offsetof(struct vkb_values, name), initial, low, high},
 
-const struct vkb_value_row vkb_value_rows[] = {PARAMETER_BLOCKS(BLOCK_ROWS) COUNT_ROWS(COUNT_ROW)
+const struct vkb_value_row vkb_value_rows[] = {SETTING_ROWS(SETTING_ROW) COUNT_ROWS(COUNT_ROW)
                                                    REAL_ROWS(REAL_ROW)};
 const size_t vkb_value_row_count = sizeof vkb_value_rows / sizeof vkb_value_rows[0];
 
@@ -33,12 +32,12 @@ const size_t vkb_block_sizes[] = {[VKB_BLOCK_NONE] = 0, PARAMETER_BLOCKS(BLOCK_S
 #define PACK(block, name) \
     memcpy(bytes + size, &params->block.name, sizeof params->block.name); \
     size += sizeof params->block.name;
-#define PACK_SETTING(block, name, initial, low, high) PACK(block, name)
-#define PACK_INPUT(block, type, name)                 PACK(block, name)
-#define PACK_VEC4S(block, name, count)                PACK(block, name)
+#define PACK_READS(block, name)        PACK(block, name)
+#define PACK_INPUT(block, type, name)  PACK(block, name)
+#define PACK_VEC4S(block, name, count) PACK(block, name)
 #define PACK_BLOCK(block, ROWS) \
     case VKB_BLOCK_##block: \
-        ROWS(block, PACK_SETTING, PACK_INPUT, PACK_VEC4S) \
+        ROWS(block, PACK_READS, PACK_INPUT, PACK_VEC4S) \
         break;
 
 size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, unsigned char *bytes)
@@ -52,3 +51,24 @@ size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, uns
     }
     return size;
 }
+
+#define READ(block, name) params->block.name = values->name;
+#define READ_BLOCK(block, ROWS) \
+    case VKB_BLOCK_##block: \
+        ROWS(block, READ, SKIP_INPUT, SKIP_VEC4S) \
+        break;
+
+void vkb_params_read(enum vkb_block block, const struct vkb_values *values,
+                     union vkb_params *params)
+{
+    switch (block) {
+    case VKB_BLOCK_NONE:
+        break;
+        PARAMETER_BLOCKS(READ_BLOCK)
+    }
+}
+
+#define CONSTANT_ROW(id, name, member) {id, offsetof(struct vkb_constants, member)},
+
+const struct vkb_constant_row vkb_constant_rows[VKB_CONSTANT_COUNT] = {
+    SPECIALIZATION_CONSTANTS(CONSTANT_ROW)};

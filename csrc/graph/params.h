@@ -6,16 +6,17 @@
 #include "shaders/params.h"
 
 #include <stddef.h>
+#include <stdint.h>
 
 // Where std140 starts an array of vec4.
 #define VKB_VEC4 _Alignas(16) float
 
-#define VKB_MEMBER_SETTING(block, name, initial, low, high) float name;
-#define VKB_MEMBER_INPUT(block, type, name)                 type name;
-#define VKB_MEMBER_VEC4S(block, name, count)                VKB_VEC4 name[count][4];
+#define VKB_MEMBER_READS(block, name)        float name;
+#define VKB_MEMBER_INPUT(block, type, name)  type name;
+#define VKB_MEMBER_VEC4S(block, name, count) VKB_VEC4 name[count][4];
 #define VKB_BLOCK_STRUCT(block, ROWS) \
     struct vkb_##block##_params { \
-        ROWS(block, VKB_MEMBER_SETTING, VKB_MEMBER_INPUT, VKB_MEMBER_VEC4S) \
+        ROWS(block, VKB_MEMBER_READS, VKB_MEMBER_INPUT, VKB_MEMBER_VEC4S) \
     };
 PARAMETER_BLOCKS(VKB_BLOCK_STRUCT)
 
@@ -39,10 +40,11 @@ extern const size_t vkb_block_sizes[];  // bytes of each block's struct
 // no defined value. `bytes` has room for vkb_block_sizes[block]; returns how many were written.
 size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, unsigned char *bytes);
 
-// All settings that are numbers: the blocks side by side, from which a graph copies them to its
-// passes, and those that shape the graph.
+// All settings that are numbers: those that passes read, and those that shape the graph.
 struct vkb_values {
-    PARAMETER_BLOCKS(VKB_BLOCK_MEMBER)
+#define VKB_SETTING_MEMBER(name, initial, low, high) float name;
+    SETTING_ROWS(VKB_SETTING_MEMBER)
+#undef VKB_SETTING_MEMBER
 #define VKB_COUNT_MEMBER(name, initial, low, high) int name;
     COUNT_ROWS(VKB_COUNT_MEMBER)
 #undef VKB_COUNT_MEMBER
@@ -53,8 +55,11 @@ struct vkb_values {
 
 enum vkb_value_type { VKB_VALUE_FLOAT, VKB_VALUE_INT, VKB_VALUE_DOUBLE };
 
-// Where a setting lies in struct vkb_values, its default and its range. A setting that several
-// blocks hold has a row for each.
+// Sets what a block reads of the settings.
+void vkb_params_read(enum vkb_block block, const struct vkb_values *values,
+                     union vkb_params *params);
+
+// Where a setting lies in struct vkb_values, its default and its range.
 struct vkb_value_row {
     const char *name;
     enum vkb_value_type type;
@@ -80,6 +85,23 @@ enum vkb_choice {
 };
 
 extern const struct vkb_choice_row vkb_choice_rows[VKB_CHOICE_COUNT];
+
+// The specialization constants of a pass. All members are 32 bits wide: there is no padding.
+struct vkb_constants {
+#define VKB_CONSTANT_MEMBER(id, name, member) int32_t member;
+    SPECIALIZATION_CONSTANTS(VKB_CONSTANT_MEMBER)
+#undef VKB_CONSTANT_MEMBER
+};
+
+enum { VKB_CONSTANT_COUNT = sizeof(struct vkb_constants) / sizeof(int32_t) };
+
+// By constant, its id and where it lies in the struct.
+struct vkb_constant_row {
+    uint32_t id;
+    uint32_t offset;
+};
+
+extern const struct vkb_constant_row vkb_constant_rows[VKB_CONSTANT_COUNT];
 
 #define VKB_NAME_ENUM(name, value, spelling) name = value,
 enum vkb_composite { COMPOSITE_NAMES(VKB_NAME_ENUM) };

@@ -1,6 +1,7 @@
 // Bevy's bloom. Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016),
 // crates/bevy_post_process/src/bloom: sizes in mod.rs, factors in upsampling_pipeline.rs.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -8,7 +9,7 @@
 static double blend_factor(const struct vkb_settings *settings, uint32_t level, uint32_t count)
 {
     const struct vkb_values *values = &settings->values;
-    const double intensity = values->composite.intensity, high_pass = values->high_pass_frequency;
+    const double intensity = values->intensity, high_pass = values->high_pass_frequency;
     const double x = level / (count - 1.0);
     double boost = 1.0 - pow(1.0 - x, 1.0 / (1.0 - values->low_frequency_boost_curvature));
 

@@ -62,16 +62,14 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
             return false;
     }
     row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, VKB_SHADER_gbuffer_body_frag, 0, 0, &stored);
-    row.constants[0] = emitters;
-    row.constant_count = 1;
+    row.constants.emitters = emitters;
     set_targets(gbuffer, &row);
     if (!vkb_add_mesh(&row, source->body_textured, VKB_SHADER_gbuffer_textured_frag, graph, error))
         return false;
     if (glow == VKB_NO_IMAGE)
         return true;
     row = vkb_fullscreen_row("glow_light", VKB_SHADER_gbuffer_glow_frag, 0);
-    row.constants[0] = emitters;
-    row.constant_count = 1;
+    row.constants.emitters = emitters;
     row.reads[0] = glow;
     row.read_count = 1;
     row.blend = VKB_BLEND_ADD;

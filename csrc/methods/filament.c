@@ -1,6 +1,7 @@
 // Filament's bloom at its low quality. Source: google/filament, filament/src/PostProcessManager.cpp
 // @ 003e5005713c, bloom().
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -34,7 +35,7 @@ static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32
         vkb_prefilter_row(levels, VKB_SHADER_filament_prefilter_frag, from, to);
 
     if (from != levels->source->glow)
-        row.constants[1] = 0;
+        row.constants.thresholded = 0;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

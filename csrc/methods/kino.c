@@ -1,6 +1,7 @@
 // Keijiro Takahashi's KinoBloom, version 2, high quality. Source: keijiro/KinoBloom @ 0a04c43fa47d,
 // Assets/Kino/Bloom/Bloom.cs.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -8,7 +9,7 @@
 // that a blur is as wide in a small frame as in a large one.
 static double choose_sizes(struct vkb_levels *levels)
 {
-    const double radius = levels->settings->values.pyramid.radius;
+    const double radius = levels->settings->values.radius;
     const double lg = log2(levels->source->buffers.height) + radius - 8.0;
     const uint32_t count = (uint32_t)fmin(fmax(trunc(lg), 1.0), VKB_MAX_LEVELS);
     struct vkb_size size = levels->source->buffers;
@@ -30,8 +31,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
         return false;
     struct vkb_pass_row prefilter =
         vkb_prefilter_row(&levels, VKB_SHADER_kino_prefilter_frag, source->glow, from);
-    prefilter.constants[2] = settings->values.anti_flicker;
-    prefilter.constant_count = 3;
+    prefilter.constants.anti_flicker = settings->values.anti_flicker;
     if (!vkb_graph_add_pass(graph, &prefilter, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
@@ -40,8 +40,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
             return false;
         struct vkb_pass_row row =
             vkb_pyramid_row(&levels, VKB_SHADER_box_down_frag, from, levels.downs[level]);
-        row.constants[1] = settings->values.anti_flicker && level == 0;
-        row.constant_count = 2;
+        row.constants.firefly_filter = settings->values.anti_flicker && level == 0;
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

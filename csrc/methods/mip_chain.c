@@ -1,6 +1,7 @@
 // The contract's own chains: the pyramid, which adds each level on the way up, and dual Kawase,
 // which does not.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 static bool add_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
 {
@@ -25,7 +26,7 @@ bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom
     for (uint32_t level = 0; level < levels.count; ++level)
         if (!add_down(&levels, level, error))
             return false;
-    combination.radius = settings->values.pyramid.radius;
+    combination.radius = settings->values.radius;
     combination.gain = 1.0 / levels.count;
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }
@@ -37,12 +38,10 @@ static bool add_kawase(const struct vkb_levels *levels, enum vkb_shader fragment
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
 
     row.block = VKB_BLOCK_kawase;
-    row.params.kawase = (struct vkb_kawase_params){
-        .offset = levels->settings->values.kawase.offset,
-        .target_width = sampling.width,
-        .target_height = sampling.height,
-        .limit = sampling.limit,
-    };
+    vkb_params_read(row.block, &levels->settings->values, &row.params);
+    row.params.kawase.target_width = sampling.width;
+    row.params.kawase.target_height = sampling.height;
+    row.params.kawase.limit = sampling.limit;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

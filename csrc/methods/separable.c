@@ -1,5 +1,6 @@
 // The separable blur: loops of a vertical and a horizontal pass, in layers that are added; or the
 // same kernel as one N x N pass.
+#include "methods/methods.h"
 #include "passes/blur.h"
 
 #include <stdio.h>

@@ -2,7 +2,8 @@
 // com.unity.render-pipelines.universal, BloomPostProcessPass.cs @ 13e28e026298, Bloom.shader
 // @ 00d472fae509; HDRP: com.unity.render-pipelines.high-definition, HDRenderPipeline.PostProcess.cs
 // @ 0148835ea9ba, BloomBlur.compute @ 0e4ca4d79b2c.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // three.js' UnrealBloomPass. Source: mrdoob/three.js, examples/jsm/postprocessing/
 // UnrealBloomPass.js, the form with the kernels of #31528 and the factor of #32517.
-#include "methods/levels.h"
+#include "methods/methods.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -40,7 +41,7 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     for (; levels.count < GATHERED_LEVELS; ++levels.count) {
         const double factor = bloom_factors[levels.count];
         levels.sizes[levels.count] = size = rounded_half(size);
-        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.pyramid.radius;
+        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
     }
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
         return false;

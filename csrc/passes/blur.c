@@ -3,8 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-enum { DIRECTION, RADIUS, SAMPLING, CONSTANT_COUNT };
-
 static bool is_whole(double number)
 {
     return floor(number) == number;
@@ -64,33 +62,32 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
         const double gain = blur->direction == DIRECTION_BOTH ? 1.0 : blur->gain;
         params->weights[i / 4][i % 4] = (float)(gain * moved.weights[i]);
     }
-    row.constants[DIRECTION] = blur->direction;
-    row.constants[RADIUS] = (int32_t)moved.count - 1;
-    row.constants[SAMPLING] =
+    row.constants.direction = blur->direction;
+    row.constants.radius = (int32_t)moved.count - 1;
+    row.constants.sampling =
         same_size && is_whole(params->step_across) && is_whole(params->step_down) ? SAMPLING_WHOLE
         : blur->filter                                                            ? SAMPLING_FILTER
                                                                                   : SAMPLING_FETCH;
-    row.constant_count = CONSTANT_COUNT;
     return row;
 }
 
 bool vkb_is_line_blur(const struct vkb_pass_row *pass)
 {
     return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader == VKB_SHADER_blur_frag
-        && pass->constants[DIRECTION] != DIRECTION_BOTH;
+        && pass->constants.direction != DIRECTION_BOTH;
 }
 
 enum vkb_mode vkb_blur_direction(const struct vkb_pass_row *pass)
 {
-    return (enum vkb_mode)pass->constants[DIRECTION];
+    return (enum vkb_mode)pass->constants.direction;
 }
 
 bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texel_kernel *kernel)
 {
     const struct vkb_blur_params *params = &pass->params.blur;
-    const bool vertical = pass->constants[DIRECTION] == DIRECTION_VERTICAL;
+    const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
     const double step = vertical ? params->step_down : params->step_across;
-    const int taps = pass->constants[RADIUS];
+    const int taps = pass->constants.radius;
 
     if (!is_whole(step) || step < 0.0 || taps * step > limit)
         return false;

@@ -2,7 +2,7 @@
 #ifndef VKB_BLUR_H
 #define VKB_BLUR_H
 
-#include "methods/methods.h"
+#include "passes/pass.h"
 
 // A kernel whose taps lie on the texels of its source.
 struct vkb_texel_kernel {

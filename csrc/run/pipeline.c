@@ -30,12 +30,10 @@ struct pipeline_key {
     uint32_t textured;
     uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
-    uint32_t constant_count;
-    int32_t constants[VKB_MAX_CONSTANTS];
-    uint32_t zero;
+    struct vkb_constants constants;
 };
 _Static_assert(sizeof(struct pipeline_key)
-                   == sizeof(VkRenderPass) + (8 + VKB_MAX_CONSTANTS + 1) * sizeof(uint32_t),
+                   == sizeof(VkRenderPass) + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
@@ -495,15 +493,17 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
                             const struct vkb_pass_row *pass, VkRenderPass render_pass,
                             VkPipeline *pipeline, struct vkb_error *error)
 {
-    VkSpecializationMapEntry map[VKB_MAX_CONSTANTS];
+    VkSpecializationMapEntry map[VKB_CONSTANT_COUNT];
 
-    for (uint32_t i = 0; i < pass->constant_count; ++i)
-        map[i] = (VkSpecializationMapEntry){i, i * (uint32_t)sizeof(int32_t), sizeof(int32_t)};
+    // Those that a shader does not have are ignored.
+    for (uint32_t i = 0; i < VKB_CONSTANT_COUNT; ++i)
+        map[i] = (VkSpecializationMapEntry){vkb_constant_rows[i].id, vkb_constant_rows[i].offset,
+                                            sizeof(int32_t)};
     VkSpecializationInfo constants = {
-        .mapEntryCount = pass->constant_count,
+        .mapEntryCount = VKB_CONSTANT_COUNT,
         .pMapEntries = map,
         .dataSize = sizeof pass->constants,
-        .pData = pass->constants,
+        .pData = &pass->constants,
     };
     if (pass->geometry == VKB_GEOMETRY_DISPATCH)
         return create_compute(device, pipelines, pass, &constants, pipeline, error);
@@ -524,8 +524,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     key.textured = pass->textured;
     key.blend = pass->blend;
     key.target_count = pass->target_count;
-    key.constant_count = pass->constant_count;
-    memcpy(key.constants, pass->constants, sizeof key.constants);
+    key.constants = pass->constants;
     key.render_pass = render_pass;
 
     for (size_t i = 0; i < pipelines->entry_count; ++i)

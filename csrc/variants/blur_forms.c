@@ -20,16 +20,15 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, blur, sizeof row);
-    memset(&row.constants, 0, sizeof row.constants);
+    row.constants = (struct vkb_constants){0};
     memset(&row.params, 0, sizeof row.params);
     vkb_make_dispatch(&row, line_shaders[graph->images[blur->reads[0]].format],
                       vertical ? ROW_INVOCATIONS : ROW_INVOCATIONS * LINE_OUTPUTS,
                       vertical ? LINE_OUTPUTS : 1);
     row.loads = true;
     row.targets[0] = target;
-    row.constants[0] = direction;
-    row.constants[1] = kernel->radius <= LINE_SHORT_RADIUS ? kernel->radius : 0;
-    row.constant_count = 2;
+    row.constants.direction = direction;
+    row.constants.radius = kernel->radius <= LINE_SHORT_RADIUS ? kernel->radius : 0;
     row.block = VKB_BLOCK_line;
     row.params.line.radius = kernel->radius;
     row.params.line.origin = origin;
@@ -88,8 +87,7 @@ bool vkb_add_enlarged(const struct vkb_form_choice *choice, const struct vkb_pas
     struct vkb_pass_row line = line_row(choice->graph, pass, &kernel, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, VKB_SHADER_enlarge_frag, pass->targets[0]);
-    row.constants[0] = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
-    row.constant_count = 1;
+    row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
     row.reads[0] = lines;
     row.read_count = 1;
     row.block = VKB_BLOCK_extract;
@@ -122,8 +120,7 @@ static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row 
                        struct chain *chain)
 {
     *chain = (struct chain){.composite = pass};
-    if (pass->shader != VKB_SHADER_composite_frag || pass->constants[0] == COMPOSITE_OFF
-        || !graph->images[pass->reads[0]].input)
+    if (!vkb_is_composite(pass) || !graph->images[pass->reads[0]].input)
         return false;
     chain->across = blur_of(graph, pass->reads[1], DIRECTION_HORIZONTAL);
     if (chain->across)
@@ -148,16 +145,10 @@ static struct vkb_pass_row whole_row(const struct vkb_form_choice *choice,
     row.read_count = 1;
     row.reads[1] = 0;
     row.alternative = true;
-    row.constants[4] = chain->extract->constants[0];
-    row.constants[5] = vkb_stored_as(choice->device, format);
-    row.constant_count = 6;
     row.block = VKB_BLOCK_whole;
-    params->threshold = chain->extract->params.extract.threshold;
-    params->knee = chain->extract->params.extract.knee;
-    params->intensity = chain->composite->params.composite.intensity;
-    params->exposure = chain->composite->params.composite.exposure;
-    params->noise_seed = chain->composite->params.composite.noise_seed;
-    params->limit = vkb_formats[format].limit;
+    VKB_TAKE_COMPOSITE(&row, whole, chain->composite);
+    VKB_TAKE_THRESHOLD(&row, whole, chain->extract);
+    row.constants.format = vkb_stored_as(choice->device, format);
     params->down_radius = chain->down_kernel.radius;
     params->across_radius = chain->across_kernel.radius;
     memcpy(params->down, chain->down_kernel.weights, sizeof params->down);
@@ -189,7 +180,7 @@ bool vkb_add_from_lines(const struct vkb_form_choice *choice, const struct vkb_p
     const struct vkb_pass_row *enlarging = NULL;
     struct vkb_pass_row row;
 
-    if (pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF)
+    if (vkb_is_composite(pass))
         enlarging = vkb_writer_of(choice->graph, pass->reads[1]);
     *fits = enlarging
          && (enlarging->shader == VKB_SHADER_enlarge_frag
@@ -198,9 +189,9 @@ bool vkb_add_from_lines(const struct vkb_form_choice *choice, const struct vkb_p
         return true;
     memcpy(&row, pass, sizeof row);
     row.reads[1] = enlarging->reads[0];
-    row.constants[4] = BLOOM_LINES;
-    row.constants[5] = vkb_stored_as(choice->device, choice->plain.images[pass->reads[1]].format);
-    row.constant_count = 6;
+    row.constants.bloom = BLOOM_LINES;
+    row.constants.format =
+        vkb_stored_as(choice->device, choice->plain.images[pass->reads[1]].format);
     row.alternative = true;
     return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
         && vkb_add_fullscreen(choice->forms, choice->graph, &row, error);
@@ -223,8 +214,7 @@ bool vkb_add_tiles(const struct vkb_form_choice *choice, const struct vkb_pass_r
         radius *= 2;
     struct vkb_pass_row row = whole_row(choice, &chain);
     vkb_make_dispatch(&row, VKB_SHADER_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
-    row.constants[6] = radius;
-    row.constant_count = 7;
+    row.constants.radius = radius;
     return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -3,7 +3,8 @@
 #ifndef VKB_FORM_H
 #define VKB_FORM_H
 
-#include "methods/methods.h"
+#include "passes/composite.h"
+#include "passes/threshold.h"
 #include "variants/forms.h"
 
 // The choice of forms for one graph: the passes of `plain` to those of `graph`.

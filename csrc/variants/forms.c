@@ -74,7 +74,7 @@ const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_
 {
     const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
 
-    return pass && pass->shader == VKB_SHADER_extract_frag && pass->constants[1] == SAMPLING_WHOLE
+    return pass && vkb_is_extract(pass)
                 && graph->images[pass->reads[0]].format == graph->images[image].format
              ? pass
              : NULL;
@@ -86,26 +86,17 @@ static const enum vkb_shader bright_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(br
 // A composite whose images have one size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF
-        && pass->constants[4] == BLOOM_OWN && vkb_same_size(graph, pass->reads[0], pass->targets[0])
+    return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN
+        && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
         && graph->images[pass->reads[0]].format == graph->images[pass->reads[1]].format;
 }
 
-// An extraction in the image's own size.
-static bool brightens(const struct vkb_pass_row *pass)
-{
-    return pass->shader == VKB_SHADER_extract_frag && pass->constants[1] == SAMPLING_WHOLE;
-}
-
 // A pass that needs the texels at each pixel's own place alone, by a shader that loads them.
-static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t constants)
+static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader)
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * TEXEL_COLUMNS, TEXEL_ROWS);
     row->loads = true;
-    memset(&row->constants[constants], 0,
-           (VKB_MAX_CONSTANTS - constants) * sizeof row->constants[0]);
-    row->constant_count = constants;
 }
 
 bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
@@ -119,9 +110,9 @@ bool vkb_add_fullscreen(enum vkb_forms forms, struct vkb_graph *graph,
         vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
                           PIXEL_INVOCATIONS);
     else if (blends(graph, pass))
-        load_texels(&row, blend_shaders[format], 4);
-    else if (brightens(pass))
-        load_texels(&row, bright_shaders[format], 1);
+        load_texels(&row, blend_shaders[format]);
+    else if (vkb_is_extract(pass))
+        load_texels(&row, bright_shaders[format]);
     return vkb_graph_add_pass(graph, &row, error);
 }
 

@@ -1,7 +1,7 @@
 // Forms of a pyramid's levels that are exactly half or twice as large as the one before.
 #include "variants/form.h"
 
-#include "methods/levels.h"
+#include "passes/levels.h"
 
 #include <string.h>
 
@@ -15,8 +15,7 @@ static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uin
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
     row->loads = true;
-    memset(row->constants, 0, sizeof row->constants);
-    row->constant_count = 0;
+    row->constants = (struct vkb_constants){0};
 }
 
 // Where the larger level is what is extracted of an image: from the image itself, as an alternative
@@ -32,12 +31,10 @@ static bool add_halved_image(const struct vkb_form_choice *choice, const struct 
     memcpy(&row, halving, sizeof row);
     row.reads[0] = extract->reads[0];
     row.alternative = true;
-    row.constants[0] = 1;
-    row.constants[1] = extract->constants[0];
-    row.constants[2] = vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
-    row.constant_count = 3;
-    row.params.pyramid.threshold = extract->params.extract.threshold;
-    row.params.pyramid.knee = extract->params.extract.knee;
+    row.constants.extract = true;
+    row.constants.format =
+        vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
+    VKB_TAKE_THRESHOLD(&row, pyramid, extract);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -69,8 +66,7 @@ bool vkb_add_doubled(const struct vkb_form_choice *choice, const struct vkb_pass
     memcpy(&row, pass, sizeof row);
     load_in_strips(&row, double_shaders[plain->images[pass->reads[0]].format], DOUBLE_COLUMNS,
                    DOUBLE_ROWS);
-    row.constants[0] = pass->constants[1];
-    row.constant_count = 1;
+    row.constants.add_own = pass->constants.add_own;
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -83,9 +79,9 @@ bool vkb_add_doubled_final(const struct vkb_form_choice *choice, const struct vk
     struct vkb_pass_row row;
     struct vkb_double_final_params *params = &row.params.double_final;
 
-    if (pass->shader == VKB_SHADER_composite_frag && pass->constants[0] != COMPOSITE_OFF)
+    if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
-    *fits = up && vkb_doubles(up) && up->constants[1] == 0
+    *fits = up && vkb_doubles(up) && !up->constants.add_own
          && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format;
     if (!*fits)
         return true;
@@ -97,14 +93,10 @@ bool vkb_add_doubled_final(const struct vkb_form_choice *choice, const struct vk
     row.alternative = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
-    row.constants[4] = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
-    row.constant_count = 5;
     row.block = VKB_BLOCK_double_final;
     params->coarse = up->params.pyramid.coarse;
-    params->intensity = pass->params.composite.intensity;
-    params->exposure = pass->params.composite.exposure;
-    params->noise_seed = pass->params.composite.noise_seed;
-    params->limit = vkb_formats[plain->images[pass->targets[0]].format].limit;
+    VKB_TAKE_COMPOSITE(&row, double_final, pass);
+    row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
     memcpy(params->taps, up->params.pyramid.taps, sizeof params->taps);
     return vkb_add_fullscreen(choice->forms, choice->graph, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);

@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.checks import check_number
 from vkbloom.settings import BloomFormat, Composite, Settings, flag_field, number_field
 
 __all__ = ["BevyBloom", "FilamentBloom", "HdrpBloom", "KinoBloom", "UnrealBloom", "UrpBloom"]
@@ -86,7 +85,7 @@ class BevyBloom(Settings):
     method: ClassVar[str] = "bevy"
 
     composite: Composite = "mix"
-    intensity: float = number_field("intensity", default=0.15)
+    intensity: float = number_field("intensity", default=0.15, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     low_frequency_boost: float = number_field("low_frequency_boost")
     low_frequency_boost_curvature: float = number_field("low_frequency_boost_curvature")
@@ -96,7 +95,6 @@ class BevyBloom(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_composite(self, "mix", "add")
-        check_number("intensity", self.intensity, 0, 1)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -137,13 +135,12 @@ class KinoBloom(Settings):
     knee: float = number_field("knee", default=0.5)
     intensity: float = number_field("intensity", default=0.8)
     format: BloomFormat | None = "rgba16float"
-    radius: float = number_field("radius", default=2.5)
+    radius: float = number_field("radius", default=2.5, range=(1, 7))
     anti_flicker: bool = flag_field("anti_flicker")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_composite(self, "add")
-        check_number("radius", self.radius, 1, 7)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -155,7 +152,7 @@ class FilamentBloom(Settings):
     resolution : int
         Height of ``down_0`` before it is floored to a multiple of 16, 16 to 2048.
     levels : int
-        Of the chain, 1 to floor(log2(resolution)) + 1, at which a larger number stops; at most 12.
+        Of the chain, 1 to 12. It ends at floor(log2(resolution)) + 1.
     highlight : float
         Brightness towards which bright colours are compressed, 10 to 65504. Counts with a
         threshold.
@@ -187,9 +184,9 @@ class FilamentBloom(Settings):
     method: ClassVar[str] = "filament"
 
     threshold: float | None = 1.0
-    intensity: float = number_field("intensity", default=0.1)
+    intensity: float = number_field("intensity", default=0.1, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
-    levels: int = number_field("levels")
+    levels: int = number_field("levels", range=(1, 12))
     resolution: int = number_field("resolution", unit="pixel")
     highlight: float = number_field("highlight")
 
@@ -197,8 +194,6 @@ class FilamentBloom(Settings):
         super().__post_init__()
         _check_composite(self, "add")
         _check_no_knee(self)
-        check_number("intensity", self.intensity, 0, 1)
-        check_number("levels", self.levels, 1, 12)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -292,7 +287,7 @@ class HdrpBloom(Settings):
     method: ClassVar[str] = "hdrp"
 
     composite: Composite = "mix"
-    intensity: float = number_field("intensity", default=2**0.2 - 1)
+    intensity: float = number_field("intensity", default=2**0.2 - 1, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     scatter: float = number_field("scatter")
     high_quality_filtering: bool = flag_field("high_quality_filtering")
@@ -301,7 +296,6 @@ class HdrpBloom(Settings):
         super().__post_init__()
         _check_composite(self, "mix")
         _check_no_knee(self)
-        check_number("intensity", self.intensity, 0, 1)
         if self.threshold is not None:
             raise ValueError(
                 f"threshold: {self.threshold!r} is out of range, None, for what HDRP does with a "
@@ -348,11 +342,10 @@ class UnrealBloom(Settings):
     threshold: float | None = 0.0
     intensity: float = number_field("intensity", default=3.0)
     format: BloomFormat | None = "rgba16float"
-    radius: float = number_field("radius", default=0.0)
+    radius: float = number_field("radius", default=0.0, range=(0, 1))
     smooth_width: float = number_field("smooth_width")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_composite(self, "add")
         _check_no_knee(self)
-        check_number("radius", self.radius, 0, 1)

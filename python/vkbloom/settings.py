@@ -24,16 +24,31 @@ BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float"]
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
 
-#: The half-kernel of the forward system: w0 at the centre, w1..w4 on both sides.
+#: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
 
 
-def number_field(name: str, default: float | None = None, unit: str = "1") -> Any:
-    """Declare a number field; the core's table gives its default and range."""
+def number_field(
+    name: str,
+    default: float | None = None,
+    unit: str = "1",
+    range: tuple[float, float] | None = None,
+) -> Any:
+    """Declare a field that is a number in the core's table, which gives its default and range.
+
+    A method whose source has a narrower range gives that one.
+    """
     initial, _, _ = _core.VALUES[name]
     return dataclasses.field(
-        default=initial if default is None else default, metadata={"unit": unit}
+        default=initial if default is None else default, metadata={"unit": unit, "range": range}
     )
+
+
+def field_range(field: dataclasses.Field[Any]) -> tuple[float, float]:
+    """Return the least and the largest value of a field that is a number."""
+    narrowed: tuple[float, float] | None = field.metadata.get("range")
+    _, low, high = _core.VALUES[field.name]
+    return narrowed or (low, high)
 
 
 def flag_field(name: str) -> Any:
@@ -67,8 +82,7 @@ class Settings:
         q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
         max(q, b - threshold) / max(b, 1e-5).
     composite : {"add", "mix", "screen"}
-        How the bloom b is added to the scene s with the intensity i: s + i b; s + (b - s) i; or
-        1 - (1 - s)(1 - i b) with both clamped to 0..1.
+        s + i b; s + (b - s) i; 1 - (1 - s)(1 - i b) with both clamped to 0..1.
     intensity : float
         The i of the composite, 0 to 65504.
     tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
@@ -89,12 +103,11 @@ class Settings:
     bloom_size : (int, int) or None
         Width and height of the bloom buffers in pixels.
     bloom_scale : float
-        Size of the bloom buffers as a fraction of the frame, 0.001 to 4, used if `bloom_size` is
-        None; each side is floored and at least 1. With neither, at a scale of 1, a forward scene
-        has buffers of 256 x 256.
+        The same as a fraction of the frame, 0.001 to 4, where `bloom_size` is None; sides are
+        floored, never under 1. A forward scene with neither (a scale of 1) has 256 x 256.
     format : {"rgba8unorm", "rgba16float", "rgba32float"} or None
-        Format of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images,
-        "rgba16float" for deferred scenes, the image's own format for float images.
+        Of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images,
+        "rgba16float" for deferred scenes, the image's own for float images.
 
     Raises
     ------
@@ -153,8 +166,7 @@ class Settings:
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
         """Check a number and store it as a Python number; NumPy scalars print differently."""
-        _, low, high = _core.VALUES[field.name]
-        number = check_number(field.name, value, low, high)
+        number = check_number(field.name, value, *field_range(field))
         if isinstance(field.default, int):
             integer = int(number)
             if integer != value:
@@ -164,12 +176,12 @@ class Settings:
         object.__setattr__(self, field.name, number)
 
     def _check_name(self, field: str, names: tuple[str, ...]) -> None:
-        """Check a name and store it as a plain str, also if it is of a subclass of str."""
+        """Check a name and store it as a plain str, of whatever class it is."""
         value = getattr(self, field)
-        # Check the type first: `in` would compare an array with a name element by element.
+        # An array compares with a name element by element.
         if not isinstance(value, str) or value not in names:
             raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}")
-        # Not str(value), which gives the member's name for an enum.
+        # Not by str(), which gives an enum's own name.
         object.__setattr__(self, field, names[names.index(value)])
 
     def replace(self, **changes: Any) -> Self:
@@ -246,7 +258,7 @@ class Separable(Settings):
         (scale, strength), 1 to 8 of them, each number 0 to 16. Each layer is a complete blur at
         blur_scale * scale; the blurs are added with their strengths.
     first_tap : {1, 0}
-        First index of the sum. 0: the sum includes the centre, whose weight becomes
+        First index of the sum, 0 or 1. 0: the sum includes the centre, whose weight becomes
         w0 (1 + 2 strength).
     texel : {"own", "x"}
         Step of the vertical pass. "own": 1 / height of the texture; "x": 1 / width, as in the
@@ -316,7 +328,7 @@ class Separable(Settings):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Pyramid(Settings):
-    """A mip chain: downsampled with 13 taps, upsampled with a 3 x 3 tent, the levels added.
+    """A mip chain: 13 taps down, a 3 x 3 tent up, the levels added on the way.
 
     Parameters
     ----------
@@ -327,8 +339,8 @@ class Pyramid(Settings):
     radius : float
         Distance of the tent's taps in texels of the smaller level, 0 to 16.
     firefly_filter : bool
-        Whether the first downsample weights its five 2 x 2 groups by 1 / (1 + luminance of the
-        group's mean), renormalized, so that single bright pixels do not flicker.
+        In the first downsample the five 2 x 2 groups are weighted by 1 / (1 + luminance of the
+        group's mean) and renormalized.
     **settings
         The fields of `Settings`.
 
@@ -342,9 +354,9 @@ class Pyramid(Settings):
     Weights of the downsample: centre 0.125; four diagonals 1 texel away 0.125 each; four axials
     2 texels away 0.0625 each; four diagonals 2 texels away 0.03125 each. Upsample: (1 2 1)^2 / 16,
     up_k = down_k + tent(up_k+1). ``bloom`` is tent(up_0) at every pixel of ``final``, divided by
-    the number of levels, so that a flat image keeps its value. In "rgba8unorm", whose largest
-    value is 1, the up images contain the mean of their levels instead of the sum; ``bloom`` is the
-    same.
+    the number of levels, so that a flat image keeps its value. In "rgba8unorm", which ends at 1,
+    the images on the way up hold the mean of the levels that went into them instead of their sum;
+    the bloom is the same.
 
     Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
     SIGGRAPH 2014.

@@ -1,12 +1,12 @@
-// Expands the rows of params.h into a uniform block and into named constants.
+// Expands the rows of params.h into a uniform block, and into specialization and named constants.
 #include "params.h"
 
-#define MEMBER_SETTING(block, name, initial, low, high) float name;
+#define MEMBER_READS(block, name) float name;
 #define MEMBER_INPUT(block, type, name) type name;
 #define MEMBER_VEC4S(block, name, count) vec4 name[count];
 #define UNIFORM_BLOCK(ROWS) \
     layout(set = 0, binding = 0, std140) uniform Parameters { \
-        ROWS(parameters, MEMBER_SETTING, MEMBER_INPUT, MEMBER_VEC4S) \
+        ROWS(parameters, MEMBER_READS, MEMBER_INPUT, MEMBER_VEC4S) \
     } params
 
 #define CONSTANT_NAME(name, value, spelling) const int name = value;
@@ -15,3 +15,6 @@ TONEMAP_NAMES(CONSTANT_NAME)
 ENCODING_NAMES(CONSTANT_NAME)
 TEXEL_NAMES(CONSTANT_NAME)
 MODE_NAMES(CONSTANT_NAME)
+
+#define SPECIALIZATION_CONSTANT(id, name, member) layout(constant_id = id) const int name = 0;
+SPECIALIZATION_CONSTANTS(SPECIALIZATION_CONSTANT)

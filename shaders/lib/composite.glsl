@@ -1,10 +1,5 @@
 // Scene and bloom, exposure, tone map, encoding, dither. A shader that includes this has intensity,
-// exposure and noise_seed among its parameters, storage.glsl, and these constants.
-
-layout(constant_id = 0) const int COMPOSITE = COMPOSITE_ADD;
-layout(constant_id = 1) const int TONEMAP = TONEMAP_NONE;
-layout(constant_id = 2) const int ENCODING = ENCODING_NONE;
-layout(constant_id = 3) const int DITHER = 0;
+// exposure and noise_seed among its parameters, and storage.glsl.
 
 #include "lib/dither.glsl"
 #include "lib/finite.glsl"

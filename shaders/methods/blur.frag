@@ -8,10 +8,6 @@
 UNIFORM_BLOCK(BLUR_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int DIRECTION = DIRECTION_VERTICAL;
-layout(constant_id = 1) const int RADIUS = 4;
-layout(constant_id = 2) const int SAMPLING = SAMPLING_FILTER;
-
 layout(set = 0, binding = 1) uniform sampler2D source;
 
 #define TARGET_BINDING 2

@@ -8,9 +8,6 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
-layout(constant_id = 4) const int BLOOM = BLOOM_OWN;
-layout(constant_id = 5) const int BLOOM_FORMAT = STORED_SINGLE;
-
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
 
@@ -22,10 +19,10 @@ vec3 bloom_light()
 {
     if (BLOOM == BLOOM_OWN)
         return texelFetch(bloom, PIXEL, 0).rgb;
-    bool floats = BLOOM_FORMAT == STORED_HALF || BLOOM_FORMAT == STORED_SINGLE;
+    bool floats = FORMAT == STORED_HALF || FORMAT == STORED_SINGLE;
     int sampling = floats ? SAMPLING_FETCH : SAMPLING_FILTER;
     vec3 light = sample_bordered(bloom, PIXEL, textureSize(scene, 0), sampling).rgb;
-    return as_stored(light, BLOOM_FORMAT);
+    return as_stored(light, FORMAT);
 }
 
 vec4 shade()

@@ -12,9 +12,6 @@
 UNIFORM_BLOCK(EXTRACT_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int THRESHOLD_MODE = 0;
-layout(constant_id = 1) const int SAMPLING = SAMPLING_FETCH;
-
 layout(set = 0, binding = 1) uniform sampler2D image;
 
 #define TARGET_BINDING 2

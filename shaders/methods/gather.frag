@@ -7,8 +7,6 @@
 UNIFORM_BLOCK(GATHER_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
-
 layout(set = 0, binding = 1) uniform sampler2D level_0;
 layout(set = 0, binding = 2) uniform sampler2D level_1;
 layout(set = 0, binding = 3) uniform sampler2D level_2;

@@ -9,8 +9,6 @@
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
-
 layout(set = 0, binding = 1) uniform sampler2D source;
 
 #define TARGET_BINDING 2

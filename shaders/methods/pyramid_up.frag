@@ -9,10 +9,6 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/doubling.glsl"
 
-layout(constant_id = 0) const int SAMPLING = SAMPLING_FILTER;
-layout(constant_id = 1) const int ADD_OWN = 1;
-layout(constant_id = 2) const int UPSAMPLE = UPSAMPLE_TENT;
-
 layout(set = 0, binding = 1) uniform sampler2D smaller;
 layout(set = 0, binding = 2) uniform sampler2D own;
 

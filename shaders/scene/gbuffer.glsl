@@ -1,8 +1,6 @@
 // The colour targets of the G-buffer pass. A normal of length 0 marks what the light leaves alone:
 // its albedo is its colour.
 
-layout(constant_id = 0) const int EMITTERS = 1;
-
 layout(location = 0) out vec4 albedo;
 layout(location = 1) out vec4 normal;
 layout(location = 2) out vec4 position;

@@ -6,8 +6,6 @@
 UNIFORM_BLOCK(MESH_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int THRESHOLD_MODE = 0;
-
 layout(location = 0) out vec4 colour;
 
 void main()

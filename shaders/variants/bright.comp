@@ -9,8 +9,6 @@
 UNIFORM_BLOCK(EXTRACT_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int THRESHOLD_MODE = 0;
-
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
 layout(set = 0, binding = 2) uniform writeonly image2D target;

@@ -6,8 +6,6 @@
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int ADD_OWN = 1;
-
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D smaller;
 layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D own;

@@ -7,8 +7,6 @@ UNIFORM_BLOCK(DOUBLE_FINAL_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
-layout(constant_id = 4) const int FORMAT = STORED_SINGLE;
-
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D smaller;
 layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D scene;

@@ -10,11 +10,6 @@
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
 
-// From the image itself, past the threshold, in place of what is extracted of it.
-layout(constant_id = 0) const int EXTRACT = 0;
-layout(constant_id = 1) const int THRESHOLD_MODE = 0;
-layout(constant_id = 2) const int FORMAT = STORED_SINGLE;
-
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = 2) uniform writeonly image2D target;

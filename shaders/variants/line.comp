@@ -7,10 +7,6 @@
 UNIFORM_BLOCK(LINE_BLOCK);
 #include "lib/storage.glsl"
 
-layout(constant_id = 0) const int DIRECTION = DIRECTION_VERTICAL;
-// Of a short kernel, whose loops a compiler can unroll then; 0: it is long, and params.radius.
-layout(constant_id = 1) const int RADIUS = 0;
-
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = 2) uniform writeonly image2D target;

@@ -8,9 +8,8 @@ layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
 layout(set = 0, binding = 2) uniform writeonly image2D target;
 
-const int RADIUS = STRIP_RADIUS;
-const int SUMS = 2 * RADIUS;
-const int LOADED = STRIP_COLUMNS + 2 * RADIUS;
+const int SUMS = 2 * STRIP_RADIUS;
+const int LOADED = STRIP_COLUMNS + 2 * STRIP_RADIUS;
 
 void main()
 {
@@ -26,29 +25,29 @@ void main()
     for (int row = 0; row < SUMS; ++row)
         for (int i = 0; i < LOADED; ++i)
             sums[row][i] = vec3(0.0);
-    for (int y = first.y - RADIUS; y < end + RADIUS; ++y) {
+    for (int y = first.y - STRIP_RADIUS; y < end + STRIP_RADIUS; ++y) {
         int row = clamp(y, 0, last.y);
         // In small loops, each of which drivers unroll; in one large one the sums would be memory.
         for (int i = 0; i < LOADED; ++i)
-            line[i] = bright(imageLoad(image, ivec2(clamp(first.x + i - RADIUS, 0, last.x), row)).rgb);
+            line[i] = bright(imageLoad(image, ivec2(clamp(first.x + i - STRIP_RADIUS, 0, last.x), row)).rgb);
         for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
-            line[i] = as_stored(sums[0][i] + down(RADIUS) * added, FORMAT);
+            line[i] = as_stored(sums[0][i] + down(STRIP_RADIUS) * added, FORMAT);
             for (int tap = 1; tap < SUMS; ++tap)
-                sums[tap - 1][i] = sums[tap][i] + down(RADIUS - tap) * added;
-            sums[SUMS - 1][i] = down(RADIUS) * added;
+                sums[tap - 1][i] = sums[tap][i] + down(STRIP_RADIUS - tap) * added;
+            sums[SUMS - 1][i] = down(STRIP_RADIUS) * added;
         }
-        if (y < first.y + RADIUS)
+        if (y < first.y + STRIP_RADIUS)
             continue;
         for (int i = 0; i < STRIP_COLUMNS; ++i) {
             vec3 sum = vec3(0.0);
-            for (int tap = -RADIUS; tap <= RADIUS; ++tap)
-                sum += across(tap) * line[i + RADIUS + tap];
+            for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
+                sum += across(tap) * line[i + STRIP_RADIUS + tap];
             bloom[i] = as_stored(sum, FORMAT);
         }
         for (int i = 0; i < STRIP_COLUMNS; ++i) {
-            ivec2 pixel = ivec2(first.x + i, y - RADIUS);
+            ivec2 pixel = ivec2(first.x + i, y - STRIP_RADIUS);
             if (pixel.x <= last.x)
                 imageStore(target, pixel,
                            finish(imageLoad(image, pixel), bloom[i], pixel));

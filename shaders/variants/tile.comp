@@ -4,8 +4,6 @@
 // memory between the blurs.
 #include "variants/whole.glsl"
 
-layout(constant_id = 6) const int RADIUS = TILE_RADIUS;
-
 const int RUN = TILE_ROWS / TILE_RUNS;
 
 layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;

@@ -8,9 +8,6 @@ UNIFORM_BLOCK(WHOLE_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
-layout(constant_id = 4) const int THRESHOLD_MODE = 0;
-layout(constant_id = 5) const int FORMAT = STORED_SINGLE;
-
 // Whole or not at all, a texel needs no rounding: the image has the format that it would be stored
 // in.
 vec3 bright(vec3 texel)

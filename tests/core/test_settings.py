@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import inspect
 import json
 import math
 import pickle
+import re
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -15,7 +17,8 @@ import numpy as np
 import pytest
 
 import vkbloom
-from vkbloom import TUTORIAL, Separable, Settings, gaussian_weights, presets
+from vkbloom import TUTORIAL, Separable, Settings, _core, gaussian_weights, presets
+from vkbloom.settings import field_range
 
 DEFAULTS = {
     "bloom": True,
@@ -382,3 +385,30 @@ def test_the_outlines_gain() -> None:
     centre, *sides = TUTORIAL
     one_way = centre * (1 + 2 * 1.5) + 2 * 1.5 * sum(sides)
     assert vkbloom.reference.gain(presets["outline"]) == pytest.approx(one_way**2)
+
+
+def documented_range(kind: type[Settings], name: str) -> tuple[float, float] | None:
+    """Return the range that a class's docstring gives a parameter, if it does."""
+    lines = inspect.getdoc(kind).splitlines()  # type: ignore[union-attr]
+    text = ""
+    described = False
+    for line in lines[lines.index("Parameters") + 2 :]:
+        if not line:
+            break
+        if line.startswith(" "):
+            text += f" {line.strip()}" if described else ""
+        else:
+            described = name in line.partition(" : ")[0].split(", ")
+    found = re.search(r"(-?\d[\d.]*) (?:to|or) (-?\d+(?:\.\d+)?)", text)
+    return (float(found[1]), float(found[2])) if found else None
+
+
+@pytest.mark.parametrize("kind", Settings.__subclasses__())
+def test_the_ranges_in_docstrings(kind: type[Settings]) -> None:
+    for field in dataclasses.fields(kind):
+        if field.name not in _core.VALUES or isinstance(field.default, bool):
+            continue
+        own = documented_range(kind, field.name)
+        narrowed = field_range(field) != tuple(_core.VALUES[field.name][1:])
+        assert own is not None or not narrowed, f"{field.name}: {kind.__name__} says no range"
+        assert (own or documented_range(Settings, field.name)) == field_range(field), field.name

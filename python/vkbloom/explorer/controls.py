@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 
 from vkbloom import _core
 from vkbloom.presets import presets
-from vkbloom.settings import Settings
+from vkbloom.settings import Settings, field_range
 from vkbloom.views.descriptions import described_parameters
 
 __all__ = ["METHODS", "as_code", "controls", "settings_from"]
@@ -19,28 +19,22 @@ METHODS: Final[dict[str, type[Settings]]] = {
     kind.method: kind for kind in Settings.__subclasses__()
 }
 
-# Where a slider ends, of fields whose range is wider than what one looks at. A method's own come
-# before those of the field; the number beside the slider takes the whole range.
+# Where a slider ends, of fields whose range is wider than what one looks at; the number beside the
+# slider takes the whole range. A range that a method narrows is its slider's.
 _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
     "threshold": (0, 4),
     "intensity": (0, 4),
-    "bevy.intensity": (0, 1),
-    "filament.intensity": (0, 1),
-    "hdrp.intensity": (0, 1),
     "exposure": (-8, 8),
     "bloom_scale": (0.05, 1),
     "blur_scale": (0.1, 2),
     "blur_strength": (0, 4),
     "radius": (0, 4),
-    "kino.radius": (1, 7),
-    "unreal.radius": (0, 1),
     "offset": (0, 8),
     "highlight": (10, 5000),
     "clamp_max": (0, 100),
     "smooth_width": (0.01, 1),
     "max_mip_dimension": (16, 1024),
     "resolution": (16, 1024),
-    "filament.levels": (1, 12),
     "levels": (1, 10),
     "loops": (1, 8),
     "dither_seed": (0, 100),
@@ -111,8 +105,9 @@ def _control(
         return {"kind": "choice", "choices": choices, "optional": optional}
     if field.name not in _core.VALUES:
         return None
-    _, low, high = _core.VALUES[field.name]
-    start, end = _SLIDERS.get(f"{kind.method}.{field.name}", _SLIDERS.get(field.name, (low, high)))
+    low, high = field_range(field)
+    is_narrowed = field.metadata.get("range") is not None
+    start, end = (low, high) if is_narrowed else _SLIDERS.get(field.name, (low, high))
     if not (_takes(kind, field.name, start) and _takes(kind, field.name, end)):
         return None
     whole = annotation is int

@@ -44,4 +44,18 @@ struct vkb_settings {
     uint32_t layer_count;
 };
 
+static inline bool vkb_is_published(const struct vkb_settings *settings)
+{
+    switch (settings->method) {
+#define VKB_METHOD_CASE(constant, name, published) \
+    case VKB_METHOD_##constant: \
+        return published;
+        VKB_METHODS(VKB_METHOD_CASE)
+#undef VKB_METHOD_CASE
+    case VKB_METHOD_COUNT:
+        break;
+    }
+    return false;
+}
+
 #endif

@@ -1,27 +1,7 @@
-// What the shadings share: their names, and the rows that draw a scene's meshes.
-#include "methods/methods.h"
+#include "passes/scene.h"
 
 #include <stdio.h>
 #include <string.h>
-
-static const struct shading {
-    const char *name;
-    bool (*build)(const struct vkb_settings *, const struct vkb_scene_source *, struct vkb_graph *,
-                  struct vkb_error *);
-} shadings[] = {
-    {"forward", vkb_build_forward},
-    {"deferred", vkb_build_deferred},
-};
-
-bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
-                     const struct vkb_scene_source *source, struct vkb_graph *graph,
-                     struct vkb_error *error)
-{
-    for (size_t i = 0; i < sizeof shadings / sizeof shadings[0]; ++i)
-        if (strcmp(shadings[i].name, shading) == 0)
-            return shadings[i].build(settings, source, graph, error);
-    return vkb_fail(error, VKB_ERROR_VALUE, "shading: there is no %s", shading);
-}
 
 struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source)
 {
@@ -77,12 +57,9 @@ bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_so
         return false;
     struct vkb_pass_row row =
         vkb_scene_row("glow", VKB_GEOMETRY_GLOW, VKB_SHADER_glow_frag, *glow, depth, params);
-    row.constants[0] = threshold;
-    row.constant_count = 1;
+    row.constants.threshold_mode = threshold;
     row.params.mesh.limit = vkb_formats[format].limit;
-    if (threshold != THRESHOLD_NONE) {
-        row.params.mesh.threshold = settings->values.mesh.threshold;
-        row.params.mesh.knee = settings->values.mesh.knee;
-    }
+    if (threshold != THRESHOLD_NONE)
+        vkb_params_read(row.block, &settings->values, &row.params);
     return vkb_add_mesh(&row, source->glow_textured, VKB_SHADER_glow_textured_frag, graph, error);
 }

@@ -1,4 +1,4 @@
-#include "methods/levels.h"
+#include "passes/levels.h"
 
 #include "passes/blur.h"
 
@@ -74,8 +74,7 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_s
     row.reads[0] = from;
     row.read_count = 1;
     // Never the sampler's filter: lavapipe's is good to 8 bits, and the errors of a chain add up.
-    row.constants[0] = SAMPLING_FETCH;
-    row.constant_count = 1;
+    row.constants.sampling = SAMPLING_FETCH;
     return row;
 }
 
@@ -104,20 +103,20 @@ struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_f
     struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_down_frag, from, to);
 
     if (!firefly_filter && is_twice(levels->graph, from, to))
-        row.constants[0] = SAMPLING_WHOLE;
-    row.constants[1] = firefly_filter;
-    row.constant_count = 2;
+        row.constants.sampling = SAMPLING_WHOLE;
+    row.constants.firefly_filter = firefly_filter;
     return row;
 }
 
 bool vkb_halves(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_pyramid_down_frag && pass->constants[0] == SAMPLING_WHOLE;
+    return pass->shader == VKB_SHADER_pyramid_down_frag
+        && pass->constants.sampling == SAMPLING_WHOLE;
 }
 
 bool vkb_doubles(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_pyramid_up_frag && pass->constants[0] == SAMPLING_WHOLE;
+    return pass->shader == VKB_SHADER_pyramid_up_frag && pass->constants.sampling == SAMPLING_WHOLE;
 }
 
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
@@ -127,10 +126,9 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
 
-    row.constants[1] = settings->thresholded;
-    row.constant_count = 2;
+    row.constants.thresholded = settings->thresholded;
     row.block = VKB_BLOCK_prefilter;
-    row.params.prefilter = settings->values.prefilter;
+    vkb_params_read(row.block, &settings->values, &row.params);
     if (!settings->thresholded) {
         row.params.prefilter.threshold = 0.0f;
         row.params.prefilter.knee = 0.0f;
@@ -206,9 +204,8 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     const struct vkb_image_row *smaller = &levels->graph->images[from];
     const struct vkb_image_row *larger = &levels->graph->images[to];
 
-    row.constants[1] = own != VKB_NO_IMAGE;
-    row.constants[2] = kernel;
-    row.constant_count = 3;
+    row.constants.add_own = own != VKB_NO_IMAGE;
+    row.constants.upsample = kernel;
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = own != VKB_NO_IMAGE ? own : from;
     row.read_count = 2;
@@ -220,7 +217,7 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     if (is_twice(levels->graph, to, from) && kernel != UPSAMPLE_CUBIC
         && (kernel == UPSAMPLE_LINEAR
             || (params->step_x == params->step_y && fabsf(params->step_x) <= 1.0f))) {
-        row.constants[0] = SAMPLING_WHOLE;
+        row.constants.sampling = SAMPLING_WHOLE;
         find_up_taps(kernel == UPSAMPLE_TENT ? params->step_x : 0.0, params->taps[0]);
     }
     params->own = (float)own_share;

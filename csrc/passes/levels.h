@@ -3,7 +3,7 @@
 #ifndef VKB_LEVELS_H
 #define VKB_LEVELS_H
 
-#include "methods/methods.h"
+#include "passes/pass.h"
 
 enum { VKB_MAX_LEVELS = 16 };
 

@@ -1,0 +1,52 @@
+#include "passes/pass.h"
+
+#include <stdio.h>
+#include <string.h>
+
+struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target)
+{
+    struct vkb_pass_row row;
+
+    // All of the parameters' union: an initializer would reach its first member only.
+    memset(&row, 0, sizeof row);
+    snprintf(row.name, sizeof row.name, "%s", name);
+    row.geometry = VKB_GEOMETRY_FULLSCREEN;
+    row.vertex = VKB_SHADER_fullscreen_vert;
+    row.shader = fragment;
+    row.targets[0] = target;
+    row.target_count = 1;
+    row.depth = VKB_NO_IMAGE;
+    return row;
+}
+
+struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target)
+{
+    const struct vkb_image_row *row = &graph->images[target];
+
+    return (struct vkb_sampling){
+        .width = (int)row->width,
+        .height = (int)row->height,
+        .limit = vkb_formats[row->format].limit,
+    };
+}
+
+bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)
+{
+    const struct vkb_image_row *first = &graph->images[a], *second = &graph->images[b];
+    return first->width == second->width && first->height == second->height;
+}
+
+bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
+                    struct vkb_size size, bool framebuffer, uint32_t *index,
+                    struct vkb_error *error)
+{
+    struct vkb_image_row row = {
+        .format = format,
+        .width = size.width,
+        .height = size.height,
+        .framebuffer = framebuffer,
+    };
+
+    snprintf(row.name, sizeof row.name, "%s", name);
+    return vkb_graph_add_image(graph, &row, index, error);
+}

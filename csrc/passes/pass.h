@@ -1,0 +1,37 @@
+// What the rows of all passes have in common.
+#ifndef VKB_PASS_H
+#define VKB_PASS_H
+
+#include "graph/graph.h"
+#include "passes/settings.h"
+
+struct vkb_size {
+    uint32_t width, height;
+};
+
+// What a method's rows start from: the glow image and the format of the bloom buffers; they end in
+// an image "bloom" of the final size.
+struct vkb_bloom_source {
+    uint32_t glow;
+    struct vkb_size buffers, final;
+    enum vkb_format format;
+};
+
+// An image that a pass will write.
+bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
+                    struct vkb_size size, bool framebuffer, uint32_t *index,
+                    struct vkb_error *error);
+
+// What SAMPLING_ROWS hold for a pass that writes `target`.
+struct vkb_sampling {
+    int width, height;
+    float limit;
+};
+struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target);
+
+bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
+
+// A row with the defaults of a fullscreen pass; the caller fills in the rest.
+struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target);
+
+#endif

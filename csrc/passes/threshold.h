@@ -1,0 +1,27 @@
+// The threshold pass: what of an image is bright enough, at the size of the bloom buffers.
+#ifndef VKB_THRESHOLD_H
+#define VKB_THRESHOLD_H
+
+#include "passes/pass.h"
+
+enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
+
+// A pass that reduces `image` to the size of `glow` and keeps what the threshold lets through.
+bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
+                     struct vkb_graph *graph, struct vkb_error *error);
+
+// Whether a row is of that pass, and needs the image's texels at each pixel's own place alone.
+bool vkb_is_extract(const struct vkb_pass_row *pass);
+
+// Gives the row of a fused pass, whose block is B, all that the threshold pass has. A block without
+// THRESHOLD_ROWS does not compile.
+#define VKB_TAKE_THRESHOLD(row, B, threshold_pass) \
+    do { \
+        struct vkb_pass_row *const to = (row); \
+        const struct vkb_pass_row *const from = (threshold_pass); \
+        to->constants.threshold_mode = from->constants.threshold_mode; \
+        THRESHOLD_ROWS(B, VKB_TAKE_THRESHOLD_SETTING) \
+    } while (0)
+#define VKB_TAKE_THRESHOLD_SETTING(B, name) to->params.B.name = from->params.extract.name;
+
+#endif
