@@ -72,7 +72,7 @@ class FrameRenderer(Protocol):
         time: float,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Render a scene with each of the settings."""
+        """Render a scene with one settings after the other."""
 
     def _survey_apply(self, image: NDArray[Any], settings: Settings) -> Framebuffers:
         """Return shape and dtype of all framebuffers that `apply` would give."""
@@ -122,7 +122,7 @@ class ImageSource:
 
     has_time = False
     shading = "image"
-    #: Image of the points if there is no axis of images.
+    #: Of points where no axis gives another.
     place = 0.0
 
     def __init__(self, images: Sequence[NDArray[Any]], labels: tuple[Any, ...] = ()) -> None:
@@ -136,7 +136,7 @@ class ImageSource:
         place: float,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Yield the frames of one image with each of the settings."""
+        """Yield the frames of some settings on one image."""
         return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
 
     def survey(self, renderer: FrameRenderer, settings: Settings, place: float) -> Framebuffers:
@@ -160,7 +160,7 @@ class ImageSource:
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
-        """The identity of the source: shapes, dtypes and digests."""
+        """What identifies the source: shapes, dtypes and digests."""
         return {
             "kind": "image",
             "images": [
@@ -191,7 +191,7 @@ class SceneSource:
         place: float,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Yield the frames of the scene at one time with each of the settings."""
+        """Yield the frames of some settings at one time."""
         return renderer.render_many(
             self.scene,
             settings,
@@ -215,7 +215,7 @@ class SceneSource:
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
-        """The identity of the source: size, shading, time and a digest of the scene."""
+        """What identifies the source: size, shading, time and a digest of the scene."""
         return {
             "kind": "scene",
             "sha256": digest(self.scene),
