@@ -102,7 +102,10 @@ class Mean(Reduction):
     --------
     >>> from vkbloom.grid.reductions import Mean
     >>> final = np.full((16, 16, 4), 51, np.uint8)
-    >>> Mean()(vkbloom.Frames({"final": final}, timings={}, settings=vkbloom.Separable(), info={}))
+    >>> frames = vkbloom.Frames(
+    ...     {"final": final}, timings={}, settings=vkbloom.Separable(), info={}
+    ... )
+    >>> round(Mean()(frames), 3)
     0.2
 
     In a grid, without storing frames:
