@@ -111,6 +111,17 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
     """One `vkbloom.Renderer` for the whole process, on the adapter of ``--bloom-adapter``.
 
     No adapter, and another than ``--bloom-expect-adapter`` names, is an error.
+
+    See Also
+    --------
+    frame_regression : Compares what the renderer returns.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> def test_black_stays_black(bloom_renderer):
+    ...     frames = bloom_renderer.apply(np.zeros((16, 16, 4), np.uint8))
+    ...     assert not frames["final"][..., :3].any()
     """
     from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
 
@@ -125,7 +136,22 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
 
 @pytest.fixture
 def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
-    """Compare frames with references: see `vkbloom.testing.FrameRegression.check`."""
+    """Compare frames with references: see `vkbloom.testing.FrameRegression.check`.
+
+    See Also
+    --------
+    vkbloom.testing.FrameRegression : What the fixture gives.
+
+    Examples
+    --------
+    A test that compares every framebuffer with its reference:
+
+    >>> import numpy as np
+    >>> import vkbloom
+    >>> def test_blur(bloom_renderer, frame_regression):
+    ...     image = np.full((16, 16, 4), 0.5, np.float32)
+    ...     frame_regression.check(bloom_renderer.apply(image, vkbloom.Pyramid(levels=2)))
+    """
     from vkbloom.testing.regression import (  # noqa: PLC0415  costs start-up time
         FrameRegression,
         Mode,

@@ -74,10 +74,24 @@ def explore(
     ModuleNotFoundError
         anywidget is not installed: ``pip install vkbloom[notebook]``.
 
+    See Also
+    --------
+    Renderer.grid : Many settings at once.
+
     Notes
     -----
     ``vkbloom explore`` shows the same page without a notebook. A bloom whose reach is given in
     texels looks wider in a reduced frame than in a larger one.
+
+    Examples
+    --------
+    >>> image = np.full((32, 32, 4), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     explorer = vkbloom.explore(image, vkbloom.Pyramid(levels=3), renderer=renderer)
+    ...     explorer.settings = explorer.settings.replace(radius=2.0)
+    ...     print(explorer.settings.radius)
+    ...     explorer.close()
+    2.0
     """
     import_extra("anywidget", "notebook", "explore")
     from vkbloom.explorer.viewer import Viewer  # noqa: PLC0415  needs the renderer's module

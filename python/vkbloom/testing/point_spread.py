@@ -58,6 +58,21 @@ def point_spread(
         A result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or `at` is not in the image.
+
+    See Also
+    --------
+    response : Figures of the point spread, along a parameter.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(weights=(0.5, 0.25), blur_strength=1.0)
+    >>> probe = testing.Probe(size=(9, 9))
+    >>> spread = testing.point_spread(lambda image: reference.blur(image, settings), probe)
+    >>> spread[3:6, 3:6, 0]
+    array([[0.0625, 0.125 , 0.0625],
+           [0.125 , 0.25  , 0.125 ],
+           [0.0625, 0.125 , 0.0625]])
     """
     __tracebackhide__ = True
     return _measured(bloom, probe, at)[0]
@@ -85,6 +100,16 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         The law does not hold, the result is black, or it is not finite.
     TypeError, ValueError
         `bloom` is not such a callable.
+
+    See Also
+    --------
+    point_spread : The image that this law is about.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_separable(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     spread, error = _measured(bloom, probe, None)
@@ -140,6 +165,16 @@ def assert_centroid_kept(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the light reaches the
         border.
+
+    See Also
+    --------
+    assert_symmetric : The law of mirrored images.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_centroid_kept(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     check_number("within", within, 0.0, math.inf)
@@ -195,6 +230,17 @@ def assert_spread(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the light reaches the
         border.
+
+    See Also
+    --------
+    response : Measures sigma along a parameter.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> weights = vkbloom.gaussian_weights(2.0)
+    >>> settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
+    >>> testing.assert_spread(lambda image: reference.blur(image, settings), 2.0)
     """
     __tracebackhide__ = True
     pair = sigma if isinstance(sigma, tuple) else (sigma, sigma)
@@ -245,6 +291,19 @@ class Response:
     at_border : ndarray of float64, shape (N,)
         Share of the light in the outermost pixels: where it is not small, the others are too
         small.
+
+    See Also
+    --------
+    response : Returns it.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image, blur_scale):
+    ...     return reference.blur(image, vkbloom.Separable(blur_scale=blur_scale))
+    >>> found = testing.response(bloom, "blur_scale", [1.0, 2.0])
+    >>> bool(found.sigma[1, 0] > 1.9 * found.sigma[0, 0])
+    True
     """
 
     parameter: str
@@ -305,6 +364,21 @@ def response(
         A result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or there is no value.
+
+    See Also
+    --------
+    point_spread : The image that is measured.
+    assert_spread : Asserts one sigma.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image, sigma):
+    ...     weights = vkbloom.gaussian_weights(sigma)
+    ...     settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
+    ...     return reference.blur(image, settings)
+    >>> testing.response(bloom, "sigma", [1.0, 2.0]).sigma[:, 0].round(1)
+    array([1., 2.])
     """
     __tracebackhide__ = True
     if not len(values):

@@ -62,6 +62,18 @@ class Probe:
     ------
     ValueError, TypeError
         A field is out of range or of another type.
+
+    See Also
+    --------
+    assert_superposition : One of the laws that take a probe.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> probe = testing.Probe(size=(32, 24), dtype="float16", value=4.0)
+    >>> probe.centre
+    (16, 12)
+    >>> testing.assert_gain(lambda image: image, 1.0, probe)
     """
 
     size: tuple[int, int] = (65, 65)

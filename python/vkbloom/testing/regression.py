@@ -25,7 +25,21 @@ __all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
 
 
 class FrameDifferenceWarning(UserWarning):
-    """An image passed, but differs by more than ``warn``."""
+    """An image passed, but differs by more than ``warn``.
+
+    See Also
+    --------
+    Tolerances : Has the limit `warn`.
+
+    Examples
+    --------
+    Make such a warning an error of the test:
+
+    >>> import warnings
+    >>> from vkbloom import testing
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", testing.FrameDifferenceWarning)
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +91,20 @@ class FrameRegression:
     mode : Mode
     records : list of dict
         Where each check leaves what it found.
+
+    See Also
+    --------
+    pytest_vkbloom.frame_regression : The fixture that gives it.
+    Tolerances : The limits of a comparison.
+
+    Examples
+    --------
+    A test in a module ``test_blur.py``, whose references are made by ``pytest --bloom-update``:
+
+    >>> def test_blur(bloom_renderer, frame_regression):
+    ...     image = np.full((16, 16, 4), 0.5, np.float32)
+    ...     frames = bloom_renderer.apply(image, vkbloom.Pyramid(levels=2))
+    ...     frame_regression.check(frames, atol=1e-3)
     """
 
     def __init__(

@@ -63,6 +63,17 @@ class Tolerances:
         A number is out of its range; names the field, the value and the range.
     TypeError
         A field is no number.
+
+    See Also
+    --------
+    FrameRegression.check : Takes the same limits as arguments.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> limits = testing.Tolerances(atol=0.01, fail_percent=0.1, ssim=0.99)
+    >>> limits.metrics
+    ('ssim',)
     """
 
     atol: float | None = None
