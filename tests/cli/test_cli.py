@@ -232,7 +232,7 @@ def test_options_change_a_preset() -> None:
         ("--loops 1.5", "'--loops': '1.5'"),
         ("--loops 0", "loops: 0 is out of range, 1 to 16"),
         ("--weights 1,x", "'--weights': '1,x' is not A,B,..."),
-        ("--layers 1,2", "layers: ((1.0,), (2.0,)) must hold (scale, strength) pairs"),
+        ("--layers 1,2", "layers: ((1.0,), (2.0,)) is not a sequence of pairs (scale, strength)"),
         ("--bloom-size 256", "'--bloom-size': '256' is not WxH|none"),
         ("--bloom-size 0x5", "bloom_size: (0, 5) is out of range"),
         ("--format rgba8", "'--format': 'rgba8' is not rgba8unorm|"),
@@ -265,7 +265,7 @@ def test_a_method_has_no_field_of_another() -> None:
         settings_from("--radius", "2")
     with pytest.raises(click.UsageError, match="the method pyramid has no --blur-scale, --direct"):
         settings_from("--method", "pyramid", "--blur-scale", "2", "--direct", "--levels", "3")
-    with pytest.raises(click.UsageError, match="pyramid is not the method of the preset tutorial"):
+    with pytest.raises(click.UsageError, match="the preset tutorial has the method separable"):
         settings_from("--method", "pyramid", "--preset", "tutorial")
 
 

@@ -289,7 +289,7 @@ class TestColours:
         assert np.isfinite(written).sum() == image.size - 4
         result = run(path, tmp_path / "b.png")
         assert result.exit_code == 0
-        assert "b.png holds integers: NaN is written as 0, infinity as 1" in result.stderr
+        assert "b.png has integers: NaN is written as 0, infinity as 1" in result.stderr
         assert (pixels(tmp_path / "b.png")[0, 0] == 0).all()
 
     def test_nan_of_grey_counts_once(self, tmp_path: Path) -> None:
@@ -345,15 +345,15 @@ class TestErrors:
         [
             ("no.png b.png", 1, "no.png: No such file or directory"),
             (". b.png", 1, ".: Is a directory"),
-            ("bad.png b.png", 1, "bad.png: not an image that can be read"),
-            ("bad.exr b.png", 1, "bad.exr: not an image that can be read"),
+            ("bad.png b.png", 1, "bad.png: is not a readable image"),
+            ("bad.exr b.png", 1, "bad.exr: is not a readable image"),
             ("cut.exr b.png", 1, "cut.exr: damaged"),
-            ("xyz.exr b.png", 1, "xyz.exr: the channels are X, Y, Z; R, G, B or one"),
+            ("xyz.exr b.png", 1, "xyz.exr: the channels X, Y, Z are not R, G, B or a single one"),
             ("a.exr none/b.png", 1, "none/b.png: No such file or directory"),
-            ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold such a picture"),
-            ("a.exr b.png --subimage 1", 1, "a.exr: there is no part 1, only 0 to 0"),
-            ("a.exr b.unknown", 2, "no image format for the extension '.unknown'"),
-            ("a.exr b", 2, "no image format for the extension ''"),
+            ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold this picture"),
+            ("a.exr b.png --subimage 1", 1, "a.exr: subimage 1 is not in 0..0"),
+            ("a.exr b.unknown", 2, "'.unknown' is not the extension of a writable"),
+            ("a.exr b", 2, "'' is not the extension of a writable"),
             ("a.exr", 2, "Missing argument 'OUT'"),
             ("a.exr b.png c.png", 2, "c.png"),
             ("a.exr b.png --blur-scale 17", 2, "blur_scale: 17.0 is out of range, 0 to 16"),
@@ -454,7 +454,7 @@ def test_the_help_tells_of_colours() -> None:
     text = " ".join(CliRunner().invoke(program, ["apply", "--help"]).stdout.split())
     for sentence in (
         "Files of 8-bit or 16-bit integers are decoded from sRGB to 32-bit floats",
-        "Files of floats are taken as linear",
+        "Files of floats are read as linear",
         "Integers are encoded to sRGB and clipped to 0..1",
         "floats (as in OpenEXR and Radiance HDR) are written linear",
         "Alpha is kept",

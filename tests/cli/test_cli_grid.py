@@ -86,7 +86,7 @@ class TestAxes:
             ("blur_scale=0:2:3:lin", "is not NAME=FIRST:LAST:COUNT"),
             ("tonemap=nice", "is not one of"),
             ("blur_scale=1,99", "blur_scale: 99.0 is out of range"),
-            ("loops=1:2:4", "whole number"),
+            ("loops=1:2:4", "is not an integer"),
         ],
     )
     def test_wrong_use_is_one_line(self, tmp_path: Path, word: str, told: str) -> None:
@@ -191,8 +191,8 @@ class TestStores:
             (["--reduce", "mean@blur_scale=1"], "takes no @REFERENCE"),
             (["--reduce", "ssim@blur_scale=3"], "is not a value of the axis"),
             (["--chunk", "blur_scale"], "AXIS=COUNT"),
-            (["--size", "3x3"], "only scenes"),
-            (["--attachments", "none"], "nothing is asked for"),
+            (["--size", "3x3"], "the source is not a scene"),
+            (["--attachments", "none"], "request one of them"),
             (["--sheet", "a.jpg"], "--sheet: a.jpg does not end in .png"),
             (["--curves", "a"], "--curves: a does not end in .png, .svg, .pdf"),
             (
@@ -295,7 +295,7 @@ class TestImageFiles:
         names = sorted(path.name for path in out.iterdir())
         before = load(out / "001_final.exr").pixels
         (out / "001_final.exr").unlink()
-        assert "there is a grid already" in run(*words).stderr
+        assert "already has a grid" in run(*words).stderr
         assert "passes run 0" not in done(*words, "--resume")
         assert sorted(path.name for path in out.iterdir()) == names
         # (Not the bytes of the file, which has the time of its writing in it.)
@@ -310,7 +310,7 @@ class TestImageFiles:
         (tmp_path / "files" / "letter.txt").write_text("dear")
         result = run(image_file, "--axis", "exposure=0", "-o", tmp_path / "files", "--resume")
         assert result.exit_code == 1
-        assert "there is no grid in it" in result.stderr
+        assert "its content is not a grid" in result.stderr
 
     @pytest.mark.parametrize(
         ("content", "told"),
@@ -345,7 +345,7 @@ class TestImageFiles:
         out = tmp_path / "files"
         result = run(image_file, "--axis", "exposure=0", "-o", out, "--image-format", "no")
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
-        assert "no image format for the extension '.no'" in result.stderr
+        assert "'.no' is not the extension of a writable" in result.stderr
         assert not out.exists()
 
 

@@ -645,7 +645,7 @@ class TestCommand:
         [
             ("no.png a.png", 1, "no.png: No such file or directory"),
             ("a.png bad.png", 1, "bad.png: not an image that can be read"),
-            ("a.png b.png --subimage 1", 1, "a.png: there is no part 1, only 0 to 0"),
+            ("a.png b.png --subimage 1", 1, "a.png: subimage 1 is not in 0..0"),
             ("a.png b.png --subimage -1", 2, "--subimage"),
             ("a.png", 2, "Missing argument 'B'"),
             ("a.png b.png --min-ssim 2", 2, "ssim: 2.0 is out of range, -1 to 1"),
