@@ -417,7 +417,7 @@ class TestProbe:
     @pytest.mark.parametrize(
         ("bloom", "error", "message"),
         [
-            (None, TypeError, "is not callable"),
+            (None, TypeError, "None is not callable"),
             (lambda image: {"bloom": image}, TypeError, "it returns a mapping; name the"),
             (lambda image: "text", TypeError, "it returns <U4"),
             (lambda image: image.astype(int), TypeError, "it returns int64"),
