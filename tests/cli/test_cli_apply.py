@@ -304,7 +304,7 @@ class TestColours:
         path = stored(tmp_path / "a.exr", image)
         (line,) = run(path, tmp_path / "b.jpg").stderr.splitlines()
         assert line.startswith("vkbloom: note: ")
-        assert line.endswith("b.jpg has no place for the alpha, which is not 1 everywhere")
+        assert line.endswith("b.jpg cannot hold alpha, which is not 1 everywhere")
 
 
 class TestAttachments:
@@ -458,7 +458,7 @@ def test_the_help_tells_of_colours() -> None:
         "Integers are encoded to sRGB and clipped to 0..1",
         "floats (as in OpenEXR and Radiance HDR) are written linear",
         "Alpha is kept",
-        "OUT is replaced when it is complete",
+        "OUT is replaced only when the new file is complete",
     ):
         assert sentence in text
 

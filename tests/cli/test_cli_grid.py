@@ -318,8 +318,8 @@ class TestImageFiles:
             (b"{", "grid.json: damaged"),
             (b"\xff", "grid.json: damaged"),
             (b"[" * 100_000, "grid.json: damaged"),
-            (b"[]", "another grid is there"),
-            (b'{"settings": 3}', "another grid is there"),
+            (b"[]", "contains another grid"),
+            (b'{"settings": 3}', "contains another grid"),
         ],
         ids=["half", "no text", "deep", "a list", "a number"],
     )
