@@ -1,24 +1,25 @@
-# make demo: sets up what is missing, renders the built-in scene into out/.
-# make test: the same for the tests, and runs them. Both are quick the second time.
-# make check: while you work: lint of the changed files and a fast part of the tests.
-# make docs: the documentation into build/docs; a warning is a failure.
+# make demo: installs what is missing, renders the built-in scene into out/.
+# make test: installs what the tests need, runs all tests. Both are quick the second time.
+# make check: for use during development: lints the changed files, runs a fast part of the tests.
+# make docs: builds the documentation into build/docs; a warning is a failure.
+# make wheels: builds the wheels of vkbloom and of its driver into dist/ (docs/releasing.md); as root.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) setup.py pyproject.toml
 
-# Processes that the tests run in. Fixtures of a file are made once: it stays in one process.
+# Test processes. All tests of a file run in one process, which makes its fixtures once.
 WORKERS := $(shell nproc 2>/dev/null || echo 2)
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
-# Every layer from the arguments to the pictures once, no process or browser of its own, no image of
-# a full frame: what a change of the core or of a method breaks first.
+# The tests that a change of the core or of a method breaks first. They reach every layer, and have no
+# other process, browser or large image.
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
 	tests/core/test_errors.py tests/core/test_frames.py tests/core/test_out_of_date.py \
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test check docs bench lint format sanitize clean
+.PHONY: demo test check docs bench wheels lint format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -27,7 +28,7 @@ demo: build/stamp/core
 test: build/stamp/core build/stamp/test
 	$(PYTHON) -m pytest $(PARALLEL)
 
-# Changed: against the last commit, and files that Git does not know yet.
+# Changed files: those that differ from the last commit, and untracked ones.
 check: build/stamp/core build/stamp/test build/stamp/lint
 	changed=$$(git ls-files --modified --others --exclude-standard --deduplicate -- '*.py' | \
 	    while read -r file; do test ! -e "$$file" || echo "$$file"; done); \
@@ -42,7 +43,11 @@ docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
 
-# BENCH: more options of python -m benchmarks.
+# The build root and Mesa are built once, in build/wheels.
+wheels:
+	packaging/wheels.sh
+
+# BENCH: options for python -m benchmarks.
 bench: build/stamp/core build/stamp/peers
 	$(PYTHON) -m benchmarks --out out/bench.md $(BENCH)
 
@@ -58,7 +63,7 @@ format: build/stamp/lint
 	$(VENV)/bin/ruff format .
 	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/threads/*.c
 
-# The suite once more over a core with ASan, UBSan and LeakSanitizer; threads under ThreadSanitizer.
+# Tests of the core with ASan, UBSan and LeakSanitizer; threads with ThreadSanitizer.
 sanitize: build/stamp/core build/stamp/test
 	PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh
 	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10

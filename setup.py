@@ -79,19 +79,24 @@ def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
     return (*words[:first_type], *decorations, *words[first_type:])
 
 
-def compile_module(module: Module) -> tuple[int, ...]:
-    """Compile one module to its SPIR-V words."""
+def compile_shader(module: Module, target: Path) -> None:
+    """Compile one module, as glslang does, to a file."""
     compiler = shutil.which("glslangValidator") or shutil.which("glslang")
     if compiler is None:
         raise SystemExit(
             "glslangValidator is missing; on Debian or Ubuntu: apt install glslang-tools"
         )
-    target = SPIRV / f"{module.name}.spv"
     command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", *module.options]
     command += ["-o", str(target), str(module.shader)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise SystemExit(f"{module.shader} does not compile:\n{result.stdout}{result.stderr}")
+
+
+def compile_module(module: Module) -> tuple[int, ...]:
+    """Compile one module to its SPIR-V words."""
+    target = SPIRV / f"{module.name}.spv"
+    compile_shader(module, target)
     code = target.read_bytes()
     return without_contraction(struct.unpack(f"={len(code) // 4}I", code))
 
@@ -114,13 +119,16 @@ def write_spirv() -> None:
     for module in built:
         dispatch = f"{module.shader.stem}_dispatch"
         twin = dispatch if dispatch in names else module.name
-        rows += f"    {{{module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n"
+        rows += (
+            f'    {{"{module.name}", {module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n'
+        )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
         "#include <stddef.h>\n#include <stdint.h>\n\n"
         f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
         "// `dispatch`: the same pass as a compute shader, or itself where there is none.\n"
-        "struct vkb_spirv { const uint32_t *code; size_t size; enum vkb_shader dispatch; };\n"
+        "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
+        "    enum vkb_shader dispatch;\n};\n"
         "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
     )
     (SPIRV / "spirv.c").write_text(

@@ -1,7 +1,7 @@
-"""Benchmarks of vkbloom beside its peers: what ``make bench`` runs.
+"""Benchmarks of vkbloom beside other libraries (its peers): what ``make bench`` runs.
 
-Nothing here is needed to make bloom, and nothing of the peers is needed to run it: a peer that is
-not installed is listed as missing.
+The installed package does not contain this code. No peer is required: a peer that is not installed
+is listed as missing.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``python -m benchmarks``: how fast vkbloom is here, beside its peers."""
+"""``python -m benchmarks``: measure the speed of vkbloom and of its peers on this machine."""
 
 from __future__ import annotations
 
@@ -43,21 +43,23 @@ def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None
     default="bench.md",
     show_default=True,
     type=click.Path(dir_okay=False),
-    help="The table; beside it go FILE.json and, with matplotlib, the curves.",
+    help="The table. FILE.json and, with matplotlib, the curves are written beside it.",
 )
-@click.option("--quick", is_flag=True, help="Small and few: shows that all runs, measures nothing.")
-@click.option("--rounds", type=int, help="How often each contender is timed, 3 or more.")
+@click.option(
+    "--quick", is_flag=True, help="Small images, few rounds: a check only, the times mean nothing."
+)
+@click.option("--rounds", type=int, help="Rounds for each contender, 3 or more.")
 @click.option(
     "--points",
     type=int,
     default=Plan.points,
     show_default=True,
-    help="Settings of the benchmark points.",
+    help="Requests of the benchmark points.",
 )
 @click.option(
     "--threads",
     type=int,
-    help="Of the peers.  [default: the cores that this process may use]",
+    help="Threads of the peers.  [default: the cores that this process may use]",
 )
 @adapter_option
 def command(
@@ -72,18 +74,16 @@ def command(
 ) -> None:
     """Time vkbloom beside its peers and write a table.
 
-    Peers (OpenCV, SciPy, scikit-image, PyTorch, CuPy, pygfx) take part where they are installed,
-    and are listed as missing where they are not. Pictures are compared before they are timed; all
-    are timed in turn, A B A B. All of it takes a quarter of an hour on two cores, which should have
-    nothing else to do.
+    Peers are OpenCV, SciPy, scikit-image, PyTorch, CuPy and pygfx. A peer that is not installed is
+    listed as missing. Pictures are compared before they are timed. Contenders take turns: A B A B.
+    All benchmarks together take a quarter of an hour on two cores. Run nothing else meanwhile.
 
-    The exit status is 1 if pictures differ that should be the same; the times of those are left
-    out.
+    The exit status is 1 if pictures differ that should be equal. Their times are left out.
     """
     target = Path(out)
     if target.suffix != ".md":
         raise click.UsageError(f"--out: {out!r} does not end in .md")
-    # Before a quarter of an hour is spent.
+    # Fail now rather than after a quarter of an hour.
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=target.parent):
         pass

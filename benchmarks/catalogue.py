@@ -1,4 +1,4 @@
-"""The benchmarks by id, and how they are run one after the other."""
+"""The benchmarks by id, and the function that runs them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from benchmarks.results import Report, Section
 
 __all__ = ["BENCHMARKS", "run"]
 
-#: What each benchmark times, by its id. Each is a module of this package, - being _ in its name,
-#: with a function ``run(plan) -> Section``.
+#: What each benchmark times, by its id. Each is a module of this package (with _ in place of -)
+#: that has a function ``run(plan) -> Section``.
 BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "image": "an image's bloom, NumPy in and out, against image libraries",
         "pyramid": "a pyramid of five levels against pygfx and a Gaussian of the same spread",
-        "forward": "what bloom adds to a forward frame, against the source's form",
-        "points": "many settings of one image, against single calls",
+        "forward": "the time that bloom adds to a forward frame, against the source's variant",
+        "points": "many requests with one image, against single calls",
         "cost": "cost against pixels, kernel length and levels",
-        "overhead": "what a call costs whatever its size",
-        "startup": "import, renderer, first frame, each in processes of their own",
+        "overhead": "the constant cost of a call",
+        "startup": "import, renderer and first frame, in fresh processes",
         "separable": "two passes of N taps against one of N x N",
         "image-gpu": "an image's bloom at 4K on a GPU, against CUDA",
     }
@@ -42,21 +42,21 @@ def run(plan: Plan) -> Iterator[Report]:
     Yields
     ------
     Report
-        One after each benchmark, with all that was found so far: the last is the whole, and
-        nothing is lost when a later benchmark fails.
+        One after each benchmark, with all results so far. So nothing is lost if a later benchmark
+        fails. The last report is complete.
 
     Raises
     ------
     ValueError
-        `plan.only` names a benchmark that there is not.
+        `plan.only` names an unknown benchmark.
     AdapterNotFoundError, Error
         The adapter cannot be used.
     """
     for name in plan.only:
         if name not in BENCHMARKS:
             raise ValueError(f"only: {name!r} is not one of {', '.join(BENCHMARKS)}")
-    # OpenMP's threads, of which torch makes use, else go on spinning into the next contender's
-    # time. Read when the library is loaded.
+    # Otherwise OpenMP's idle threads, which torch uses, take time from the next contender. The
+    # variable is read when the library is loaded.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     with vkbloom.Renderer(plan.adapter) as renderer:
         adapter = renderer.info
@@ -67,7 +67,7 @@ def run(plan: Plan) -> Iterator[Report]:
         module = importlib.import_module(f"benchmarks.{name.replace('-', '_')}")
         section: Section = module.run(plan)
         if plan.quick:
-            # Its figures mean nothing.
+            # The figures of a quick run mean nothing.
             section.goals.clear()
         report = Report(machine, (*report.sections, section))
         yield report

@@ -23,21 +23,21 @@ from benchmarks.timing import Contender, Times, alternate
 __all__ = ["Line", "run"]
 
 SIDES: Final = (64, 128, 256, 512, 1024, 2048, 4096)
-#: From here on the cost is to be a straight line.
+#: The line is fitted from this side on.
 FIRST_SIDE: Final = 512
 RADII: Final = (1, 2, 4, 8, 16, 32, 64)
-#: Of 1024 pixels a side; one more would be of 1 x 1, which is cut.
+#: For 1024 pixels a side. A further level would be 1 x 1, which is left out.
 LEVELS: Final = tuple(range(1, 10))
 SIDE: Final = 1024
 SMALL: Final = 256
 SEPARABLE: Final = "vkbloom, 9 taps"
-FRAGMENT: Final = "vkbloom, 9 taps, fragment form"
+FRAGMENT: Final = "vkbloom, 9 taps, fragment variant"
 PYRAMID: Final = "vkbloom, Pyramid(levels=5)"
 
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line ``y = start + slope x`` through points, all of the same relative weight."""
+    """A straight line ``y = start + slope x`` with the same relative weight for every point."""
 
     start: float
     slope: float
@@ -51,24 +51,26 @@ class Line:
         return cls(float(start), float(slope))
 
     def deviation(self, x: float, y: float) -> float:
-        """Return how far a point lies above the line, as a part of the line's value there."""
+        """Return how far a point is above the line, relative to the line's value there."""
         return y / (self.start + self.slope * x) - 1
 
 
 def run(plan: Plan) -> Section:
-    """Time ours, its fragment form and OpenCV over sizes; ours over kernels and levels."""
+    """Time vkbloom and OpenCV over sizes and kernels, and vkbloom over levels."""
     section = Section(
         "cost",
         "Cost against pixels, kernel length and levels",
         [
-            "float16 RGBA, another image in each round. On CPU adapters by the wall clock, NumPy "
-            "in and out; on GPUs the passes' time on the device (OpenCV's is always the wall "
-            "clock's). Lines are least-squares fits of relative deviations; a positive deviation "
-            "is slower than the line.",
+            "float16 RGBA, another image in each round. CPU adapters: wall-clock time, NumPy in "
+            "and out. GPUs: time of the passes on the device; OpenCV always has wall-clock "
+            "time. The lines are least-squares fits of relative deviations. A positive "
+            "deviation is slower than the line.",
         ],
     )
     with ExitStack() as stack:
-        ours, source = (stack.enter_context(plan.renderer(form)) for form in ("auto", "fragment"))
+        ours, source = (
+            stack.enter_context(plan.renderer(variant)) for variant in ("auto", "fragment")
+        )
         _over_pixels(plan, section, ours, source)
         _over_taps(plan, section, ours)
         _over_levels(plan, section, ours)
@@ -160,7 +162,7 @@ def _over_levels(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
         plan.times(9),
     )
     section.times["levels"] = times
-    # The first two levels hold nearly all pixels; each one after them costs its passes.
+    # The first two levels hold nearly all pixels. Each further level costs only its passes.
     first = min(2, len(levels) - 2)
     axis = Axis(
         "levels", tuple(map(str, levels)), tuple(map(float, levels)), first, "us a level", 1e6
@@ -170,7 +172,7 @@ def _over_levels(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
 
 @dataclass(frozen=True)
 class Axis:
-    """What a cost grows with, the row from which its line is fitted, and the unit of the slope."""
+    """The x axis of a cost, the first row of its fitted line, and the unit of the slope."""
 
     chart: str
     labels: tuple[str, ...]

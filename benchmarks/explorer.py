@@ -1,10 +1,11 @@
-"""How long after a slider moved the explorer shows the new picture, measured in the browser.
+"""Latency of the explorer: from a slider's move to the new picture, measured in the browser.
 
-A slider is set as a hand would, and the clock of the browser is read when the picture of exactly
-that setting is on the canvas, and again when the browser has painted it (two animation frames
-later at most). In its own page and, with ``--jupyterlab``, in JupyterLab; the scene at 640 x 360.
+A slider is moved as a user would move it. The browser's clock is read when the picture of this
+setting is on the canvas, and again when the browser has painted it, at most two animation frames
+later. This is measured on the explorer's own page and, with ``--jupyterlab``, in JupyterLab, with
+the scene at 640 x 360.
 
-Needs Chromium, playwright and, for the latter, JupyterLab: ``make build/stamp/test`` installs them.
+``make build/stamp/test`` installs what it needs: Chromium, playwright and JupyterLab.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from rich.table import Table
 import vkbloom
 from vkbloom.explorer.viewer import Viewer
 
-# What starts both for the tests.
+# The tests' functions that start both pages.
 sys.path.append(str(Path(__file__).parents[1]))
 from tests.explorer.explorer_hosts import jupyterlab, served
 
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
 
 SIZE = (640, 360)
 CELL = "import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo())\nexplorer"
-# Field to its slider's ends. Each puts other passes out of date: the composite alone, the blur,
-# and all of them.
+# The range of each slider. They make different passes out of date: only the composite, the blur, or
+# all passes.
 SLIDERS = {
     "exposure": (-2.0, 2.0),
     "intensity": (0.0, 2.0),
@@ -54,7 +55,7 @@ MEASURE = """async ([selector, values]) => {
     const frame = () => new Promise(requestAnimationFrame);
     const times = [];
     for (const value of values) {
-        // Begun at any moment between two frames, as hands do.
+        // Start at a random time between two frames, as a user does.
         await new Promise((done) => setTimeout(done, 40 + 20 * Math.random()));
         slider.value = value;
         const shown = drawn();
@@ -71,7 +72,7 @@ MEASURE = """async ([selector, values]) => {
 
 
 def fit(page: Page) -> None:
-    """Make the window such that the picture has the size to be measured."""
+    """Resize the window until the picture has the size to be measured."""
     page.locator(".vkb-status", has_text="until shown").wait_for(timeout=60_000)
     for _ in range(4):
         shown = page.evaluate('document.querySelector(".vkb-stage").clientWidth')
@@ -89,7 +90,7 @@ def measured(page: Page, count: int) -> dict[str, np.ndarray[Any, Any]]:
     found = {}
     for name, (low, high) in SLIDERS.items():
         selector = ".vkb-time input" if name == "time" else f"[data-field={name}]"
-        # No value twice, and none near the one before: each picture is a new one.
+        # Every value differs from the one before, so that each picture is new.
         values = np.random.default_rng(0).permutation(np.linspace(low, high, count + 3))
         times = page.evaluate(MEASURE, [selector, [round(float(value), 3) for value in values]])
         found[name] = np.array(times)[3:]

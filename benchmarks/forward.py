@@ -1,4 +1,4 @@
-"""What bloom adds to a forward frame: frames with it minus frames without it."""
+"""The time that bloom adds to a forward frame: frames with it minus frames without it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["run"]
 
 SIZE: Final = (1280, 720)
 ROUNDS: Final = 25
-NAMES: Final = {"auto": "vkbloom", "fragment": "the source's form"}
+NAMES: Final = {"auto": "vkbloom", "fragment": "the source's variant"}
 
 
 def run(plan: Plan) -> Section:
@@ -24,23 +24,24 @@ def run(plan: Plan) -> Section:
         "forward",
         f"A forward frame at {size[0]} x {size[1]}, all defaults",
         [
-            "The built-in scene at another time in each round, so that every pass runs; `final` "
-            "is read back, by the wall clock. What bloom costs is the difference of a frame with "
-            "it and the frame of the same round without it (which has no glow mesh either).",
+            "The built-in scene at another time in each round, so that every pass runs. `final` "
+            "is read back; wall-clock time. The cost of bloom is the difference between a frame "
+            "with bloom and the frame of the same round without bloom, which has no glow mesh "
+            "either.",
         ],
     )
     scene = vkbloom.Scene.ufo()
     with ExitStack() as stack:
-        # Each has a renderer of its own: one that has drawn the scene with bloom would not draw it
-        # again without.
+        # One renderer each: a renderer that has drawn the scene with bloom would not draw it again
+        # without bloom.
         renderers = {
-            (form, bloom): stack.enter_context(plan.renderer(form))
-            for form in NAMES
+            (variant, bloom): stack.enter_context(plan.renderer(variant))
+            for variant in NAMES
             for bloom in (True, False)
         }
 
-        def frame(form: str, turn: int, *, bloom: bool) -> vkbloom.Frames:
-            return renderers[form, bloom].render(
+        def frame(variant: str, turn: int, *, bloom: bool) -> vkbloom.Frames:
+            return renderers[variant, bloom].render(
                 scene,
                 vkbloom.Separable(bloom=bloom),
                 size,
@@ -49,15 +50,15 @@ def run(plan: Plan) -> Section:
             )
 
         for turn in (0, 20, 50):
-            ours, source = (frame(form, turn, bloom=True)["final"] for form in NAMES)
-            what = f"both forms at time {0.013 * turn:g}"
+            ours, source = (frame(variant, turn, bloom=True)["final"] for variant in NAMES)
+            what = f"both variants at time {0.013 * turn:g}"
             section.agreements.append(agreement(what, ours, source, 1.0, "one level of 8 bits"))
         contenders = [
             Contender(
                 f"{name}, bloom {'on' if bloom else 'off'}",
-                lambda turn, form=form, bloom=bloom: frame(form, turn, bloom=bloom),  # type: ignore[misc]
+                lambda turn, variant=variant, bloom=bloom: frame(variant, turn, bloom=bloom),  # type: ignore[misc]
             )
-            for form, name in NAMES.items()
+            for variant, name in NAMES.items()
             for bloom in (True, False)
         ]
         times = alternate(contenders, plan.times(ROUNDS))
@@ -78,6 +79,6 @@ def run(plan: Plan) -> Section:
     cost, source_cost = (each.median for each in extra.values())
     ratio = cost / source_cost if source_cost > 0 else float("nan")
     if all(found.agrees for found in section.agreements):
-        what = "forward frame: bloom's cost / that of the source's form"
+        what = "forward frame: bloom's cost / that of the source's variant"
         section.goals.append(Goal(what, ratio, 1 / 3, at_most=True))
     return section

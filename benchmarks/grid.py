@@ -1,6 +1,6 @@
-"""Grids measured: what shared passes, stores, kills and workers cost or save.
+"""Benchmarks of grids: shared passes, stores, killed processes and workers.
 
-Each part prints its figures; a part's name as the argument runs that part alone.
+Each part prints its figures. With names of parts as arguments, only these parts run.
 
     python benchmarks/grid.py [points|kills|tiny|workers] ...
 """
@@ -45,7 +45,7 @@ def picture(side: int = SIDE) -> np.ndarray[Any, Any]:
 
 
 def axes() -> dict[str, Any]:
-    """Return the axes of the issue's grid, the fastest in the middle."""
+    """Return three axes. The one that affects only the last pass is in the middle."""
     scale, strength, intensity = COUNTS
     return {
         "blur_scale": np.linspace(0.1, 4, scale),
@@ -56,7 +56,7 @@ def axes() -> dict[str, Any]:
 
 @contextmanager
 def folder() -> Iterator[Path]:
-    """Give a folder on the disk that holds the working tree's temporary files."""
+    """Create a temporary folder and remove it afterwards."""
     path = Path(tempfile.mkdtemp(prefix="vkbloom-grid-"))
     try:
         yield path
@@ -85,15 +85,15 @@ def memory(process: psutil.Process | None = None) -> Iterator[list[float]]:
 
 
 def spread(samples: list[float]) -> str:
-    """Return how memory went: at a tenth, the half, and the end of the time, and the most."""
+    """Return the memory at 10, 50 and 100 % of the time, and the maximum."""
     if not samples:
         return "not measured"
     at = [samples[int(share * (len(samples) - 1))] for share in (0.1, 0.5, 1.0)]
-    return f"{at[0]:.0f}, {at[1]:.0f}, {at[2]:.0f} MiB at 10, 50, 100 %; most {max(samples):.0f}"
+    return f"{at[0]:.0f}, {at[1]:.0f}, {at[2]:.0f} MiB at 10, 50, 100 %; at most {max(samples):.0f}"
 
 
 def points() -> None:
-    """10,000 points of 256 x 256, against single calls, spot-checked."""
+    """10,000 points of 256 x 256 against single calls, with spot checks."""
     image, values = picture(), axes()
     total = int(np.prod([len(value) for value in values.values()]))
     with folder() as path, memory() as samples:
@@ -119,12 +119,12 @@ def points() -> None:
                                     reduce={"mean": vkbloom.reductions.Mean()})  # fmt: skip
             seconds_reduced = time.perf_counter() - start
             del dataset
-            print(f"  only the mean of each, in memory: {total / seconds_reduced:.0f} points/s")
+            print(f"  only the means, in memory: {total / seconds_reduced:.0f} points/s")
     singles(image, values, total / seconds)
 
 
 def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) -> None:
-    """Single calls: nested loops in the order of the axes, and with every pass of every point."""
+    """Single calls: nested loops in the order of the axes, and calls that run every pass."""
     names = list(values)
     every: list[dict[str, Any]] = [dict(zip(names, map(float, point), strict=True))
              for point in itertools.product(*values.values())]  # fmt: skip
@@ -137,7 +137,7 @@ def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) ->
         chosen = random.Random(2).sample(every, min(SINGLES, len(every)))
         start = time.perf_counter()
         for changes in chosen:
-            # Another image in between: every pass of every point runs.
+            # Another image in between makes every pass of every point run.
             renderer.apply(image, vkbloom.Separable(**changes), attachments="final")
             renderer.apply(other, vkbloom.Separable(**changes), attachments="final")
         alone = 2 * len(chosen) / (time.perf_counter() - start)
@@ -148,12 +148,12 @@ def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) ->
 
 
 def kills() -> None:
-    """Kill -9 ten times at random moments of the work, then finish: equal to the undisturbed."""
+    """Kill -9 ten times at random moments, then finish and compare with an undisturbed run."""
     script = Path(__file__).parents[1] / "tests" / "grid" / "grid_to_kill.py"
     generator = random.Random(time.time_ns())
     with folder() as path:
         command = [sys.executable, str(script)]
-        subprocess.run([*command, str(path / "whole.zarr"), "100"], check=True)
+        subprocess.run([*command, str(path / "undisturbed.zarr"), "100"], check=True)
         killed, chunks = 0, path / "a.zarr" / "final"
         for number in range(10):
             before = len(list(chunks.glob("c.*")))
@@ -166,8 +166,8 @@ def kills() -> None:
             report = str(vkbloom.check_grid(path / "a.zarr")).splitlines()
             print(f"  after kill {number + 1}: {report[0]}, problems {len(report) - 1}")
         subprocess.run([*command, str(path / "a.zarr"), "100"], check=True)
-        found, expected = contents(path / "a.zarr"), contents(path / "whole.zarr")
-        print(f"{killed} of 10 runs killed at work; bit-equal to the undisturbed: "
+        found, expected = contents(path / "a.zarr"), contents(path / "undisturbed.zarr")
+        print(f"{killed} of 10 runs killed while working; bit-equal to the undisturbed run: "
               f"{found == expected}, {len(found)} files")  # fmt: skip
 
 
@@ -181,7 +181,7 @@ def contents(store: Path) -> dict[str, bytes]:
 
 
 def tiny() -> None:
-    """Many points of tiny images over two workers: the scheduler's load and memory."""
+    """Many points of tiny images on two workers: the load and memory of the scheduler."""
     values = {
         "blur_scale": np.linspace(0.1, 4, 100),
         "intensity": np.linspace(0, 2, TINY // 1000),
@@ -255,10 +255,10 @@ def workers() -> None:
                 made = vkbloom.grid_to_zarr(image, None, values, path / "a.zarr", client=client,
                                             adapter=ADAPTER)  # fmt: skip
                 rates[count] = total / (time.perf_counter() - start)
-                print(f"{count} workers, threads of lavapipe a worker: {threads}: "
+                print(f"{count} workers, lavapipe threads for each worker: {threads}: "
                       f"{rates[count]:.0f} points/s of {total}; passes run "
                       f"{made.attrs['passes_run']}")  # fmt: skip
-        print(f"  two by one: {rates[2] / rates[1]:.2f}")
+        print(f"  two against one: {rates[2] / rates[1]:.2f}")
     os.environ.pop("LP_NUM_THREADS", None)
 
 

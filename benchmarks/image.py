@@ -1,4 +1,4 @@
-"""An image's bloom, NumPy in and NumPy out: threshold, the forward system's nine taps, sum."""
+"""Bloom of an image, NumPy in and out: threshold, nine taps of the forward system, sum."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ SETTINGS: Final = vkbloom.Separable(threshold=THRESHOLD)
 SIZE: Final = (1920, 1080)
 ROUNDS: Final = 15
 OURS: Final = "vkbloom"
-FRAGMENT: Final = "vkbloom, the source's fragment form"
+FRAGMENT: Final = "vkbloom, the source's fragment variant"
 UNCHANGED: Final = "vkbloom, same image, other strength"
 
-#: How much pictures may differ by dtype, and why.
+#: The allowed difference of pictures by dtype, and the reason.
 ALLOWED: Final[dict[str, tuple[float, str]]] = {
-    "uint8": (2.0, "levels: the vertical pass, the bloom and the sum are rounded, or the sum only"),
-    "float16": (4e-3, "three roundings to half, of values up to 2 by at most 1e-3 each"),
-    "float32": (1e-4, "lavapipe's linear filter of rgba32float is that exact"),
+    "uint8": (2.0, "levels: one side rounds vertical pass, bloom and sum, the other only the sum"),
+    "float16": (4e-3, "three roundings to half, each of at most 1e-3 for values up to 2"),
+    "float32": (1e-4, "accuracy of lavapipe's linear filter of rgba32float"),
 }
 
 _PEERS: Final = ("OpenCV", "SciPy", "scikit-image", "PyTorch")
 
-#: Ours over theirs, or theirs over ours where wanted is at least a number; of RGBA images.
+#: Peer, wanted ratio, whether at most. At most: ours / theirs; at least: theirs / ours. RGBA.
 _GOALS: Final[dict[str, tuple[tuple[str, float, bool], ...]]] = {
     "float16": (
         ("OpenCV", 3.0, False),
@@ -49,7 +49,7 @@ _GOALS: Final[dict[str, tuple[tuple[str, float, bool], ...]]] = {
 
 
 def full_kernel(settings: vkbloom.Separable) -> NDArray[np.float32]:
-    """Return all taps of a pass, strength included, of a blur of whole texels."""
+    """Return all taps of one pass, with the strength, for a blur with integer texel offsets."""
     one_side = np.array(settings.weights[1:], np.float32) * settings.blur_strength
     return np.concatenate([one_side[::-1], settings.weights[:1], one_side]).astype(np.float32)
 
@@ -61,12 +61,12 @@ def run(plan: Plan) -> Section:
         "image",
         f"An image's bloom at {size[0]} x {size[1]}",
         [
-            "Hard luminance threshold, the nine taps of the forward system (strength 1.5) in both "
-            "directions, sum; NumPy array in, new NumPy array out, by the wall clock. Each round "
-            "gives every contender another image than the round before. Buffers between the steps "
-            "are kept from call to call by all that can; alpha is not asked of the peers.",
-            f'"{UNCHANGED}" has one image and another `blur_strength` in each round, so that the '
-            "image is not sent again and the threshold not run again.",
+            "Hard luminance threshold, the nine taps of the forward system (strength 1.5) in "
+            "both directions, sum. NumPy array in, new NumPy array out; wall-clock time. Each "
+            "round gives every contender another image than the round before. Contenders that "
+            "can keep intermediate buffers between calls do so. Peers need not keep alpha.",
+            f'"{UNCHANGED}" uses one image and another `blur_strength` in each round. So the '
+            "image is not uploaded again, and the threshold pass does not run again.",
         ],
     )
     for dtype in ("float16", "float32", "uint8"):
@@ -90,7 +90,7 @@ def _time_one(
     )
     with ExitStack() as stack:
         ours, source, unchanged = (
-            stack.enter_context(plan.renderer(form)) for form in ("auto", "fragment", "auto")
+            stack.enter_context(plan.renderer(variant)) for variant in ("auto", "fragment", "auto")
         )
         blooms: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
             OURS: _bloom(ours),

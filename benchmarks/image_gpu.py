@@ -1,4 +1,4 @@
-"""An image's bloom at 4K on a GPU: times on the device, and until Python has the array."""
+"""Bloom of an image at 4K on a GPU: times on the device, and until Python has the array."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ __all__ = ["run"]
 SIZE: Final = (3840, 2160)
 ROUNDS: Final = 25
 OURS: Final = "vkbloom"
-FRAGMENT: Final = "vkbloom, the source's fragment form"
+FRAGMENT: Final = "vkbloom, the source's fragment variant"
 FUSED: Final = "a CUDA kernel of our own"
 COPY: Final = "plain copy on the device"
 TRANSFER: Final = "bare transfer into pinned memory"
 IN_HANDS: Final = "vkbloom, an unchanged half-float frame as an array"
 
-#: Theirs over ours at least, or ours over theirs at most. Of the two that do it in several steps
-#: the blur alone, against the whole of ours.
+#: Peer, wanted ratio, whether at most. At least: theirs / ours; at most: ours / theirs. The two
+#: peers with several steps count with the blur alone, against our complete bloom.
 _GOALS: Final = (
     (FRAGMENT, 50.0, False),
     ("cupyx correlate1d twice, blur alone", 4.0, False),
@@ -39,7 +39,7 @@ _GOALS: Final = (
 
 
 def run(plan: Plan) -> Section:
-    """Time the bloom of a half-float image on the device, and the way back."""
+    """Time the bloom of a half-float image on the device, and the transfer back."""
     size = plan.size(*SIZE)
     section = Section("image-gpu", f"On the GPU: {size[0]} x {size[1]}, float16 RGBA")
     with ExitStack() as stack:
@@ -49,14 +49,14 @@ def run(plan: Plan) -> Section:
             return section
         source = stack.enter_context(plan.renderer("fragment"))
         section.about += [
-            "Times on the device: of vkbloom the sum of its passes' timestamps, of the others "
-            "CUDA events. All do the whole bloom (hard threshold, nine taps in both directions, "
-            "sum) but where it says blur alone; vkbloom gets another image in each round, the "
-            "images of the others lie on the device.",
-            "The array in Python's hands: a half-float frame (`scene` of deferred shading) of "
-            "which nothing has changed, so that the call is submit, transfer and the array. In "
-            "calls of `apply` the upload of another image comes first, or, of the same image, "
-            "its comparison with the one that the device has.",
+            "Times on the device: for vkbloom the sum of the timestamps of its passes, for the "
+            "others CUDA events. All do the complete bloom (hard threshold, nine taps in both "
+            "directions, sum), except rows with `blur alone`. vkbloom gets another image in "
+            "each round. The images of the others stay on the device.",
+            "The array in Python's hands: a half-float frame (`scene` of deferred shading) that "
+            "has not changed, so that the call consists of submission, transfer and the array. "
+            "Calls of `apply` first upload another image or, for the same image, compare it "
+            "with the image on the device.",
         ]
         images = pictures(size, np.float16)
         _on_device(plan, section, ours, source, images)
@@ -126,7 +126,7 @@ def _bloom(renderer: vkbloom.Renderer, image: NDArray[Any]) -> vkbloom.Frames:
 def _in_hands(
     plan: Plan, section: Section, ours: vkbloom.Renderer, images: list[NDArray[Any]]
 ) -> None:
-    """Time the way from the device to an array, against the bare transfer of as many bytes."""
+    """Time the readback into an array, against the bare transfer of as many bytes."""
     height, width = images[0].shape[:2]
     theirs = peers.gather(("CuPy",), lambda peer: peer.transfer_to_host(images[0]), section.missing)
     scene = vkbloom.Scene.ufo()

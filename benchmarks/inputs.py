@@ -1,4 +1,4 @@
-"""The pictures that benchmarks blur."""
+"""The input pictures of the benchmarks."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from numpy.typing import DTypeLike, NDArray
 
 __all__ = ["COUNT", "REC709", "THRESHOLD", "picture", "pictures"]
 
-#: How many pictures a contender goes through in turn, so that none is the one before.
+#: A contender cycles through this many pictures, so that each differs from the one before.
 COUNT = 3
-#: What of a picture is taken as bright, by its luminance.
+#: Pixels with a higher luminance are bright.
 THRESHOLD = 0.5
 #: The luminance of linear colours (ITU-R BT.709).
 REC709 = (0.2126, 0.7152, 0.0722)
 
 _BRIGHTEST = 0.7
 _BLOCK = 16
-# Luminances this near to the threshold are kept out of a picture.
+# Pictures have no luminance within this distance of the threshold.
 _MARGIN = 0.03
 
 
 def picture(size: tuple[int, int], dtype: DTypeLike, channels: int, seed: int) -> NDArray[Any]:
     """Make a picture of blocks with a slight grain, about a quarter of them bright.
 
-    No luminance is near `THRESHOLD`, so that no rounding decides whether a pixel is bright, and
-    no value is above 0.7, so that a pass of the forward system's kernel at strength 1.5, which
-    gives a flat picture 1.39 times its value, stays below 1 in 8 bits. Both make contenders
-    comparable that round, and clamp, in different places.
+    No luminance is near `THRESHOLD`, so that rounding does not decide whether a pixel is bright. No
+    value is above 0.7: a pass of the forward system's kernel at strength 1.5 multiplies a flat
+    picture by 1.39, and the result stays below 1 in 8 bits. So contenders that round and clamp in
+    different places can be compared.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a benchmark ran on."""
+"""The machine that a benchmark ran on."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ __all__ = ["describe"]
 
 
 def describe(plan: Plan, adapter: vkbloom.AdapterInfo | None) -> dict[str, Any]:
-    """Return what a reader needs to place the figures: plain values that JSON can hold.
+    """Return what the figures depend on, as plain values for JSON.
 
     Parameters
     ----------
     plan : Plan
     adapter : AdapterInfo or None
-        What the benchmarks rendered on.
+        The adapter that the benchmarks used.
     """
     return {
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
@@ -76,7 +76,7 @@ def _cpu_model() -> str:
 
 
 def _load() -> float | None:
-    """Return how many processes ran on average in the last minute: others disturb the figures."""
+    """Return the load average of the last minute; other processes disturb the figures."""
     return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
 
 

@@ -1,4 +1,4 @@
-"""Contenders of vkbloom's own."""
+"""The contenders of vkbloom."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def contender(
     images: Iterator[NDArray[Any]],
     settings: vkbloom.Settings,
 ) -> Contender:
-    """Return the bloom of the next of `images`, on a GPU by the device's clock.
+    """Return a contender that renders the bloom of the next image, with the device's clock on GPUs.
 
-    All contenders of a renderer take their images from one iterator, of which none is the one
-    before: a call with the image of the call before it would not run all of its passes.
+    All contenders of a renderer share one iterator, whose images all differ from the one before. A
+    call with the image of the previous call would not run all passes.
     """
     return Contender(
         name,

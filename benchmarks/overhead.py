@@ -1,4 +1,4 @@
-"""What a call costs whatever its size, and where: Python, each pass, the readback."""
+"""The constant cost of a call, split into Python, passes and readback."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ SIZE: Final = (64, 64)
 ROUNDS: Final = 101
 LOOPS: Final = 8
 OURS: Final = "vkbloom"
-FRAGMENT: Final = "vkbloom, plain fragment form"
+FRAGMENT: Final = "vkbloom, plain fragment variant"
 AGAIN: Final = "vkbloom once more, a control"
 
 Case = Callable[[vkbloom.Renderer, int], vkbloom.Frames]
 
 
 class _Stopwatch:
-    """The core of a renderer, or a batch of it, with the seconds that were spent in its calls."""
+    """A renderer's core, or a submission, that counts the seconds spent in its calls."""
 
     def __init__(self, core: Any, watch: _Stopwatch | None = None) -> None:
         self._core = core
@@ -46,35 +46,36 @@ class _Stopwatch:
         self._watch.seconds += time.perf_counter() - start
         return result
 
-    def apply(self, *arguments: Any) -> Any:
-        return _Stopwatch(self._call(self._core.apply, *arguments), self)
+    def plan(self, *arguments: Any) -> Any:
+        return self._call(self._core.plan, *arguments)
 
-    def add(self, *arguments: Any) -> Any:
-        return self._call(self._core.add, *arguments)
+    def pages(self, size: int) -> Any:
+        return self._call(self._core.pages, size)
 
-    def submit(self) -> Any:
-        return self._call(self._core.submit)
+    def run(self, *arguments: Any) -> Any:
+        return _Stopwatch(self._call(self._core.run, *arguments), self)
 
-    def collect(self) -> Any:
-        return self._call(self._core.collect)
+    def wait(self) -> Any:
+        return self._call(self._core.wait)
 
 
 def run(plan: Plan) -> Section:
-    """Time calls on 64 x 64 pixels: against the plain form, and by what they have to do."""
+    """Time calls on 64 x 64 pixels, against the fragment variant and by the work they do."""
     section = Section(
         "overhead",
         f"A call on {SIZE[0]} x {SIZE[1]}, float16 RGBA",
         [
-            "So few pixels that what is timed is the call: NumPy in and out, by the wall clock. "
-            "The control is another renderer of the same kind; what it differs by is noise.",
+            "The image is so small that the constant cost of the call dominates. NumPy in and "
+            "out; wall-clock time. The control is a second renderer of the same kind: its "
+            "difference is noise.",
         ],
     )
     images = pictures(SIZE, np.float16)
     rounds = plan.times(ROUNDS)
     with ExitStack() as stack:
         made = {
-            name: stack.enter_context(plan.renderer(form))
-            for name, form in ((OURS, "auto"), (FRAGMENT, "fragment"), (AGAIN, "auto"))
+            name: stack.enter_context(plan.renderer(variant))
+            for name, variant in ((OURS, "auto"), (FRAGMENT, "fragment"), (AGAIN, "auto"))
         }
         times = alternate(
             [
@@ -89,19 +90,19 @@ def run(plan: Plan) -> Section:
             rounds,
             warm_up=5,
         )
-        section.times["forms"] = times
+        section.times["variants"] = times
         section.tables.append(side_by_side("Another image in each call", times, OURS))
         ratio = times[OURS].over(times[FRAGMENT]).value
-        # The two are to be the same; 5 % is what medians of the same differ by.
+        # The two should be equal; medians of equal work differ by up to 5 %.
         section.goals.append(
-            Goal("64 x 64: vkbloom / plain fragment form", ratio, 1.05, at_most=True)
+            Goal("64 x 64: vkbloom / plain fragment variant", ratio, 1.05, at_most=True)
         )
         _split(section, made[OURS], images, rounds)
     return section
 
 
 def _cases(images: list[NDArray[Any]]) -> dict[str, Case]:
-    """Return calls that differ in what they make the renderer do."""
+    """Return calls that cause different work."""
     image = images[0]
     final = ("final",)
 
@@ -139,10 +140,10 @@ def _cases(images: list[NDArray[Any]]) -> dict[str, Case]:
 def _split(
     section: Section, renderer: vkbloom.Renderer, images: list[NDArray[Any]], rounds: int
 ) -> None:
-    """Add the table of what calls spend, and where."""
+    """Add the table of where calls spend their time."""
     watch = _Stopwatch(renderer._core)
     renderer._core = watch  # type: ignore[assignment]
-    whole: dict[str, Times] = {}
+    calls: dict[str, Times] = {}
     inside: dict[str, Times] = {}
     passes: dict[str, int] = {}
     device: dict[str, float] = {}
@@ -161,37 +162,37 @@ def _split(
             device[name] = sum(frames.timings.values())
             return wall
 
-        # Not in turn: what a case has to do depends on the call before.
-        whole[name] = alternate_seconds({name: once}, rounds, warm_up=3)[name]
+        # Not in turn: the work of a case depends on the call before.
+        calls[name] = alternate_seconds({name: once}, rounds, warm_up=3)[name]
         inside[name] = Times(tuple(core_seconds[3:]))
-    section.times["calls"] = whole
+    section.times["calls"] = calls
     section.times["calls, in the core"] = inside
     is_gpu = renderer.info.type != "cpu"
     rows = tuple(
         (
             name,
             str(passes[name]),
-            f"{1e6 * whole[name].median:.0f}",
+            f"{1e6 * calls[name].median:.0f}",
             f"{1e6 * inside[name].median:.0f}",
-            f"{1e6 * (whole[name].median - inside[name].median):.0f}",
+            f"{1e6 * (calls[name].median - inside[name].median):.0f}",
             *([f"{1e6 * device[name]:.0f}"] if is_gpu else []),
         )
-        for name in whole
+        for name in calls
     )
     header = ["", "passes", "call, us", "in the core, us", "in Python, us"]
     if is_gpu:
         header.append("on the device, us")
     section.tables.append(Table("Where a call spends its time", tuple(header), rows))
-    section.about.append(_reading(whole, passes, list(whole)))
+    section.about.append(_reading(calls, passes, list(calls)))
 
 
-def _reading(whole: dict[str, Times], passes: dict[str, int], names: list[str]) -> str:
+def _reading(calls: dict[str, Times], passes: dict[str, int], names: list[str]) -> str:
     nothing, _, _, another, all_read, loops = names
-    a_pass = (whole[loops].median - whole[another].median) / max(1, passes[loops] - passes[another])
+    a_pass = (calls[loops].median - calls[another].median) / max(1, passes[loops] - passes[another])
     return (
-        f"A call in which nothing runs costs {1e6 * whole[nothing].median:.0f} us (checks, "
-        "comparison of the image, submit, readback), each pass of this size "
-        f"{1e6 * a_pass:.0f} us more (record and run: {LOOPS} loops against one), and reading "
-        "all framebuffers back in place of `final` "
-        f"{1e6 * (whole[all_read].median - whole[another].median):.0f} us."
+        f"A call that runs no pass costs {1e6 * calls[nothing].median:.0f} us (checks, comparison "
+        f"of the image, submission, readback). Each pass of this size adds {1e6 * a_pass:.0f} us "
+        f"(recording and running: {LOOPS} loops against one). Reading back all framebuffers in "
+        "place of `final` adds "
+        f"{1e6 * (calls[all_read].median - calls[another].median):.0f} us."
     )

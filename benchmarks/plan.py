@@ -1,4 +1,4 @@
-"""What to run: how often, how large, on which adapter."""
+"""What to run, how often, at which size, on which adapter."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import vkbloom
 
-#: Chooses the forms of the passes of the renderers that are made under it.
+#: Selects the variants of passes for renderers that are made while it is set.
 FORM_VARIABLE = "VKBLOOM_FORM"
 
 
@@ -33,17 +33,17 @@ class Plan:
     adapter : str
         As for `vkbloom.Renderer`.
     quick : bool
-        Small images and few rounds: shows that all works, its figures mean nothing.
+        Small images and few rounds: a check that everything runs. The figures mean nothing.
     rounds : int or None
-        How often each contender is timed; None: what the benchmark thinks fit. At least 3.
+        Rounds for each contender, at least 3. None: the benchmark's own number.
     points : int
-        Settings of the benchmark "points", at least 1.
+        Requests of the benchmark "points", at least 1.
     threads : int
-        Of the peers that take a number, at least 1.
+        Threads of the peers that have such a setting, at least 1.
     only : tuple of str
-        Ids of benchmarks; none: all.
+        Ids of benchmarks; empty: all.
     tell : callable
-        Is told in a few words what is being timed.
+        Gets a short text about what is being timed.
 
     Raises
     ------
@@ -66,17 +66,17 @@ class Plan:
                 raise ValueError(f"{name}: {value!r} is out of range, {least} or more")
 
     def times(self, usual: int) -> int:
-        """Return the rounds to run where `usual` is what the benchmark thinks fit."""
+        """Return the number of rounds; `usual` is the benchmark's own number."""
         return self.rounds or (3 if self.quick else usual)
 
     def size(self, width: int, height: int) -> tuple[int, int]:
-        """Return the size to run at, which --quick reduces to about 256 a side."""
+        """Return the size to run at; --quick reduces it to about 256 a side."""
         factor = -(-max(width, height) // 256) if self.quick else 1
         return max(1, width // factor), max(1, height // factor)
 
-    def renderer(self, form: str = "auto") -> vkbloom.Renderer:
-        """Make a renderer whose passes have the forms that VKBLOOM_FORM `form` stands for."""
-        with _environment(FORM_VARIABLE, form):
+    def renderer(self, variant: str = "auto") -> vkbloom.Renderer:
+        """Make a renderer with VKBLOOM_FORM set to `variant`."""
+        with _environment(FORM_VARIABLE, variant):
             return vkbloom.Renderer(self.adapter)
 
 

@@ -1,4 +1,4 @@
-"""Many settings of one image in the best order against single calls."""
+"""Many requests with one image, in the best order, against single calls."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ WORST: Final = "apply, worst order"
 def best_order(count: int) -> list[vkbloom.Separable]:
     """Return settings over blur_scale x blur_strength x intensity, the last changing fastest.
 
-    So a point in most cases needs the composite only, in fewer the blur too. The axes are as
-    1 : 2 : 5, 10 x 20 x 50 for 10,000 points; with other counts the last points are left out.
+    So most requests need only the composite, and some the blur, too. The lengths of the axes are as
+    1 : 2 : 5, which is 10 x 20 x 50 for 10,000 requests. With other counts the last ones are left
+    out.
     """
     side = 1
     while 10 * side**3 < count:
@@ -46,33 +47,34 @@ def best_order(count: int) -> list[vkbloom.Separable]:
     ]
 
 
-def worst_order(points: Iterable[vkbloom.Separable]) -> list[vkbloom.Separable]:
-    """Return the same points with blur_scale changing fastest: every point blurs anew."""
-    return sorted(points, key=lambda point: (point.intensity, point.blur_strength))
+def worst_order(settings: Iterable[vkbloom.Separable]) -> list[vkbloom.Separable]:
+    """Return the same settings with blur_scale changing fastest: every request blurs again."""
+    return sorted(settings, key=lambda each: (each.intensity, each.blur_strength))
 
 
 def run(plan: Plan) -> Section:
-    """Time `plan.points` settings of one half-float image, in blocks that alternate."""
+    """Time `plan.points` requests with one half-float image, in blocks that alternate."""
     count = min(plan.points, 60) if plan.quick else plan.points
     section = Section(
         "points",
-        f"{count:,} points of {SIZE[0]} x {SIZE[1]}, float16 RGBA",
+        f"{count:,} requests of {SIZE[0]} x {SIZE[1]}, float16 RGBA",
         [
-            "A grid over blur_scale x blur_strength x intensity of one image, `final` of each "
-            "point taken as an array, by the wall clock. Best order: intensity changes fastest, "
-            "then blur_strength; worst order: blur_scale does, so that no point can use the blur "
-            f"of the one before. Up to {BLOCKS} blocks of points, the contenders in turn in each.",
+            "Settings over blur_scale x blur_strength x intensity for one image. `final` of "
+            "each request becomes an array; wall-clock time. Best order: intensity changes "
+            "fastest, then blur_strength. Worst order: blur_scale changes fastest, so that no "
+            "request can use the blur of the one before. Contenders take turns in up to "
+            f"{BLOCKS} blocks of requests.",
         ],
     )
     image = picture(SIZE, np.float16, 4, 0)
-    points = best_order(count)
-    work = {MANY: points, CALLS: points, WORST: worst_order(points)}
+    settings = best_order(count)
+    work = {MANY: settings, CALLS: settings, WORST: worst_order(settings)}
     block = -(-count // BLOCKS)
     seconds: dict[str, list[float]] = {name: [] for name in work}
     passes = dict.fromkeys(work, 0)
     with ExitStack() as stack:
         renderers = {name: stack.enter_context(plan.renderer()) for name in work}
-        first = renderers[MANY].apply(image, points[0])
+        first = renderers[MANY].apply(image, settings[0])
         everything = count * len(first.timings)
         for name, renderer in renderers.items():
             alone = renderer.apply(image, work[name][0], attachments=("final",))["final"]
@@ -82,12 +84,12 @@ def run(plan: Plan) -> Section:
             section.agreements.append(agreement(name, many, alone, 0.0, "the same computation"))
         for start in range(0, count, block):
             for name, renderer in renderers.items():
-                settings = work[name][start : start + block]
-                duration, ran = _time_block(renderer, image, settings, many=name == MANY)
+                part = work[name][start : start + block]
+                duration, ran = _time_block(renderer, image, part, many=name == MANY)
                 seconds[name].append(duration)
                 passes[name] += ran
     times = {name: Times(tuple(durations)) for name, durations in seconds.items()}
-    section.times["blocks of points"] = times
+    section.times["blocks of requests"] = times
     rows = []
     for name, measured in times.items():
         total = sum(measured.seconds)
@@ -100,7 +102,7 @@ def run(plan: Plan) -> Section:
                 str(measured.over(times[MANY])),
             )
         )
-    header = ("", "all, s", "ms a point", "passes run", f"times as long as {MANY} (quartiles)")
+    header = ("", "all, s", "ms a request", "passes run", f"times as long as {MANY} (quartiles)")
     section.tables.append(Table("", header, tuple(rows)))
     return section
 
@@ -112,13 +114,13 @@ def _time_block(
     *,
     many: bool,
 ) -> tuple[float, int]:
-    """Return the seconds that the points take and how many passes ran."""
+    """Return the seconds that the requests take, and the number of passes that ran."""
     ran = 0
     start = time.perf_counter()
     if many:
         for frames in renderer.apply_many(image, settings, attachments=("final",)):
             ran += len(frames.timings)
     else:
-        for point in settings:
-            ran += len(renderer.apply(image, point, attachments=("final",)).timings)
+        for each in settings:
+            ran += len(renderer.apply(image, each, attachments=("final",)).timings)
     return time.perf_counter() - start, ran

@@ -23,7 +23,7 @@ SETTINGS: Final = vkbloom.Pyramid(levels=LEVELS)
 SIZE: Final = (1920, 1080)
 ROUNDS: Final = 15
 OURS: Final = "vkbloom"
-FRAGMENT: Final = "vkbloom, fragment form"
+FRAGMENT: Final = "vkbloom, fragment variant"
 GAUSSIAN: Final = "OpenCV GaussianBlur"
 PYGFX: Final = "pygfx"
 PYGFX_COPY: Final = "pygfx, upload and readback alone"
@@ -36,17 +36,20 @@ def run(plan: Plan) -> Section:
         "pyramid",
         f"Pyramid(levels=5) at {size[0]} x {size[1]}, float16 RGBA",
         [
-            "NumPy array in, new NumPy array out, another image in each round, by the wall clock. "
+            "NumPy array in, new NumPy array out, another image in each round; wall-clock time. "
             "pygfx runs its `PhysicalBasedBloomPass`, the same chain after Jimenez 2014, with "
-            "five levels on the same adapter at the same number of pixels. Its tent has one "
-            "radius in parts of the width for all levels where ours has one in texels of each, "
-            "so that the pictures differ; it is set so that both spread as far.",
-            "The Gaussian has the spread of ours too. OpenCV converts the halves itself.",
+            "five levels, on the same adapter and the same number of pixels. Its tent has one "
+            "radius for all levels, relative to the width. Ours has a radius in texels of each "
+            "level. So the pictures differ; pygfx's radius is set so that both have the same "
+            "spread.",
+            "The Gaussian has the same spread, too. OpenCV converts half floats itself.",
         ],
     )
     images = pictures(size, np.float16)
     with ExitStack() as stack:
-        ours, source = (stack.enter_context(plan.renderer(form)) for form in ("auto", "fragment"))
+        ours, source = (
+            stack.enter_context(plan.renderer(variant)) for variant in ("auto", "fragment")
+        )
         sigma, gain = spread(lambda image: _bloom_alone(ours, image), size)
         spreads = {OURS: (sigma, gain)}
         contenders = [
@@ -95,7 +98,7 @@ def _pygfx(
     adapter: str,
     spreads: dict[str, tuple[float, float]],
 ) -> list[Contender]:
-    """Return pygfx's contenders, having set its radius to our spread."""
+    """Fit pygfx's radius to our spread, and return its contenders."""
     made = peers.gather(
         (PYGFX,), lambda peer: {PYGFX: peer.Bloom(size, LEVELS, adapter)}, section.missing
     )
@@ -106,10 +109,10 @@ def _pygfx(
     peer.radius = radius = _fitting_radius(peer, size, sigma)
     found, gain = spread(peer.bloom, size)
     spreads[f"{PYGFX}, filter_radius {radius:.5f}"] = (found, gain)
-    reason = "the radius is found to a third of a pixel"
+    reason = "the radius is fitted to a third of a pixel"
     section.agreements += [
         Agreement(f"{PYGFX}: spread, relative", abs(found / sigma - 1), 0.02, reason),
-        # pygfx adds its levels up and leaves their number to the strength.
+        # pygfx adds its levels without dividing by their number.
         Agreement(f"{PYGFX}: gain, relative", abs(gain / LEVELS - 1), 0.01, "sums of small halves"),
     ]
     return [
@@ -119,8 +122,8 @@ def _pygfx(
 
 
 def _fitting_radius(peer: Any, size: tuple[int, int], sigma: float) -> float:
-    """Return the radius at which pygfx's bloom has that spread, which grows with it."""
-    # In parts of the width; 40 pixels are more than twice the distance of ours at the last level.
+    """Return the radius at which pygfx's bloom has the given spread."""
+    # Relative to the width. 40 pixels are more than twice our distance at the last level.
     low, high = 0.0, 40 / size[0]
     for _ in range(7):
         peer.radius = middle = (low + high) / 2
@@ -151,7 +154,7 @@ def _gaussian(
     spreads[f"{GAUSSIAN}, sigma {sigma:.2f}"] = (found, gain)
     section.agreements += [
         Agreement(
-            f"{GAUSSIAN}: spread, relative", abs(found / sigma - 1), 0.02, "its ends are cut off"
+            f"{GAUSSIAN}: spread, relative", abs(found / sigma - 1), 0.02, "the kernel is truncated"
         ),
         Agreement(f"{GAUSSIAN}: gain, relative", abs(gain - 1), 0.01, "sums of small halves"),
     ]

@@ -1,4 +1,4 @@
-"""What benchmarks find: tables, goals, agreements of pictures, and the times behind them."""
+"""Results of benchmarks: tables, goals, comparisons of pictures, and the times."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class Agreement:
     Attributes
     ----------
     what : str
-        Whose picture, against whose.
+        The contender whose picture is compared with vkbloom's.
     largest : float
-        The largest difference; NaN where they cannot be compared.
+        The largest difference; NaN if they cannot be compared.
     allowed : float
-        What it may be.
+        The largest allowed difference.
     reason : str
-        Why so much is allowed.
+        The reason for `allowed`.
     """
 
     what: str
@@ -37,7 +37,7 @@ class Agreement:
 
     @property
     def agrees(self) -> bool:
-        """Whether the difference is within what is allowed; NaN is not."""
+        """Whether the difference is allowed; NaN is not."""
         return self.largest <= self.allowed
 
 
@@ -46,8 +46,8 @@ def agreement(
 ) -> Agreement:
     """Compare the colours of two pictures, (H, W, 3) or (H, W, 4).
 
-    Alpha is left out: peers that blur it as a fourth channel are spared the work of restoring it.
-    Pictures of different shape or dtype, and NaN in one of them, are no agreement.
+    Alpha is ignored, so that peers that blur it as a fourth channel need not restore it. Pictures
+    of different shape or dtype, and pictures with NaN, do not agree.
     """
     if ours.shape[:2] != theirs.shape[:2] or ours.dtype != theirs.dtype:
         return Agreement(what, math.nan, allowed, reason)
@@ -62,11 +62,11 @@ class Goal:
     Attributes
     ----------
     what : str
-        Of what over what.
+        The two contenders of the ratio.
     ratio : float
-        Measured.
+        The measured ratio.
     wanted : float
-        At least that much, or at most.
+        The smallest ratio wanted, or the largest with `at_most`.
     at_most : bool
     """
 
@@ -77,7 +77,7 @@ class Goal:
 
     @property
     def met(self) -> bool:
-        """Whether the measured ratio is as wanted."""
+        """Whether the measured ratio meets the goal."""
         return self.ratio <= self.wanted if self.at_most else self.ratio >= self.wanted
 
 
@@ -92,7 +92,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Curve:
-    """Points of a cost curve: what is on the x axis, and milliseconds."""
+    """A cost curve: milliseconds over the values of the x axis."""
 
     chart: str
     label: str
@@ -102,18 +102,18 @@ class Curve:
 
 @dataclass
 class Section:
-    """What one benchmark found.
+    """The result of one benchmark.
 
     Attributes
     ----------
     id, title : str
     about : list of str
-        Paragraphs: what was timed, and what the figures do not say.
+        Paragraphs about what was timed, and what the figures do not show.
     tables, goals, agreements, curves : list
     missing : list of str
         Peers that did not take part, each with the reason.
     times : dict
-        Of each group of contenders that ran in turn, the times by name.
+        The times by name, for each group of contenders that took turns.
     """
 
     id: str
@@ -129,21 +129,21 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """What a run found, on what, with which command."""
+    """The results of a run, with machine and command."""
 
     machine: dict[str, Any]
     sections: tuple[Section, ...]
 
     @property
     def disagreements(self) -> tuple[Agreement, ...]:
-        """The pictures that should agree and do not."""
+        """The comparisons that failed."""
         return tuple(
             found for section in self.sections for found in section.agreements if not found.agrees
         )
 
 
 def side_by_side(caption: str, times: dict[str, Times], ours: str) -> Table:
-    """Make a table of contenders that ran in turn, with their ratios to one of them."""
+    """Make a table of contenders that took turns, with their ratios to one of them."""
     rows = []
     for name, measured in times.items():
         ratio = "1" if name == ours else str(measured.over(times[ours]))

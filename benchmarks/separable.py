@@ -1,4 +1,4 @@
-"""The proof of separability, measured: the same blur as two passes and as one N x N pass."""
+"""The gain of separability: the same blur as two passes and as one N x N pass."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def run(plan: Plan) -> Section:
         "separable",
         f"Two passes against one at {size[0]} x {size[1]}, float32 RGBA",
         [
-            "The same Gaussian as two passes of N taps and as one pass of N x N (`direct=True`). "
-            "The time of a kernel of one tap is taken away: upload, readback, composite and what a "
-            "pass costs without taps. On CPU adapters by the wall clock, on GPUs by the passes' "
-            "time on the device.",
+            "The same Gaussian as two passes of N taps and as one pass of N x N "
+            "(`direct=True`). The time of a kernel of one tap is subtracted: upload, readback, "
+            "composite, and the cost of a pass without taps. CPU adapters: wall-clock time. "
+            "GPUs: time of the passes on the device.",
         ],
     )
     images = pictures(size, np.float32)
@@ -46,7 +46,7 @@ def run(plan: Plan) -> Section:
             one = two.replace(direct=True)
             first, second = (renderer.apply(images[0], each)["bloom"] for each in (two, one))
             what = f"{taps} taps: two passes and one"
-            reason = "rgba32float between the passes; the order of the sums"
+            reason = "rgba32float between the passes; other order of the sums"
             section.agreements.append(agreement(what, first, second, 1e-4, reason))
             times = alternate(
                 [
@@ -59,12 +59,12 @@ def run(plan: Plan) -> Section:
             section.times[f"{taps} taps"] = times
             nothing = times[NOTHING].median
             passes = [times[name].median - nothing for name in ("two passes", "one pass")]
-            ratio = f"{passes[1] / passes[0]:.1f}" if min(passes) > 0 else "too near to one tap's"
+            ratio = f"{passes[1] / passes[0]:.1f}" if min(passes) > 0 else "too close to one tap"
             milliseconds = (f"{1e3 * seconds:.2f}" for seconds in (nothing, *passes))
             rows.append((str(taps), *milliseconds, ratio, f"{taps / 2:.1f}"))
     header = (
         "taps a line",
-        "taken away, ms",
+        "subtracted, ms",
         "two passes, ms",
         "one pass, ms",
         "one / two",

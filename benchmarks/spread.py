@@ -1,4 +1,4 @@
-"""How far a bloom spreads: the standard deviation of its point-spread function."""
+"""The spread of a bloom: the standard deviation of its point-spread function."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 __all__ = ["BLOCK", "block_image", "spread"]
 
-#: Side of the bright block, a multiple of the pixels under a texel of the smallest level of five,
-#: so that the mean over all places of a point is seen, and not one place in the grid of a level.
+#: Side of the bright block in pixels: a texel of the smallest of five levels. So the block averages
+#: over all positions of a point relative to the grid of a level.
 BLOCK: Final = 32
 _VALUE: Final = 64.0
 
@@ -35,13 +35,13 @@ def spread(
     bloom : callable
         Takes a picture (H, W, 4) and returns its blur alone.
     size : (int, int)
-        Width and height at which it runs; the blur must end well before the edges.
+        Width and height of the picture; the blur must end well before the edges.
 
     Returns
     -------
     sigma : float
-        Standard deviation along x of what becomes of one point, in pixels; that of the block,
-        sqrt((n^2 - 1) / 12), is taken out.
+        Standard deviation of the point spread along x, in pixels. The variance of the block,
+        (n^2 - 1) / 12, is subtracted.
     gain : float
         The sum of the blur over the sum of the picture.
     """

@@ -1,4 +1,4 @@
-"""Import, renderer and first frame, each in processes of their own."""
+"""Import, renderer and first frame, in fresh processes."""
 
 from __future__ import annotations
 
@@ -42,27 +42,27 @@ for turn, name in enumerate(("first frame", "second frame")):
 print(json.dumps(steps))
 """
 
-#: How the caches of pipelines are before a process starts.
+#: The pipeline caches that are filled before a process starts.
 _CACHES: Final = (
     "no caches",
     "vkbloom's pipeline cache",
     "vkbloom's and the driver's caches",
 )
 
-#: Of packages whose modules are loaded when they are asked for.
+#: Imports for packages that load their modules lazily.
 _IMPORTS: Final = {"scikit-image": "from skimage.filters import correlate_sparse"}
 
 
 def run(plan: Plan) -> Section:
-    """Time fresh processes: what they import, and how soon the first frame is there."""
+    """Time the imports and the first frame of fresh processes."""
     size = plan.size(*SIZE)
     section = Section(
         "startup",
         "Start-up, in fresh processes",
         [
             f"Forward frame of the built-in scene, {size[0]} x {size[1]}, all defaults, `final` "
-            "read back. Without caches the folder of vkbloom's pipeline cache is empty and the "
-            "driver's own shader cache is turned off; files are in the system's page cache, so "
+            "read back. Without caches, the folder of vkbloom's pipeline cache is empty, and "
+            "the driver's own shader cache is off. All files are in the system's page cache, so "
             "that the disk is not measured.",
         ],
     )
@@ -87,7 +87,7 @@ def _child(arguments: list[str], environment: dict[str, str] | None = None) -> A
 
 
 def _imports(plan: Plan, section: Section, rounds: int) -> None:
-    """Add how long imports take, as whole processes, and what of ours is spent where."""
+    """Add the times of imports as complete processes, and the split of our own import."""
     plan.tell("startup: imports")
     statements = {
         "Python alone": "pass",
@@ -124,40 +124,42 @@ def _imports(plan: Plan, section: Section, rounds: int) -> None:
         )
         for name, measured in times.items()
     )
-    header = ("process", "median, ms", "least, ms", "more than Python alone, ms")
+    header = ("process", "median, ms", "least, ms", "minus Python alone, ms")
     section.tables.append(Table("Imports, from start to exit of a process", header, rows))
     section.tables.append(_import_table())
 
 
 def _import_table() -> Table:
-    """Return the slowest modules of ``import vkbloom`` but numpy's, by ``-X importtime``."""
+    """Return the slowest modules of ``import vkbloom`` except numpy's, by ``-X importtime``."""
     lines = _child(["-X", "importtime", "-c", "import vkbloom"]).stderr.splitlines()
     own: dict[str, int] = {}
-    whole: dict[str, int] = {}
+    total: dict[str, int] = {}
     for line in lines:
         columns = line.removeprefix("import time:").split("|")
         if len(columns) == 3 and columns[0].strip().isdigit():
             name = columns[2].strip()
-            own[name], whole[name] = int(columns[0]), int(columns[1])
-    # What comes before `site`, Python imports for itself.
+            own[name], total[name] = int(columns[0]), int(columns[1])
+    # Modules before `site` are Python's own.
     names = list(own)
     later = names[names.index("site") + 1 :] if "site" in names else names
     others = (name for name in later if name.split(".")[0] != "numpy")
     slowest = sorted(others, key=lambda name: -own[name])[:8]
-    rows = [("vkbloom, with all it imports", f"{whole['vkbloom'] / 1e3:.1f}", "")]
-    rows.append(("of it numpy", f"{whole.get('numpy', 0) / 1e3:.1f}", ""))
-    rows += [(name, f"{whole[name] / 1e3:.1f}", f"{own[name] / 1e3:.1f}") for name in slowest]
+    rows = [("vkbloom, with all it imports", f"{total['vkbloom'] / 1e3:.1f}", "")]
+    rows.append(("numpy, as a part of it", f"{total.get('numpy', 0) / 1e3:.1f}", ""))
+    rows += [(name, f"{total[name] / 1e3:.1f}", f"{own[name] / 1e3:.1f}") for name in slowest]
     header = ("module", "with its imports, ms", "itself, ms")
-    return Table("One `python -X importtime`, which itself slows imports down", header, tuple(rows))
+    return Table(
+        "One run of `python -X importtime`, which itself slows imports down", header, tuple(rows)
+    )
 
 
 def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) -> None:
-    """Add how long renderer and first frames take, by the state of the caches."""
+    """Add the times of the renderer and the first frames, by the state of the caches."""
     plan.tell("startup: first frames")
     steps: dict[str, dict[str, list[float]]] = {name: {} for name in _CACHES}
     with tempfile.TemporaryDirectory() as folder:
         for name in _CACHES[1:]:
-            # Fills the caches.
+            # Fill the caches.
             _first_frames(plan, name, Path(folder), size)
         for turn in range(rounds):
             for name in _CACHES:
@@ -170,7 +172,7 @@ def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) ->
     for name, found in steps.items():
         measured = {step: Times(tuple(seconds)) for step, seconds in found.items()}
         until = zip(*(found[step] for step in list(found)[:-1]), strict=True)
-        measured["to the first frame in all"] = Times(tuple(sum(parts) for parts in until))
+        measured["total to the first frame"] = Times(tuple(sum(parts) for parts in until))
         columns[name] = measured
         section.times[f"first frames, {name}"] = measured
     rows = tuple(
@@ -185,7 +187,7 @@ def _first_frames(plan: Plan, caches: str, folder: Path, size: tuple[int, int]) 
     environment = dict(os.environ)
     ours, drivers = folder / "vkbloom", folder / "driver"
     environment["VKBLOOM_CACHE_DIR"] = str(ours)
-    # Mesa's and NVIDIA's.
+    # For Mesa and NVIDIA.
     for variable in ("MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"):
         environment[variable] = str(drivers)
     if caches != _CACHES[2]:

@@ -1,4 +1,4 @@
-"""Timing of contenders in turn, and ratios of what was timed."""
+"""Times of contenders that take turns, and ratios of these times."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ __all__ = ["Contender", "Ratio", "Times", "alternate", "alternate_seconds", "dev
 
 @dataclass(frozen=True)
 class Contender:
-    """One way to do what is timed.
+    """One implementation of the work that is timed.
 
     Parameters
     ----------
     name : str
-        In tables.
+        Its name in tables.
     call : callable
-        Takes the number of the round, from 0 on, and does it once. What it returns is dropped
-        after the clock has stopped.
+        Takes the number of the round, from 0, and does the work once. Its result is freed after
+        the clock has stopped.
     seconds : callable, optional
-        Takes what `call` returned and gives the seconds that it took, where a device measured
-        them; without it the wall clock does.
+        Takes the result of `call` and returns the seconds measured by a device. Default: the wall
+        clock.
     """
 
     name: str
@@ -55,8 +55,8 @@ class Times:
     def over(self, other: Times) -> Ratio:
         """Return how many times as long as `other` this takes.
 
-        The value is the ratio of the medians; its spread are the quartiles of the ratios of the
-        rounds, in which both ran one shortly after the other.
+        The value is the ratio of the medians. Its spread is given by the quartiles of the ratios of
+        single rounds, in which both ran shortly after each other.
         """
         each = [a / b for a, b in zip(self.seconds, other.seconds, strict=True) if b > 0]
         if not each or other.median <= 0:
@@ -97,16 +97,16 @@ def alternate(
 ) -> dict[str, Times]:
     """Time contenders in turn, A B C A B C and so on.
 
-    What changes while it runs, such as the clock rate or another program, so hits all of them.
+    So a disturbance, such as another clock rate or program, affects all of them.
 
     Parameters
     ----------
     contenders : sequence of Contender
-        Of different names.
+        Contenders with different names.
     rounds : int
         How often each is timed.
     warm_up : int
-        Rounds before these, which are not kept: compilation, first touch of memory.
+        Rounds before these that do not count: compilation, first use of memory.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def _timed(contender: Contender) -> Callable[[int], float]:
 def alternate_seconds(
     calls: Mapping[str, Callable[[int], float]], rounds: int, *, warm_up: int = 0
 ) -> dict[str, Times]:
-    """As `alternate`, of calls that return the seconds that they took."""
+    """Do the same as `alternate` for calls that return their seconds."""
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     was_enabled = gc.isenabled()
     gc.collect()
@@ -152,10 +152,10 @@ def alternate_seconds(
 
 
 def device_clock(adapter: AdapterInfo) -> Callable[[Frames], float] | None:
-    """Return what gives a frame's seconds on an adapter: its passes' by timestamps on a GPU.
+    """Return a function from frames to the seconds of their passes, by timestamps on a GPU.
 
-    None on CPU adapters, which means the wall clock: lavapipe 22.3.6 takes timestamps around
-    compute before the work is done, and they read near zero.
+    None for CPU adapters, which means the wall clock: lavapipe 22.3.6 writes timestamps around
+    compute before the work is done, so that they read near zero.
     """
     if adapter.type == "cpu":
         return None

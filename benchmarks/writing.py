@@ -14,7 +14,7 @@ from benchmarks.results import Curve, Report, Section, Table
 
 __all__ = ["as_json", "as_markdown", "write"]
 
-# From this ratio of the largest to the smallest on, an axis is logarithmic.
+# An axis is logarithmic above this ratio of the largest to the smallest value.
 _WIDE: Final = 16
 
 
@@ -25,13 +25,13 @@ def write(report: Report, path: Path) -> list[Path]:
     ----------
     report : Report
     path : Path
-        Of the Markdown file, its folder being made where it is missing; the others have its name
-        with other endings.
+        The Markdown file. Its folder is created if it is missing. The other files have the same
+        name with another suffix.
 
     Returns
     -------
     list of Path
-        What was written.
+        The files written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     charts = _draw_curves(report, path)
@@ -44,7 +44,7 @@ def write(report: Report, path: Path) -> list[Path]:
 def as_json(report: Report) -> dict[str, Any]:
     """Return a report as plain values, with the seconds of every round.
 
-    What is not finite, which JSON has not, is None.
+    NaN and infinity, which JSON does not have, become None.
     """
     sections = []
     for section in report.sections:
@@ -79,14 +79,14 @@ def _finite(value: Any) -> Any:
 
 
 def as_markdown(report: Report, charts: list[Path] | None = None) -> str:
-    """Return a report as a page of Markdown, with pictures of the curves where there are any."""
+    """Return a report as a page of Markdown, with the pictures of its curves."""
     machine = report.machine
     lines = [f"# Benchmarks on {machine['adapter']}", ""]
     lines += [f"Written by `{machine['command']}`, {machine['date']}.", ""]
     if machine["adapter type"] == "cpu":
         lines += [
-            "This adapter is a CPU: all times are wall-clock times of the same cores that the "
-            "peers run on, and say nothing of a GPU.",
+            "This adapter is a CPU: all times are wall-clock times on the same cores that the "
+            "peers use. They say nothing about a GPU.",
             "",
         ]
     lines += _table(_machine_table(machine))
@@ -167,7 +167,7 @@ def _draw_curves(report: Report, path: Path) -> list[Path]:
             by_chart.setdefault(curve.chart, []).append(curve)
     if not by_chart or find_spec("matplotlib") is None:
         return []
-    # Without pyplot, which would look for a display.
+    # Not pyplot, which looks for a display.
     figures = importlib.import_module("matplotlib.figure")
     written = []
     for chart, curves in by_chart.items():

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from importlib.metadata import version as _version
 
+from pygments.lexers.special import TextLexer
+from sphinx.application import Sphinx
+
 project = "vkbloom"
 release = _version("vkbloom")
 copyright = "the vkbloom authors, MIT licence"
@@ -25,6 +28,12 @@ autodoc_typehints = "none"
 # Members of classes are listed by the template, once.
 numpydoc_show_class_members = False
 templates_path = ["templates"]
+
+
+def setup(app: Sphinx) -> None:
+    """Flowcharts are for GitHub and editors; here their text is shown."""
+    app.add_lexer("mermaid", TextLexer)
+
 
 html_theme = "furo"
 html_title = f"vkbloom {release}"

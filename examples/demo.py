@@ -23,12 +23,12 @@ SIZE = (1280, 720)
 
 
 def times(rendered: dict[str, vkbloom.Frames], device: str) -> Table:
-    """Return a table of the time of each pass in milliseconds, a column for each render."""
+    """Return a table of the time of each pass in milliseconds, with a column for each render."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column(f"pass, ms on the {device}")
     for name in rendered:
         table.add_column(name.replace("_", " "), justify="right")
-    # The longest list first: the passes come in the order in which they run.
+    # The longest list first, so that the passes keep the order in which they run.
     by_length = sorted(rendered.values(), key=lambda frames: -len(frames.timings))
     for name in dict.fromkeys(name for frames in by_length for name in frames.timings):
         seconds = [frames.timings.get(name) for frames in rendered.values()]
@@ -43,7 +43,7 @@ def times(rendered: dict[str, vkbloom.Frames], device: str) -> Table:
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True)
 @click.option("--adapter", default="auto", show_default=True, help="As for vkbloom.Renderer.")
 def main(out: Path, adapter: str) -> None:
-    """Render, write the pictures, and say where they are."""
+    """Render, write the pictures, and print their paths."""
     out.mkdir(parents=True, exist_ok=True)
     scene = vkbloom.Scene.ufo()
     rendered: dict[str, vkbloom.Frames] = {}
@@ -51,8 +51,8 @@ def main(out: Path, adapter: str) -> None:
         "bloom_off": vkbloom.Separable(bloom=False),
         "bloom_on": vkbloom.Separable(),
     }.items():
-        # A renderer of its own for each, so that every pass runs, and is timed, in both. The first
-        # frame is of another time and only there to have the pipelines compiled.
+        # One renderer for each, so that every pass runs and is timed in both. The first frame, at
+        # another time, only compiles the pipelines.
         with vkbloom.Renderer(adapter) as renderer:
             renderer.render(scene, settings, SIZE, time=0.5)
             rendered[name] = renderer.render(scene, settings, SIZE)

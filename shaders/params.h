@@ -19,6 +19,13 @@
     SETTING(highlight, 1000.0, 10.0, 65504.0) \
     SETTING(clamp_max, 65472.0, 0.0, 65504.0) \
     SETTING(smooth_width, 0.01, 0.0001, 65504.0) \
+    SETTING(threshold_scale, 2.0, 0.0, 65504.0) \
+    SETTING(luminance_cap, 12.0, 0.0, 65504.0) \
+    SETTING(glow_bloom, 0.0, 0.0, 1.0) \
+    SETTING(strength, 1.0, 0.0, 16.0) \
+    SETTING(white, 1.0, 0.01, 65504.0) \
+    SETTING(smoothness, 0.1, 0.0, 1.0) \
+    SETTING(maximum, 3.4e38, 0.0, 65504.0) \
     SETTING(offset, 1.0, 0.0, 16.0) \
     SETTING(intensity, 1.0, 0.0, 65504.0) \
     SETTING(exposure, 0.0, -32.0, 32.0)
@@ -107,7 +114,14 @@
     THRESHOLD_ROWS(B, READS) \
     READS(B, highlight) \
     READS(B, clamp_max) \
-    READS(B, smooth_width)
+    READS(B, smooth_width) \
+    READS(B, threshold_scale) \
+    READS(B, luminance_cap) \
+    READS(B, glow_bloom) \
+    READS(B, strength) \
+    READS(B, smoothness) \
+    READS(B, maximum) \
+    INPUT(B, float, exposure)
 
 // Levels of several sizes into one image, with their weights.
 #define GATHER_BLOCK(B, READS, INPUT, VEC4S) \
@@ -123,6 +137,11 @@
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
+// The composite of Godot.
+#define GODOT_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
+    COMPOSITE_ROWS(B, READS, INPUT) \
+    READS(B, white)
+
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
     BLOCK(extract, EXTRACT_BLOCK) \
@@ -135,7 +154,8 @@
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
-    BLOCK(composite, COMPOSITE_BLOCK)
+    BLOCK(composite, COMPOSITE_BLOCK) \
+    BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
 // Settings that no shader reads, for they shape the graph.
 // Whole numbers: COUNT(name, default, min, max); a flag is one of 0 and 1.
@@ -152,7 +172,10 @@
     COUNT(anti_flicker, 1, 0, 1) \
     COUNT(resolution, 384, 16, 2048) \
     COUNT(iterations, 6, 2, 8) \
-    COUNT(high_quality_filtering, 1, 0, 1)
+    COUNT(high_quality_filtering, 1, 0, 1) \
+    COUNT(node, 0, 0, 1) \
+    COUNT(bicubic, 1, 0, 1) \
+    COUNT(karis_average, 0, 0, 1)
 
 // Real numbers, in double so that sizes come out as they do in Python.
 #define REAL_ROWS(REAL) \
@@ -162,12 +185,17 @@
     REAL(low_frequency_boost, 0.7, 0.0, 1.0) \
     REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
     REAL(high_pass_frequency, 1.0, 0.001, 1.0) \
-    REAL(scatter, 0.7, 0.0, 1.0)
+    REAL(scatter, 0.7, 0.0, 1.0) \
+    REAL(size, 0.5, 0.0, 1.0) \
+    REAL(filter_radius, 0.005, 0.0, 1.0)
 
 // The largest values of 8 bits, of half floats and of floats.
 #define UNORM_LIMIT 1.0
 #define HALF_LIMIT 65504.0
 #define SINGLE_LIMIT 3.402823466e38
+// The largest float of 11 bits; that of 10 bits is less.
+#define UFLOAT11_LIMIT 65024.0
+#define UFLOAT10_LIMIT 64512.0
 
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
@@ -202,13 +230,15 @@
 #define TILE_RADIUS 16
 #define WHOLE_VEC4S 5
 
-// The levels that one pass gathers.
-#define GATHERED_LEVELS 5
+// The most levels that one pass gathers, and the most of a chain.
+#define GATHERED_LEVELS 7
+#define MAX_LEVELS 16
 
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an int,
 // and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as an image of
 // that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for loops that a compiler
-// can unroll; with EXTRACT, halving starts from the image itself, past the threshold.
+// can unroll; with EXTRACT, halving starts from the image itself, past the threshold. FIRST is of an
+// engine's first level, LEVELS the number that a pass gathers.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -226,13 +256,19 @@
     CONSTANT(13, ADD_OWN, add_own) \
     CONSTANT(14, UPSAMPLE, upsample) \
     CONSTANT(15, EXTRACT, extract) \
-    CONSTANT(16, EMITTERS, emitters)
+    CONSTANT(16, EMITTERS, emitters) \
+    CONSTANT(17, FIRST, first) \
+    CONSTANT(18, LEVELS, levels) \
+    CONSTANT(19, KARIS_AVERAGE, karis_average) \
+    CONSTANT(20, NODE, node)
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
     NAME(COMPOSITE_ADD, 0, add) \
     NAME(COMPOSITE_MIX, 1, mix) \
-    NAME(COMPOSITE_SCREEN, 2, screen)
+    NAME(COMPOSITE_SCREEN, 2, screen) \
+    NAME(COMPOSITE_SOFT_LIGHT, 3, soft_light) \
+    NAME(COMPOSITE_REPLACE, 4, replace)
 
 #define TONEMAP_NAMES(NAME) \
     NAME(TONEMAP_NONE, 0, none) \
@@ -273,8 +309,11 @@
     NAME(STORED_HALF, 1, half) \
     NAME(STORED_SINGLE, 2, single) \
     NAME(STORED_UNORM8_SCALED, 3, unorm8_scaled) \
+    NAME(STORED_UFLOAT, 4, ufloat) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
-    NAME(UPSAMPLE_CUBIC, 2, cubic)
+    NAME(UPSAMPLE_CUBIC, 2, cubic) \
+    NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
+    NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -42,6 +43,33 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path_factory.mktemp("pipelines")))
         patch.setenv("VKBLOOM_ADAPTER", ADAPTER)
+        yield
+
+
+class RunsOwnModules:
+    """In place of pytester's snapshot of all modules: a run's own files are forgotten alone.
+
+    Libraries that a run is the first to import would be imported twice, which NumPy, scikit-image
+    and the core's types do not stand.
+    """
+
+    def __init__(self, preserve: object) -> None:
+        self.before = set(sys.modules)
+
+    def restore(self) -> None:
+        for name in set(sys.modules) - self.before:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file and Path(file).is_relative_to(self.folder):
+                del sys.modules[name]
+
+    folder: Path
+
+
+@pytest.fixture(scope="session", autouse=True)
+def modules_stay(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    RunsOwnModules.folder = tmp_path_factory.getbasetemp()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("_pytest.pytester.SysModulesSnapshot", RunsOwnModules)
         yield
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom import Frames, Separable, Settings, reference
+from vkbloom import DualKawase, Frames, Pyramid, Separable, Settings, _core, reference
 
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 _DTYPES = {format: dtype for dtype, format in FORMATS.items()}
@@ -22,6 +22,9 @@ _SINGLE = 1e-4
 # normal half, 2 ** -14.
 _HALF_ROUNDING = 2.0**-11
 _HALF_LEAST = 2.0**-25
+
+# What passes their threshold is their glow.
+_EXTRACTING = (Separable, Pyramid, DualKawase)
 
 # Framebuffers in which one 8-bit stage's rounding arrives, or that of the glow and one more.
 _FIRST_STAGES = ("glow", "blur_vertical", "down_0")
@@ -89,6 +92,13 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
     expected = reference.apply(image, settings)
     assert list(frames) == list(expected)
     format = settings.format or FORMATS[image.dtype.name]
+    if settings.threshold is not None and not isinstance(settings, _EXTRACTING):
+        # Its threshold comes after the glow, and magnifies what that was rounded by.
+        limit = tolerance(_DTYPES[format], expected["glow"], stages_of_8_bits=1)
+        assert_close("glow", frames["glow"], expected["glow"], limit)
+        height, width, _ = image.shape
+        expected |= reference.passes(frames["glow"], settings, (width, height), format)
+        expected["final"] = reference.composite(image, expected["bloom"], settings)
     passes_before_vertical = 2 * getattr(settings, "loops", 1) - 1
     hidden = passes_before_vertical - 1
     if isinstance(settings, Separable):
@@ -100,7 +110,8 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
         dtype = image.dtype if name == "final" else _DTYPES[format]
         assert array.dtype == dtype, f"{name}: {array.dtype}, not {dtype}"
         assert array.flags.c_contiguous, f"{name}: not contiguous"
-        assert array.flags.owndata, f"{name}: does not own its memory"
+        is_own = array.flags.owndata or isinstance(array.base, _core.Pages)
+        assert is_own, f"{name}: does not own its memory"
         is_first = name in _FIRST_STAGES and (
             name != "blur_vertical" or passes_before_vertical == 1
         )
@@ -115,7 +126,8 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
         )
     if settings.bloom and _DTYPES[format] != image.dtype:
         # The coarser bloom's rounding goes through the composite into a finer final.
-        limits["final"] = limits["final"] + settings.intensity * limits["bloom"]
+        of_bloom = np.broadcast_to(limits["bloom"], frames["bloom"].shape)[..., : image.shape[2]]
+        limits["final"] = limits["final"] + settings.intensity * of_bloom
     for name, array in frames.items():
         assert_close(name, array, expected[name], limits[name])
         if name != "final":

@@ -1,9 +1,9 @@
 #!/bin/sh
-# Line and branch coverage of csrc by the tests that touch the core and by the walks over its faults
-# and over Python's.
-# PYTHON: an interpreter with the test requirements installed. STRIDE: of so many fault points one
-# (8). Arguments go to pytest. Prints a table of the files; build/coverage/uncovered.txt has the
-# lines that nothing reached.
+# Line and branch coverage of csrc by the tests that use the core, by the fault walk, and by the walk
+# over Python's allocations.
+# PYTHON: an interpreter with the test requirements installed. STRIDE: walk one of this many fault
+# points (8). Arguments go to pytest. Prints a table of the files, and writes the lines that were not
+# reached to build/coverage/uncovered.txt.
 set -eu
 
 cd "$(dirname "$0")/.."

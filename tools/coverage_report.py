@@ -1,4 +1,4 @@
-"""Print what gcov counted for each file of csrc, and list the lines that nothing reached.
+"""Print line and branch coverage of each file of csrc, and list the lines not reached.
 
 ``python coverage_report.py TREE LIST``: TREE is a tree that was built with ``--coverage`` and run.
 """
@@ -14,7 +14,7 @@ import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-#: What is there for the tests alone.
+#: Files that exist only for tests.
 LEFT_OUT = {"faults.c", "faults.h"}
 
 
@@ -55,7 +55,7 @@ def main(tree: Path, listed: Path) -> int:
     everything = [count for file in lines.values() for count in file.values()]
     row("all", everything, [count for file in branches.values() for count in file])
     listed.write_text("\n".join(missed) + "\n")
-    print(f"{len(missed)} lines that nothing reached: {os.path.relpath(listed)}")
+    print(f"{len(missed)} lines not reached: {os.path.relpath(listed)}")
     return 0
 
 

@@ -45,7 +45,7 @@ def gbuffer(renderer: vkbloom.Renderer) -> list[NDArray[np.float64]]:
 
 
 def tone_mapping(renderer: vkbloom.Renderer) -> list[NDArray[np.float64]]:
-    """Return a glow of 1 and of 8 times its colour, cut off at 1 and through the ACES curve."""
+    """Return a glow of 1 and of 8 times its colour, clipped at 1 and mapped by the ACES curve."""
     curve = SETTINGS.replace(tonemap="aces", exposure=-1.0, encoding="gamma22")
     return [
         render(renderer, intensity, settings)["final"][..., :3] / 255
@@ -73,7 +73,7 @@ def textures(renderer: vkbloom.Renderer) -> list[NDArray[np.float64]]:
 
 
 def dithering(renderer: vkbloom.Renderer) -> list[NDArray[np.float64]]:
-    """Return 5 stops too dark a picture, without and with dither, 24 times as bright again."""
+    """Return a picture 5 stops too dark, without and with dither, then brightened 24 times."""
     settings = SETTINGS.replace(intensity=0.5, exposure=-5.0)
     finals = (
         renderer.render(house(), settings.replace(dither=dither), SIZE, shading="deferred")["final"]
@@ -83,10 +83,10 @@ def dithering(renderer: vkbloom.Renderer) -> list[NDArray[np.float64]]:
 
 
 def save(panels: list[NDArray[np.float64]], target: Path) -> None:
-    """Write panels, two a row, as a JPEG file."""
+    """Write panels, two in each row, as a JPEG file."""
     rows = [np.concatenate(panels[row : row + 2], 1) for row in range(0, len(panels), 2)]
-    whole = np.concatenate(rows, 0)
-    picture = np.round(np.clip(whole, 0, 1) * 255).astype(np.uint8)
+    sheet = np.concatenate(rows, 0)
+    picture = np.round(np.clip(sheet, 0, 1) * 255).astype(np.uint8)
     buffer = oiio.ImageBuf(np.ascontiguousarray(picture))
     buffer.specmod().attribute("Compression", "jpeg:85")
     if not buffer.write(str(target)):

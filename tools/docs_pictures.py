@@ -2,15 +2,17 @@
 
 python tools/docs_pictures.py docs/pictures
 
-- flow_forward.png, flow_deferred.png: every framebuffer, and which are made from which, as the
-  core's own description of its passes says
+- flow_forward.png, flow_deferred.png: every framebuffer with those that it is made from, by the
+  renderer's plan
 - gallery.jpg: the saucer with each preset
+- the flowchart of docs/plans.md, from a plan
 - profiles.png: how the light of a point falls off with each preset
 """
 
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -21,23 +23,22 @@ import numpy as np
 import OpenImageIO as oiio
 
 import vkbloom
-from vkbloom import _core
 from vkbloom.views import pictures
 
 mpl.use("agg")
 from matplotlib import pyplot as plt
 
 SIZE = (640, 360)
-# Pages of both themes show them.
+# A colour that is readable in the light and the dark theme.
 INK = "#8a929a"
 
 
-def edges(settings: vkbloom.Settings, shading: str) -> dict[str, set[str]]:
+def edges(plan: vkbloom.Plan) -> dict[str, set[str]]:
     """Return which framebuffers each is made from, in the order that the data flows."""
     made_from: dict[str, set[str]] = defaultdict(set)
-    for row in _core.describe(settings, SIZE, True, shading)["passes"]:
-        for target in row["targets"]:
-            made_from[target] |= set(row["reads"]) - {target}
+    for one in plan.passes:
+        for target in one.writes:
+            made_from[target] |= set(one.reads) - {target}
     return dict(made_from)
 
 
@@ -71,9 +72,9 @@ _ACROSS, _DOWN = 2.2, 1.6  # from box to box
 
 
 def edge(box: tuple[float, float], towards: tuple[float, float]) -> tuple[float, float]:
-    """Return where a line from the middle of a box to another leaves it."""
+    """Return the point where a line between the centres of two boxes leaves the first."""
     x, y = towards[0] - box[0], towards[1] - box[1]
-    # Below the picture is its name.
+    # The name is below the picture.
     high = _HEIGHT / 2 + 0.05 + (_CAPTION if y < 0 else 0)
     share = min((_WIDTH / 2 + 0.05) / abs(x) if x else np.inf, high / abs(y) if y else np.inf)
     return box[0] + share * x, box[1] + share * y
@@ -86,9 +87,10 @@ def draw_flow(
     layout: dict[str, tuple[float, float]],
     path: Path,
 ) -> None:
-    """Draw framebuffers, with arrows to what is made from them."""
+    """Draw framebuffers, with arrows to those made from them."""
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=3.0)
     frames = renderer.render(scene, settings, SIZE, shading=shading)
+    plan = renderer.plan(scene, settings, SIZE, shading=shading)
     places = {name: (_ACROSS * layout[name][0], -_DOWN * layout[name][1]) for name in frames}
     across = max(x for x, _ in places.values()) + _WIDTH + 0.2
     down = max(-y for _, y in places.values()) + _HEIGHT + _CAPTION + 0.2
@@ -106,8 +108,8 @@ def draw_flow(
         )
         text = f"{name}\n{array.shape[1]} x {array.shape[0]}, {array.dtype}"
         axes.text(x, y - _HEIGHT / 2 - 0.05, text, ha="center", va="top", color=INK, fontsize=7)
-    for name, reads in edges(settings, shading).items():
-        # Images that are no framebuffers, such as the deferred glow, are passed over.
+    for name, reads in edges(plan).items():
+        # Skip images that are not framebuffers, such as the deferred glow.
         for read in reads & set(frames) if name in frames else ():
             ends = edge(places[name], places[read]), edge(places[read], places[name])
             axes.annotate("", *ends, arrowprops={"arrowstyle": "->", "color": INK, "lw": 1.2})
@@ -148,7 +150,7 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
     width, height = SIZE
     image = np.zeros((height, width, 3), np.float32)
     y, x = height // 2, width // 2
-    # KinoBloom takes a single pixel for a firefly.
+    # KinoBloom removes a single pixel as a firefly.
     image[y - 1 : y + 2, x - 1 : x + 2] = 1000
     figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
     for index, (name, settings) in enumerate(vkbloom.presets.items()):
@@ -172,8 +174,19 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
     plt.close(figure)
 
 
+def write_flowchart(page: Path) -> None:
+    """Put the forward system's flowchart in the place of the one in a page."""
+    os.environ["VKBLOOM_FORM"] = "fragment"
+    with vkbloom.Renderer("software") as renderer:
+        plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Separable(), SIZE)
+    del os.environ["VKBLOOM_FORM"]
+    before, _, rest = page.read_text().partition("```mermaid\n")
+    page.write_text(f"{before}```mermaid\n{plan.to_mermaid()}\n```{rest.partition('```')[2]}")
+
+
 def main(folder: Path) -> None:
     """Write all pictures."""
+    write_flowchart(folder.parent / "plans.md")
     with vkbloom.Renderer("software") as renderer:
         draw_flow(renderer, "forward", vkbloom.Separable(), FORWARD, folder / "flow_forward.png")
         draw_flow(

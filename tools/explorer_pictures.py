@@ -1,8 +1,8 @@
-"""Take the screenshots of docs/explorer.md: the page on its own and in JupyterLab, light and dark.
+"""Take the screenshots of docs/explorer.md: its own page and JupyterLab, light and dark.
 
 python tools/explorer_pictures.py docs/pictures
 
-Needs Chromium, playwright and JupyterLab, as the tests do.
+It needs Chromium, playwright and JupyterLab, as the tests do.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from playwright.sync_api import sync_playwright
 import vkbloom
 from vkbloom.explorer.viewer import Viewer
 
-# What starts both for the tests.
+# The tests' functions that start both pages.
 sys.path.append(str(Path(__file__).parents[1]))
 from tests.explorer.explorer_hosts import jupyterlab, served
 
@@ -42,7 +42,7 @@ def wait(page: Page, code: str) -> None:
 
 
 def save(page: Page, path: Path) -> None:
-    """Save what is seen as JPEG, whose artefacts no one will take for the renderer's."""
+    """Save a screenshot as JPEG, in a quality without visible artefacts."""
     png = path.with_suffix(".png")
     page.screenshot(path=png)
     image = oiio.ImageBuf(str(png))
@@ -100,7 +100,7 @@ def photograph_jupyterlab(browser: Browser, folder: Path) -> None:
 @click.command(help=__doc__.splitlines()[0])
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
 def main(folder: Path) -> None:
-    """Take all of them."""
+    """Take all screenshots."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         raise click.ClickException("Chromium is not installed")

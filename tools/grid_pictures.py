@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/grids.md: a contact sheet and curves of a grid of the saucer.
+"""Draw the pictures of docs/grids.md: contact sheet and response curves of a grid of the saucer.
 
 python tools/grid_pictures.py docs/pictures
 """

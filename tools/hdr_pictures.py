@@ -1,7 +1,7 @@
-"""Make the pictures of docs/hdr.md: HDR images with no bloom and with several methods.
+"""Make the pictures of docs/hdr.md: HDR images without bloom and with several methods.
 
-The images are not part of the project; name the files, for example those of the OpenEXR image
-collection: ``python tools/hdr_pictures.py Desk.exr BrightRings.exr``.
+The images are not part of the project. Pass the files as arguments, for example from the OpenEXR
+image collection: ``python tools/hdr_pictures.py Desk.exr BrightRings.exr``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Hold other people's blurs and blooms, and our own, against the laws of `vkbloom.testing`.
+"""Test blurs and blooms of other packages, and our own, against the laws of `vkbloom.testing`.
 
 ``python -m tools.laws`` writes docs/laws.md. It needs the packages of benchmarks/peers.txt and a
 Vulkan driver, as pygfx's bloom runs through wgpu.
@@ -24,24 +24,24 @@ from vkbloom.testing.probe import Bloom
 TARGET = Path(__file__).parents[1] / "docs" / "laws.md"
 SIGMA = 2.0
 
-# Small kernels end long before the border; a chain's widest level does not.
+# Small kernels end far from the border; the widest level of a chain does not.
 SMALL = Probe(size=(65, 65))
 CHAIN = Probe(size=(256, 256))
-# Engines' methods have thresholds, and chains of more levels.
+# The methods of engines have thresholds and chains with more levels.
 ENGINE = Probe(size=(512, 512), value=16.0)
-# For methods whose result is in half floats whatever they are given.
+# For methods whose result has half floats for every input.
 HALF = dataclasses.replace(CHAIN, dtype="float16")
 
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """What is held against the laws, and what it promises."""
+    """A blur or bloom to test, and what it promises."""
 
     name: str
     bloom: Bloom
     probe: Probe
-    gain: float | None = None  # None: it promises none
-    sigma: float | None = None  # in pixels; None: it promises none
+    gain: float | None = None  # None: no promise
+    sigma: float | None = None  # in pixels; None: no promise
     picture: bool = False  # the picture with its bloom, not the bloom alone
 
 
@@ -78,7 +78,7 @@ def scipy() -> Iterator[Subject]:
         1.0,
         SIGMA,
     )
-    # The variance of n equal weights at whole distances is (n^2 - 1) / 12.
+    # The variance of n equal weights at integer distances is (n^2 - 1) / 12.
     yield Subject(
         f"{name} `uniform_filter` of 5",
         lambda image: ndimage.uniform_filter(image, (5, 5, 0)),
@@ -96,7 +96,7 @@ def scipy() -> Iterator[Subject]:
 
 
 def skimage() -> Iterator[Subject]:
-    """Yield scikit-image's Gaussian and, for what rings, its unsharp mask."""
+    """Yield scikit-image's Gaussian and, as an example that rings, its unsharp mask."""
     from skimage import filters
 
     name = f"scikit-image {version('scikit-image')}"
@@ -109,7 +109,7 @@ def skimage() -> Iterator[Subject]:
     )
     yield Subject(
         f"{name} `unsharp_mask`",
-        # With -1 it fills three rows of its result and leaves the rest as the memory was.
+        # With -1 it fills three rows of its result and leaves the rest uninitialized.
         lambda image: filters.unsharp_mask(image, SIGMA, channel_axis=2, preserve_range=True),
         SMALL,
         1.0,
@@ -117,7 +117,7 @@ def skimage() -> Iterator[Subject]:
 
 
 def pygfx(adapter: str) -> Iterator[Subject]:
-    """Yield pygfx's bloom alone, and the picture with it as it is by default."""
+    """Yield pygfx's bloom alone, and the picture with its default bloom."""
     from benchmarks.peers.pygfx import Bloom as Peer
 
     name = f"pygfx {version('pygfx')} `PhysicalBasedBloomPass`"
@@ -182,6 +182,9 @@ def ours(renderer: vkbloom.Renderer) -> Iterator[Subject]:
         vkbloom.HdrpBloom,
         vkbloom.UnrealBloom,
         vkbloom.KinoBloom,
+        vkbloom.GodotBloom,
+        vkbloom.BlenderGlare,
+        vkbloom.PygfxBloom,
     ):
         yield Subject(f"{name} `{method.__name__}`", bloom(method()), ENGINE)
     yield Subject(
@@ -197,7 +200,7 @@ Law = Callable[[Subject], None]
 
 
 def laws() -> dict[str, Law]:
-    """Return the laws by the heads of their columns; one that does not apply raises LookupError."""
+    """Return the laws by column; a law that does not apply raises LookupError."""
 
     def of_the_bloom(law: Callable[[Bloom, Probe], None]) -> Law:
         def check(subject: Subject) -> None:
@@ -237,14 +240,14 @@ def laws() -> dict[str, Law]:
 
 
 def fireflies(bloom: Bloom, probe: Probe) -> None:
-    """Try as many places as two halvings tell apart."""
+    """Try all positions that differ in a chain of two halvings."""
     if probe.dtype.kind == "u":
         raise LookupError("nothing is brighter than 1")
     testing.assert_bounded_fireflies(bloom, probe=probe, period=4)
 
 
 def measured(subject: Subject) -> str:
-    """Return gain and standard deviation of the point spread, in short."""
+    """Return gain and standard deviation of the point spread as a short text."""
     found = testing.response(lambda image, _: subject.bloom(image), "_", [None], subject.probe)
     sigma_x, sigma_y = found.sigma[0]
     border = f", {100 * found.at_border[0]:.1g} % at the border" * bool(found.at_border[0] > 1e-3)
@@ -287,40 +290,43 @@ def page(subjects: list[Subject], device: str) -> str:
 
 TEXT = """# Which laws blurs and blooms keep
 
-Made by `tools/laws.py`, which holds other people's blurs and blooms, and this package's own,
-against the assertions of `vkbloom.testing` (see [testing.md](testing.md)). Adapter of what runs on
+Written by `tools/laws.py`. It tests blurs and blooms of other packages, and of this one, against
+the assertions of `vkbloom.testing` (see [testing.md](testing.md)). Adapter, for those that use
 one: {device}.
 
 Gaussians have a sigma of {sigma:g} pixels. Images are float32 of 65 x 65 pixels with values up to
 1; 256 x 256 for chains of halved images; 512 x 512 with values up to 16 for the methods that
-engines published, most of which have a threshold. Tolerances are the default ones. An empty cell is
-a law that does not apply, a question mark one whose premise does not hold. "Mirrored" is
-`assert_symmetric` for left and right, top and bottom; "transposed" for rows and columns. Fireflies
-are to lift their surroundings by 1 at most.
+engines published, most of which have a threshold. Tolerances are the defaults. An empty cell
+means that the law does not apply. A question mark means that the premise of the law does not
+hold. "Mirrored" is `assert_symmetric` for left and right, top and bottom; "transposed" is the
+same for rows and columns. The limit for fireflies is 1: no bright pixel may raise its neighbours
+by more.
 
-A law that is broken is no fault by itself: a median is not linear, a threshold is there to break
-superposition, a linear blur spreads fireflies, and a chain that halves by 2 x 2 pixels puts the
-light of a pixel in the middle of its square. It is a fault where a method promises the law.
+A broken law is not in itself a fault. A median is not linear. A threshold is meant to break
+superposition. A linear blur spreads fireflies. A chain that halves by 2 x 2 pixels moves the
+light of a pixel to the centre of its square. A broken law is a fault if the method promises that
+law.
 
 {table}
 
-## What was found
+## Deviations
 
-The gain and the standard deviation of each point spread, then the largest deviation from each law
-that is broken, with its place.
+For each blur: the gain and the standard deviation of its point spread, then the largest deviation
+from each broken law, with its position.
 
 {notes}
 
-## Worth knowing
+## Notes
 
-- pygfx's bloom adds the light of its levels, so that its gain is their number, and the picture with
-  it brightens as a whole. Its `use_karis_average` makes no difference in this version: one uniform
-  buffer holds the switch for all levels, all writes to it come before the first pass runs, and the
-  last one turns it off.
-- `unsharp_mask` of this scikit-image is called with `channel_axis=2` here: with -1 it filters three
-  rows and leaves the rest of its result as the memory was, which these assertions noticed.
-- A `uniform_filter` of even size is half a pixel off, as an even number of taps has no middle one.
-- PyTorch is not here: its wheel for Linux has 539 MB.
+- pygfx's bloom adds the light of its levels. So its gain is the number of levels, and the picture
+  with bloom is brighter as a whole. Its `use_karis_average` has no effect in this version: one
+  uniform buffer holds the switch for all levels, all writes to it come before the first pass
+  runs, and the last write turns it off.
+- `unsharp_mask` of this scikit-image is called with `channel_axis=2` here. With -1 it filters
+  three rows and leaves the rest of its result uninitialized. These assertions found that.
+- A `uniform_filter` of even size shifts the image by half a pixel, as an even number of taps has
+  no middle tap.
+- PyTorch is not tested here: its wheel for Linux has 539 MB.
 """
 
 

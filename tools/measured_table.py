@@ -2,7 +2,7 @@
 
 python tools/measured_table.py docs/measured_table.md
 
-The cost is wall-clock time, so that it wants a machine that does nothing else.
+The cost is wall-clock time, so run nothing else on the machine meanwhile.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 import vkbloom
 
 FRAME = (1280, 720)
-# Above every threshold, and below where Filament compresses; 3 x 3 pixels, since KinoBloom takes
-# a single one for a firefly.
+# Above every threshold, and below the values that Filament compresses. 3 x 3 pixels, since
+# KinoBloom removes a single pixel as a firefly.
 VALUE = 100.0
 FLAT = 10.0
 SHARES = (0.5, 0.9)
 
 
 def spread(bloom: NDArray[np.float64], light: float) -> tuple[float, list[float]]:
-    """Return how much of a light in the middle is in its bloom, and the radii that hold shares."""
+    """Return the share of a light that is in its bloom, and the radii that contain parts of it."""
     height, width = bloom.shape
     y, x = np.mgrid[:height, :width]
     radius = np.hypot(y - height // 2, x - width // 2).ravel()
@@ -58,14 +58,14 @@ def row(renderer: vkbloom.Renderer, name: str, settings: vkbloom.Settings, round
     point[y - 1 : y + 2, x - 1 : x + 2] = VALUE
     frames = renderer.apply(point, exact)
     share, radii = spread(frames["bloom"][:, :, 0].astype(np.float64), 9 * VALUE)
-    # Another image before, so that every pass runs, and is counted.
+    # Another image before, so that every pass runs and is counted.
     flat = renderer.apply(np.full_like(point, FLAT), exact)
     gain = float(flat["bloom"][y, x, 0]) / FLAT
     milliseconds = 1e3 * cost(renderer, settings, rounds)
     cells = [
         f"`{name}`",
         f"{gain:.3g}",
-        f"{settings.intensity * gain:.3g}" if settings.composite == "add" else "mixed",
+        f"{settings.intensity * gain:.3g}" if settings.composite == "add" else settings.composite,
         f"{share:.3g}",
         *(f"{radius:.0f}" for radius in radii),
         str(len(flat.timings)),

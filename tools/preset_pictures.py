@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Draws what each preset makes of one bright point, side by side, for docs/presets.md.
+"""Draw the bloom of one bright point with each preset, side by side, for docs/presets.md.
 
-The point is 3 x 3 pixels of 1000 in the middle of a black 640 x 360 frame: KinoBloom removes a
-single one. Shown is the bloom, cut to a square around the point, as log10 of its share of the
-brightest bloom pixel: white is that one, black 10^-5 of it or less.
+The point has 3 x 3 pixels of 1000 in the middle of a black 640 x 360 frame, since KinoBloom removes
+a single pixel. The picture shows a square around the point, in a logarithmic scale: white is the
+brightest pixel of the bloom, black is 10^-5 of it or less.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import vkbloom
 
 FRAME = (640, 360)
-SIDE = 300  # of the square that is shown
+SIDE = 300  # of the square shown, in pixels
 GAP = 6
 LABEL = 26
 COLUMNS = 4
@@ -38,7 +38,7 @@ def spread(renderer: vkbloom.Renderer, settings: vkbloom.Settings) -> NDArray[np
 
 
 def grey(bloom: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the bloom's decades as 0..1."""
+    """Return the bloom on the logarithmic scale, as 0..1."""
     with np.errstate(divide="ignore"):
         decades = np.log10(bloom / bloom.max())
     return np.clip(1 + decades / DECADES, 0, 1).astype(np.float32)
@@ -58,7 +58,7 @@ def draw(pictures: dict[str, NDArray[np.float32]], path: Path) -> None:
         buffer.set_pixels(roi, picture[..., np.newaxis])
         if not oiio.ImageBufAlgo.render_text(buffer, left, top + 20, name, 20, "", (1.0,)):
             raise SystemExit(f"the label {name} cannot be drawn: {buffer.geterror()}")
-    # 32 levels of grey are enough to see a shape, and make the file small.
+    # 32 levels of grey show the shape and keep the file small.
     levels = np.round(buffer.get_pixels("float") * 31) / 31
     out = oiio.ImageBuf((np.clip(levels, 0, 1) * 255).round().astype(np.uint8))
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,20 +1,20 @@
-"""Measure what renderers and frames leave behind.
+"""Measure the memory that renderers and frames leak.
 
-The growth of the process for one repetition of each is shown:
+It shows the growth of the process for one repetition of each:
 
 - ``renderer``: a `vkbloom.Renderer`, created and closed, and a list of the adapters;
 - ``validated``: the same under the validation layer;
 - ``frame``: a renderer with one small frame of all framebuffers;
 - ``open``: one more frame of a renderer that stays open, sizes and settings changing, and a
-  sequence of frames that is left half taken.
+  sequence of frames that is abandoned half way.
 
-What is measured, after a collection and a trim of the heap, as the median of several rounds:
+These are measured after a collection and a trim of the heap, as the median of several rounds:
 
 - ``heap``: bytes in use by malloc, of all libraries and of Python (whose own allocator is turned
-  off), whatever the heap's fragmentation;
+  off), independent of the heap's fragmentation;
 - ``data``: resident bytes that are not executable, the heap with its gaps and all other mappings;
-- ``code``: resident bytes of anonymous executable mappings. The package makes none: it is what the
-  driver compiled shaders to;
+- ``code``: resident bytes of anonymous executable mappings. These are shaders compiled by
+  the driver; the package makes none;
 - ``descriptors`` and ``threads``.
 
 Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT]``, COUNT renderers
@@ -35,8 +35,8 @@ import numpy as np
 
 import vkbloom
 
-# One arena without a cache before it, and all of Python's objects in it, so that the bytes in use
-# are exact.
+# One arena without thread caches, for all allocations including Python's objects, so that the bytes
+# in use are exact.
 ENVIRONMENT = {
     "PYTHONMALLOC": "malloc",
     "MALLOC_ARENA_MAX": "1",
@@ -69,8 +69,8 @@ class _HeapInfo(ctypes.Structure):
 
 
 def sizes() -> tuple[int, ...]:
-    """Return what this process has in use, in the order of SIZES."""
-    # CPython's cache of type attributes holds on to up to 4096 names until it is cleared.
+    """Return the memory in use by this process, in the order of SIZES."""
+    # CPython's cache of type attributes keeps up to 4096 names alive until it is cleared.
     getattr(sys, "_clear_internal_caches", sys._clear_type_cache)()
     gc.collect()
     libc = ctypes.CDLL(None)
@@ -96,14 +96,14 @@ def sizes() -> tuple[int, ...]:
 def growth(
     action: Callable[[], None], count: int, settle: Callable[[], None] = lambda: None
 ) -> dict[str, float]:
-    """Return what one call leaves behind, the median of ROUNDS; `count` calls in all.
+    """Return the growth of one call, the median of ROUNDS; `count` calls in all.
 
     `settle` is called before each look at the sizes.
     """
-    # What the first calls build up once, in the loader, the driver and Python.
+    # The first calls fill caches of the loader, the driver and Python.
     for _ in range(WARM_UP):
         action()
-    # Allocated before the first look, so that looking leaves nothing behind.
+    # Allocated before the first measurement, which must not allocate itself.
     taken = np.zeros((ROUNDS + 1, len(SIZES)))
     settle()
     taken[0] = sizes()
@@ -112,7 +112,7 @@ def growth(
             action()
         settle()
         taken[row] = sizes()
-    # A median, because a table of Python's that grows in one of the rounds is no leak.
+    # A median, since a table of Python may grow in one of the rounds without a leak.
     middle = np.median(np.diff(taken, axis=0), axis=0) / (count // ROUNDS)
     return dict(zip(SIZES, middle.tolist(), strict=True))
 
@@ -135,13 +135,13 @@ def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
         def action() -> None:
             chosen, size = next(requests)
             renderer.render(scene, chosen, size, time=next(times))
-            # Of some more, what the device has begun with is left to it.
+            # Abandon some more, which the device has started with.
             many = renderer.render_many(scene, settings, size, time=next(times))
             for _ in range(3):
                 next(many)
 
         def settle() -> None:
-            # The driver keeps blocks of 64 KiB of its last pictures; those of a pixel need none.
+            # The driver keeps blocks of 64 KiB for its last images; images of one pixel need none.
             for time in range(8):
                 tiny = vkbloom.Separable(bloom_size=(1, 1))
                 renderer.render(scene, tiny, (1, 1), time=time / 8)
@@ -170,8 +170,8 @@ def measure(count: int) -> dict[str, dict[str, float]]:
     return {
         "renderer": renderer_growth(count),
         "validated": renderer_growth(count // 5, validation=True),
-        "frame": growth(frame, count // 10),
-        "open": frame_growth(scene, 4 * count),
+        "frame": growth(frame, count // 4),
+        "open": frame_growth(scene, 20 * count),
     }
 
 

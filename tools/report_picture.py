@@ -19,7 +19,7 @@ SIZE = (1280, 1180)
 
 
 def write(folder: Path) -> Path:
-    """Write a report in which two settings of the saucer are held against each other."""
+    """Write a report that compares two settings of the saucer."""
     right = vkbloom.Separable(format="rgba16float")
     weights = list(right.weights)
     weights[1] *= 0.9

@@ -1,6 +1,6 @@
-"""Print what an extra of pyproject.toml requires, the package's own extras resolved.
+"""Print the requirements of an extra of pyproject.toml, with the package's own extras resolved.
 
-So that the packages are installed once for each change of pyproject.toml, not for each build.
+The Makefile uses it to install packages once for each change of pyproject.toml, not for each build.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 
 
 def requirements(extra: str) -> list[str]:
-    """List the requirements of the package with that extra."""
+    """List the requirements of the package with this extra."""
     project = tomllib.loads(PROJECT.read_text())["project"]
     found: dict[str, None] = dict.fromkeys(project["dependencies"])
 

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Runs the test-suite over a core built with the address, undefined-behaviour and leak sanitizers.
-# PYTHON: an interpreter with the test requirements installed. Arguments go to pytest; without any,
-# the tests run that touch the core.
+# Runs the tests with a core built with the address, undefined-behaviour and leak sanitizers.
+# PYTHON: an interpreter with the test requirements installed. Arguments go to pytest. Without
+# arguments, it runs the tests that use the core.
 set -eu
 
 cd "$(dirname "$0")/.."
-# Without arguments: these files test Python alone or the core through other processes, and images
-# of many pixels take minutes here without another path through the core.
+# The files left out test only Python, or the core in other processes. Large images take minutes here
+# and reach no other code of the core.
 if [ $# = 0 ]; then
     set -- -k "not 333x and not 1920 and not count_of_a_point"
     for name in faults frames mutations; do
@@ -31,7 +31,7 @@ fi
 folder=$PWD/build/sanitize
 mkdir -p "$folder"
 
-# A tree of its own: the sanitized core must not replace the one in use.
+# A separate tree, so that the sanitized core does not replace the one in use.
 rm -rf "$folder/tree" "$folder/log"
 mkdir -p "$folder/tree" "$folder/log"
 cp -r csrc shaders python setup.py pyproject.toml README.md tests tools examples "$folder/tree/"
@@ -44,10 +44,10 @@ VKBLOOM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=undefined \
     "$PYTHON" setup.py --quiet build_ext --inplace
 
 asan=$(${CC:-cc} -print-file-name=libasan.so)
-# libstdc++ comes before the sanitizer's checks of exceptions, which Mesa's compiler throws.
+# Preload libstdc++, since the sanitizer intercepts C++ exceptions, which Mesa's compiler throws.
 stdcxx=$(${CC:-cc} -print-file-name=libstdc++.so.6)
-# The interpreter's own allocations would hide and fake leaks: plain malloc, and a filter that
-# looks for the core in the stacks.
+# Python's allocator would hide leaks and report false ones. So use plain malloc, and a filter that
+# searches the stacks for the core.
 set +e
 ASAN_OPTIONS="detect_leaks=1:exitcode=0:allocator_may_return_null=1:log_path=$folder/log/asan" \
     LSAN_OPTIONS="suppressions=$PWD/tools/leaks.supp:print_suppressions=0" \

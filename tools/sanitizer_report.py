@@ -1,7 +1,7 @@
-"""Fail where a sanitizer's log has an error, or a leak whose memory the core itself allocated.
+"""Fail if a sanitizer's log has an error, or a leak of memory that the core itself allocated.
 
-CPython and other extension modules leave memory behind at exit, which LeakSanitizer reports with
-stacks that may pass through the core; only a stack whose first frames lie in it is ours.
+CPython and other extension modules leak memory at exit. LeakSanitizer reports it with stacks that
+may pass through the core. A leak belongs to the core only if the first frames are in the core.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import re
 import sys
 from pathlib import Path
 
-# The sanitized core has debug information, so that its frames name their source. A frame that names
-# the core's file alone lies past its end, in a driver that has been unloaded since.
+# The sanitized core has debug information, so its frames name their source. A frame that names only
+# the core's file is beyond its end, in a driver that was unloaded.
 OURS = re.compile(r" csrc/")
 FRAMES = 3  # the allocator, the core's own allocation function, its caller
 
 
 def findings(log: str) -> list[str]:
-    """Return the parts of a log that the core must answer for."""
+    """Return the errors and leaks of the core in a log."""
     found = []
     if "runtime error" in log or re.search(r"ERROR: AddressSanitizer", log):
         found.append(log)
@@ -29,7 +29,7 @@ def findings(log: str) -> list[str]:
 
 
 def main(folder: Path) -> int:
-    """Print what the logs of a folder hold against the core; 1 where there is something."""
+    """Print the errors and leaks of the core in a folder of logs; return 1 if there are any."""
     logs = sorted(folder.glob("*"))
     found = [part for log in logs for part in findings(log.read_text(errors="replace"))]
     print(f"sanitizers: {len(logs)} logs, {len(found)} findings in the core")

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs what the build and the tests need from the system, where it is missing and apt can do it.
-# Elsewhere it says what is missing. Arguments: the groups wanted, "build" and "test".
+# Installs missing system packages for the build and the tests with apt. Without apt or root, it
+# lists what is missing. Arguments: the groups "build" and "test".
 set -eu
 
 missing_packages=""
@@ -19,7 +19,7 @@ need() {
     fi
 }
 
-# want PACKAGE COMMAND...: the same for what a test is skipped without.
+# want PACKAGE COMMAND...: the same for a package without which tests are skipped.
 want() {
     package=$1
     shift
@@ -39,7 +39,7 @@ has_loader() {
 }
 
 has_driver() {
-    # A manifest of any driver, as the loader finds it.
+    # The manifest of any driver, where the loader searches.
     test -n "${VK_DRIVER_FILES:-${VK_ICD_FILENAMES:-}}" && return 0
     for folder in /usr/share /usr/local/share /etc; do
         ls "$folder"/vulkan/icd.d/*.json && return 0
@@ -95,7 +95,7 @@ if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
     echo "Installing with apt:$missing_packages$wanted_packages"
     export DEBIAN_FRONTEND=noninteractive
     apt-get update -qq
-    # Word splitting is wanted: one argument a package.
+    # Word splitting is intended: one argument for each package.
     # shellcheck disable=SC2086
     apt-get install -qq -y --no-install-recommends $missing_packages >/dev/null
     for package in $wanted_packages; do
@@ -105,5 +105,5 @@ if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
     check "$@"
 fi
 test -z "$missing_names" && exit 0
-echo "vkbloom needs these, which are not here:$missing_names" >&2
+echo "vkbloom needs these, which are not installed:$missing_names" >&2
 exit 1

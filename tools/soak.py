@@ -1,8 +1,9 @@
-"""Render many frames of changing size and settings, and see whether anything grows.
+"""Render many frames of changing size and settings, and check that the process does not grow.
 
-``python tools/soak.py [FRAMES]`` (20,000): after every tenth of them memory, file descriptors and
-threads of the process; 1 where the second half has grown by more than a page a hundred frames, or
-has other descriptors or threads. Linux with glibc 2.33 or newer.
+``python tools/soak.py [FRAMES]`` (20,000) prints memory, file descriptors and threads of the
+process after every tenth of the frames. It returns 1 if memory grows in the second half by more
+than a page for a hundred frames, or if the descriptors or threads change. Linux with glibc 2.33 or
+newer.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class _HeapInfo(ctypes.Structure):
 
 
 def counts() -> dict[str, int]:
-    """Return what must not grow."""
+    """Return the figures that must not grow."""
     gc.collect()
     libc = ctypes.CDLL(None)
     libc.malloc_trim(0)
@@ -51,11 +52,11 @@ def counts() -> dict[str, int]:
 
 
 def frame(renderer: vkbloom.Renderer, scene: vkbloom.Scene, dice: random.Random) -> None:
-    """Render one frame whose size, source and settings are by chance."""
-    # Some presets have levels of a fixed height, whose width follows the frame's shape.
+    """Render one frame with random size, source and settings."""
+    # Some presets have levels of a fixed height; their width depends on the frame's aspect.
     size = (dice.randrange(4, 65), dice.randrange(4, 65))
     if dice.random() < 0.01:
-        # Large arrays have pages of the renderer's, which are used again.
+        # Large arrays use recycled pages of the renderer.
         size = (dice.randrange(256, 400), dice.randrange(256, 400))
     settings = dice.choice(
         [
@@ -73,14 +74,14 @@ def frame(renderer: vkbloom.Renderer, scene: vkbloom.Scene, dice: random.Random)
     dtype = dice.choice((np.uint8, np.float16, np.float32))
     pixels = np.full((size[1], size[0], dice.choice((3, 4))), dice.randrange(1, 200), dtype)
     if dice.random() < 0.1:
-        # Left half taken.
+        # Abandon the sequence half way.
         next(iter(renderer.apply_many(pixels, [settings] * 4)))
     else:
         renderer.apply(pixels, settings, attachments=dice.choice(("all", "final")))
 
 
 def main(total: int) -> int:
-    """Print a row for each tenth; 1 where something grows."""
+    """Print a row for each tenth; return 1 if something grows."""
     dice = random.Random(9)
     scene = vkbloom.Scene.ufo()
     rows: list[dict[str, int]] = []
@@ -89,12 +90,12 @@ def main(total: int) -> int:
         for step in range(STEPS):
             for _ in range(total // STEPS):
                 frame(renderer, scene, dice)
-            # The same last frames, so that the same is held at each count.
+            # The same last frames, so that each count sees the same cached objects.
             for _ in range(4):
                 renderer.render(scene, None, (16, 16))
             renderer.apply(np.zeros((8, 8, 3), np.float32))
-            # As many idle pages, too: one array that is all of what may lie idle.
-            renderer._core.new_array(np.empty, (256 << 20,), "uint8")
+            # One array replaces all idle pages, so that each count sees the same number of them.
+            renderer._core.pages(256 << 20)
             rows.append(counts())
             shown = ", ".join(f"{value} {name}" for name, value in rows[-1].items())
             print(f"{(step + 1) * (total // STEPS):>8} frames: {shown}", flush=True)

@@ -12,7 +12,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 WALL = 256
-# The axis that a wall runs along, and to which side of the other one it lies.
+# For each wall: the axis along it, and its side on the other axis.
 WALLS = [(0, 1), (2, 1), (0, -1), (2, -1)]
 
 
@@ -28,7 +28,7 @@ def bricks() -> NDArray[np.uint8]:
 
 
 def windows() -> NDArray[np.uint8]:
-    """Return what glows of a wall: four windows with frames, each another warm colour, sRGB."""
+    """Return the emission of a wall: four framed windows, each in another warm colour, sRGB."""
     lights = np.zeros((WALL, WALL, 3), np.uint8)
     colours = [(255, 200, 120), (255, 150, 60), (120, 190, 255), (255, 220, 170)]
     for index, colour in enumerate(colours):
@@ -40,7 +40,7 @@ def windows() -> NDArray[np.uint8]:
 
 
 def tiles() -> NDArray[np.uint8]:
-    """Return two by two tiles, of an odd size, sRGB."""
+    """Return two by two tiles with an odd size, sRGB."""
     y, x = np.indices((75, 75))
     colours = np.where((((y < 37) ^ (x < 37))[..., None]), (96, 104, 120), (170, 170, 160))
     colours[(y % 37 < 2) | (x % 37 < 2)] = 50

@@ -1,6 +1,6 @@
-"""The peers: other libraries that do the same, each made as fast as its interface allows.
+"""The peers: other libraries that do the same work, each used as fast as its interface allows.
 
-One module a library, which imports it when a function is called.
+There is one module for each library. It imports the library when a function is called.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 __all__ = ["PEERS", "ImageBloom", "gather", "versions"]
 
-#: Import names by the names in tables.
+#: Import name of each peer, by its name in tables.
 PEERS: Final = MappingProxyType(
     {
         "OpenCV": "cv2",
@@ -34,7 +34,7 @@ ImageBloom = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 def versions() -> dict[str, str | None]:
-    """Return the version of each peer by its name, None for what is not installed."""
+    """Return the version of each peer by its name, None for peers that are not installed."""
     distributions = packages_distributions()
     found: dict[str, str | None] = {}
     for name, package in PEERS.items():
@@ -53,7 +53,7 @@ def gather(
     Parameters
     ----------
     names : iterable of str
-        Out of `PEERS`.
+        Keys of `PEERS`.
     make : callable
         Takes the module of this package for a peer and returns its contenders by name.
     missing : list of str
@@ -62,7 +62,7 @@ def gather(
     Returns
     -------
     dict
-        The contenders of those that work.
+        The contenders of the peers that work.
     """
     found: dict[str, Any] = {}
     for name in names:
@@ -73,13 +73,13 @@ def gather(
         try:
             found.update(make(importlib.import_module(f"{__name__}.{module}")))
         except (ImportError, OSError, RuntimeError, AttributeError) as error:
-            # A peer that is half installed, or has no device, must not stop the others.
+            # A peer with a broken installation or without a device must not stop the others.
             missing.append(f"{name} does not run here: {' '.join(str(error).split())[:200]}")
     return found
 
 
 def rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return float values as `dtype`, levels of 8 bits rounded and clamped."""
+    """Return float values as `dtype`; 8-bit levels are rounded and clamped."""
     levels = np.rint(np.clip(values, 0, 255)) if dtype == np.uint8 else values
     result: NDArray[Any] = levels.astype(dtype, copy=False)
     return result

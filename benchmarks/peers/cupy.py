@@ -1,4 +1,4 @@
-"""CuPy: cupyx.scipy.ndimage, a kernel in CUDA written for this very bloom, and plain copies."""
+"""CuPy: cupyx.scipy.ndimage, a CUDA kernel written for this bloom, and plain copies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.inputs import REC709
 
-#: Outputs of a thread block of fused.cu, and how many rows a thread walks down.
+#: Output pixels of a thread block of fused.cu, and rows for each thread.
 TILE = (64, 32)
 STRIP = 8
 
@@ -48,13 +48,13 @@ def _timed(cupy: Any, work: Any) -> tuple[Any, Any, Any]:
 def gpu_bloom(
     image: NDArray[np.float16], kernel: NDArray[np.float32], threshold: float
 ) -> dict[str, tuple[Any, Any, Any]]:
-    """Return blooms of an image (H, W, 4) that lies on the GPU, with their blurs alone.
+    """Return blooms of an image (H, W, 4) on the GPU, each also with its blur alone.
 
     Returns
     -------
     dict of str to (call, seconds, fetch)
-        `call` takes the round and does it once, `seconds` gives what its result took by CUDA's
-        events, `fetch` gives the picture of a result.
+        `call` takes the round and does the work once. `seconds` returns the time of a result by
+        CUDA events. `fetch` returns the picture of a result.
     """
     cupy = _cupy()
     ndimage = importlib.import_module("cupyx.scipy.ndimage")
@@ -74,7 +74,7 @@ def gpu_bloom(
     bright = cupy.empty_like(source)
     columns, rows = cupy.empty_like(source), cupy.empty_like(source)
 
-    # gaussian_filter1d makes its weights and calls correlate1d, which can have others.
+    # gaussian_filter1d only computes weights for correlate1d, which takes any weights.
     def blur() -> Any:
         ndimage.correlate1d(bright, weights, axis=0, output=columns, mode="nearest")
         ndimage.correlate1d(columns, weights, axis=1, output=rows, mode="nearest")
@@ -94,7 +94,7 @@ def gpu_bloom(
 
 
 def _fused(cupy: Any, source: Any, kernel: NDArray[np.float32], threshold: float) -> Any:
-    """Return the bloom of `source` by fused.cu: one kernel for all of it."""
+    """Return the bloom of `source` by fused.cu, one kernel for all steps."""
     height, width, _ = source.shape
     radius = len(kernel) // 2
     options = (f"-DTILE_X={TILE[0]}", f"-DTILE_Y={TILE[1]}", f"-DSTRIP={STRIP}")
@@ -132,7 +132,7 @@ def gpu_copy(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
 def transfer_to_host(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
     """Return the bare transfer of an image's bytes into pinned memory of the host.
 
-    The memory is allocated once, and nothing is done with it; by the wall clock.
+    The memory is allocated once and not used otherwise. Wall-clock time.
     """
     cupy = _cupy()
     source = cupy.asarray(image)

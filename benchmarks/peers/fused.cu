@@ -1,9 +1,9 @@
-// The image's bloom in one kernel: hard luminance threshold, vertical and horizontal blur, sum.
-// A peer to measure against; nothing of vkbloom runs it.
+// The bloom of an image in one kernel: hard luminance threshold, vertical and horizontal blur, sum.
+// It is only a peer for benchmarks; vkbloom does not use it.
 //
-// A block makes TILE_X x TILE_Y pixels. Its threads first walk down strips of STRIP rows, the
-// window of the vertical blur in registers, and leave the columns in shared memory; then they
-// blur along the rows. Threads of a warp lie along x in both.
+// A block computes TILE_X x TILE_Y pixels. First each thread processes a strip of STRIP rows. It
+// keeps the window of the vertical blur in registers and writes the column to shared memory. Then
+// the threads blur along the rows. In both steps the threads of a warp are adjacent in x.
 
 #define TAPS (2 * RADIUS + 1)
 #define COLUMNS (TILE_X + 2 * RADIUS)
@@ -15,7 +15,7 @@ struct Colour {
     float r, g, b;
 };
 
-// Conversions by their instruction: no header is needed.
+// Conversions by instruction, so that no header is needed.
 __device__ __forceinline__ float to_float(unsigned int half_bits)
 {
     float value;

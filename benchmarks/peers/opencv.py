@@ -1,4 +1,4 @@
-"""OpenCV: its buffers are kept from call to call, only the result is new."""
+"""OpenCV, with buffers that are kept between calls; only the result is new."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def image_bloom(
 ) -> dict[str, ImageBloom]:
     """Return blooms of images like `image`: hard luminance threshold, kernel, sum.
 
-    Half floats go through 32-bit floats, which OpenCV can make of them (since 4.x in ``add`` with
-    another depth); a second contender converts them with NumPy, as most programs do.
+    Half floats are converted to 32-bit floats by OpenCV (since 4.x, by ``add`` with another depth).
+    A second contender converts them with NumPy, as most programs do.
     """
     cv2 = _opencv(threads)
     if image.dtype == np.uint8:
@@ -47,7 +47,7 @@ def image_bloom(
 
 
 def _luminance(channels: int, outputs: int) -> NDArray[np.float32]:
-    """Return the matrix that puts the luminance into each of the outputs."""
+    """Return the matrix that writes the luminance to each of the output channels."""
     row = np.zeros(channels, np.float32)
     row[:3] = REC709
     return np.tile(row, (outputs, 1))
@@ -58,8 +58,8 @@ def _floats_bloom(
 ) -> Callable[[NDArray[Any], int], NDArray[Any]]:
     glow = np.empty(image.shape, np.float32)
     blurred = np.empty_like(glow)
-    # A mask of as many channels as the image and a product: twice as fast as compare and copyTo,
-    # whose masked copy does not use the threads.
+    # A product with a mask of all channels is twice as fast as compare and copyTo, whose masked
+    # copy uses one thread.
     luminance = _luminance(image.shape[2], image.shape[2])
 
     def bloom(picture: NDArray[Any], depth: int) -> NDArray[Any]:

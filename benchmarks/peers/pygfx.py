@@ -1,4 +1,4 @@
-"""pygfx: its bloom pass on the same adapter, through textures of its own."""
+"""pygfx: its bloom pass on the same adapter, with its own textures."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ class Bloom:
     size : (int, int)
         Width and height.
     levels : int
-        Of the mip chain.
+        Levels of the mip chain.
     adapter : str
         Name of the Vulkan adapter.
 
     Raises
     ------
     RuntimeError
-        wgpu does not find that adapter, or it has not what pygfx needs.
+        wgpu does not find that adapter, or it lacks what pygfx needs.
     """
 
     def __init__(self, size: tuple[int, int], levels: int, adapter: str) -> None:
         self._wgpu = wgpu = importlib.import_module("wgpu")
         _select(wgpu, adapter)
         engine = importlib.import_module("pygfx.renderers.wgpu")
-        # Strength 1: nothing but the bloom.
+        # Strength 1: only the bloom.
         self._pass = engine.PhysicalBasedBloomPass(bloom_strength=1.0, max_mip_levels=levels)
         shared = importlib.import_module("pygfx.renderers.wgpu.engine.shared")
         self._device = shared.get_shared().device
@@ -50,7 +50,7 @@ class Bloom:
 
     @property
     def radius(self) -> float:
-        """Distance of the tent's taps as a part of the width."""
+        """Distance of the tent's taps relative to the width."""
         return float(self._pass.filter_radius)
 
     @radius.setter
@@ -59,7 +59,7 @@ class Bloom:
 
     @property
     def karis_average(self) -> bool:
-        """Whether the first level is to be weighted against fireflies."""
+        """Whether the first level is weighted against fireflies."""
         return bool(self._pass.use_karis_average)
 
     @karis_average.setter
@@ -67,7 +67,7 @@ class Bloom:
         self._pass.use_karis_average = is_on
 
     def bloom(self, image: NDArray[np.float16], strength: float = 1.0) -> NDArray[np.float16]:
-        """Return image + (bloom - image) * strength, the bloom being the sum of its levels."""
+        """Return image + (bloom - image) * strength, where the bloom is the sum of its levels."""
         self._pass.bloom_strength = strength
         return self._run(
             image,
@@ -77,7 +77,7 @@ class Bloom:
         )
 
     def copy(self, image: NDArray[np.float16]) -> NDArray[np.float16]:
-        """Return the image by the same way, copied on the device in place of the bloom."""
+        """Return the image by the same path, with a copy on the device in place of the bloom."""
         return self._run(
             image,
             lambda encoder: encoder.copy_texture_to_texture(
@@ -98,7 +98,7 @@ class Bloom:
 
 
 def _select(wgpu: Any, adapter: str) -> None:
-    """Make pygfx use the Vulkan adapter of that name; it has one for the whole process."""
+    """Make pygfx use the Vulkan adapter of that name; there is one for the process."""
     found = [
         each
         for each in wgpu.gpu.enumerate_adapters_sync()

@@ -13,7 +13,7 @@ from benchmarks.peers import ImageBloom, rounded
 
 
 class _Blur:
-    """Threshold, two depthwise convolutions and, where wanted, the sum; images (1, C, H, W)."""
+    """Threshold, two depthwise convolutions and, optionally, the sum; images (1, C, H, W)."""
 
     def __init__(self, kernel: NDArray[np.float32], channels: int, device: str, dtype: Any) -> None:
         self._torch = importlib.import_module("torch")
@@ -48,7 +48,7 @@ def image_bloom(
 
     def bloom(picture: NDArray[Any]) -> NDArray[Any]:
         with torch.inference_mode():
-            # The channels stay last in memory, which spares two transpositions.
+            # The channels stay last in memory, which avoids two transpositions.
             single = torch.from_numpy(picture).permute(2, 0, 1)[None].float()
             result = single + blur.blur(blur.glow(single, threshold * scale))
             values: NDArray[Any] = result[0].permute(1, 2, 0).numpy()
@@ -60,18 +60,18 @@ def image_bloom(
 def gpu_bloom(
     image: NDArray[Any], kernel: NDArray[np.float32], threshold: float
 ) -> dict[str, tuple[Any, Any, Any]]:
-    """Return the bloom and the blur alone of an image that lies on the GPU.
+    """Return the bloom and the blur alone of an image on the GPU.
 
     Returns
     -------
     dict of str to (call, seconds, fetch)
-        `call` takes the round and does it once, `seconds` gives what its result took by CUDA's
-        events, `fetch` gives the picture of a result.
+        `call` takes the round and does the work once. `seconds` returns the time of a result by
+        CUDA events. `fetch` returns the picture of a result.
     """
     torch = importlib.import_module("torch")
     if not torch.cuda.is_available():
         raise RuntimeError("torch finds no CUDA device")
-    # Convolutions in the format of the image, the fastest of those that cuDNN has.
+    # Convolutions in the image's format; cuDNN selects its fastest algorithm.
     torch.backends.cudnn.benchmark = True
     blur = _Blur(kernel, image.shape[2], "cuda", torch.float16)
     source = torch.tensor(image, device="cuda").permute(2, 0, 1)[None].contiguous()

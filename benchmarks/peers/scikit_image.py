@@ -1,6 +1,6 @@
-"""scikit-image: its filter by a kernel of one's own, `correlate_sparse`, along both axes.
+"""scikit-image: `correlate_sparse`, its filter with a custom kernel, along both axes.
 
-As fast as its `gaussian`, and unlike that it can have the kernel of the forward system.
+It is as fast as `gaussian`, and accepts the kernel of the forward system.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from benchmarks.peers.scipy import glow_of
 def image_bloom(
     image: NDArray[Any], kernel: NDArray[np.float32], threshold: float, threads: int
 ) -> dict[str, ImageBloom]:
-    """Return blooms of images like `image`; it has no use for `threads`."""
+    """Return blooms of images like `image`; `threads` is not used."""
     filters = importlib.import_module("skimage.filters")
 
     def bloom(picture: NDArray[Any]) -> NDArray[Any]:

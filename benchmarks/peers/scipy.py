@@ -15,7 +15,7 @@ from benchmarks.peers import ImageBloom, rounded
 def glow_of(
     image: NDArray[Any], threshold: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return an image as floats in its own units, and what of it is brighter than `threshold`."""
+    """Return an image as floats in its own units, and its part brighter than `threshold`."""
     scale = 255 if image.dtype == np.uint8 else 1
     single = image.astype(np.float32, copy=False)
     luminance = np.zeros(image.shape[2], np.float32)
@@ -27,7 +27,7 @@ def glow_of(
 def image_bloom(
     image: NDArray[Any], kernel: NDArray[np.float32], threshold: float, threads: int
 ) -> dict[str, ImageBloom]:
-    """Return blooms of images like `image`; it has no use for `threads`."""
+    """Return blooms of images like `image`; `threads` is not used."""
     ndimage = importlib.import_module("scipy.ndimage")
 
     def bloom(picture: NDArray[Any]) -> NDArray[Any]:

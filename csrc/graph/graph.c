@@ -107,6 +107,25 @@ bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
     return pass->depth == image;
 }
 
+uint32_t vkb_pass_targets(const struct vkb_pass_row *pass, uint32_t *targets)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        targets[count++] = pass->targets[i];
+    if (pass->depth != VKB_NO_IMAGE)
+        targets[count++] = pass->depth;
+    return count;
+}
+
+const char *vkb_graph_timed_as(const struct vkb_graph *graph, uint32_t first)
+{
+    const struct vkb_pass_row *pass = &graph->passes[first];
+
+    return pass->geometry == VKB_GEOMETRY_DISPATCH ? pass->name
+                                                   : graph->images[pass->targets[0]].name;
+}
+
 bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
@@ -142,7 +161,7 @@ uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, ui
     for (uint32_t i = first; i < end; ++i)
         if (graph->passes[i].blend != VKB_BLEND_NONE)
             during = VKB_ACCESS_COLOR_BLEND;
-    // Depth first: it is the first to be tested.
+    // Depth first, since the depth test comes first.
     if (pass->depth != VKB_NO_IMAGE) {
         enum vkb_access rest = vkb_graph_rest(graph, pass->depth);
         uses[count++] = (struct vkb_target_use){
@@ -172,7 +191,7 @@ uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
     return row->channels ? row->channels : vkb_formats[row->format].channels;
 }
 
-// Whether something has filled the image before pass `pass_index`.
+// Whether the image is the input, or written before pass `pass_index`.
 static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
 {
     for (uint32_t i = 0; i < pass_index; ++i)
@@ -214,7 +233,7 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
     const uint32_t first = pass->target_count ? pass->targets[0] : pass->depth;
 
     if (target >= graph->image_count)
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has a target that is not there",
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has an unknown target",
                         pass->name);
     row = &graph->images[target];
     if ((row->format == VKB_FORMAT_DEPTH32_FLOAT) != depth)
@@ -226,7 +245,7 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
     if (row->width != graph->images[first].width || row->height != graph->images[first].height)
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has targets of several sizes",
                         pass->name);
-    // Earlier writers may only be those that share this pass's render pass.
+    // Earlier writers must share the render pass of this pass.
     for (uint32_t i = pass_index; i-- > 0;) {
         if (vkb_graph_group_end(graph, i) > pass_index
             || (pass->alternative && i == pass_index - 1))
@@ -254,8 +273,7 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
     if (pass->alternative
         && (index == 0 || pass->target_count != 1
             || graph->passes[index - 1].targets[0] != pass->targets[0]))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s is an alternative to nothing",
-                        pass->name);
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s replaces no pass", pass->name);
     if (pass->textured && (pass->read_count > 0 || !vkb_is_mesh(pass->geometry)))
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "graph: pass %s has textures, but no mesh or images beside them",
@@ -263,7 +281,8 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
     for (uint32_t i = 0; i < pass->read_count; ++i)
         if (pass->reads[i] >= graph->image_count || !is_filled(graph, pass->reads[i], index))
             return vkb_fail(error, VKB_ERROR_GENERAL,
-                            "graph: pass %s reads an image that is not there", pass->name);
+                            "graph: pass %s reads an image that is unknown or not written before",
+                            pass->name);
     for (uint32_t i = 0; i < pass->target_count; ++i)
         if (!check_target(graph, index, pass->targets[i], false, error))
             return false;

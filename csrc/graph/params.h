@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Where std140 starts an array of vec4.
+// The alignment of an array of vec4 in std140.
 #define VKB_VEC4 _Alignas(16) float
 
 #define VKB_MEMBER_READS(block, name)        float name;
@@ -22,7 +22,7 @@ PARAMETER_BLOCKS(VKB_BLOCK_STRUCT)
 
 #define VKB_BLOCK_MEMBER(block, ROWS) struct vkb_##block##_params block;
 
-// One pass's parameters: those of its own block.
+// The parameters of one pass, which are those of its block.
 union vkb_params {
     PARAMETER_BLOCKS(VKB_BLOCK_MEMBER)
 };
@@ -36,8 +36,8 @@ enum vkb_block {
 
 extern const size_t vkb_block_sizes[];  // bytes of each block's struct
 
-// Writes the fields of that block one after the other, without the padding between them, which has
-// no defined value. `bytes` has room for vkb_block_sizes[block]; returns how many were written.
+// Writes the fields of a block without the padding between them, whose content is undefined.
+// `bytes` has space for vkb_block_sizes[block]. Returns the number of bytes.
 size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, unsigned char *bytes);
 
 // All settings that are numbers: those that passes read, and those that shape the graph.
@@ -55,11 +55,11 @@ struct vkb_values {
 
 enum vkb_value_type { VKB_VALUE_FLOAT, VKB_VALUE_INT, VKB_VALUE_DOUBLE };
 
-// Sets what a block reads of the settings.
+// Copies the settings that a block reads.
 void vkb_params_read(enum vkb_block block, const struct vkb_values *values,
                      union vkb_params *params);
 
-// Where a setting lies in struct vkb_values, its default and its range.
+// The offset of a setting in struct vkb_values, its default and its range.
 struct vkb_value_row {
     const char *name;
     enum vkb_value_type type;
@@ -95,7 +95,7 @@ struct vkb_constants {
 
 enum { VKB_CONSTANT_COUNT = sizeof(struct vkb_constants) / sizeof(int32_t) };
 
-// By constant, its id and where it lies in the struct.
+// For each constant, its id and its offset in the struct.
 struct vkb_constant_row {
     uint32_t id;
     uint32_t offset;

@@ -2,6 +2,128 @@
 
 #include <string.h>
 
+void vkb_plan_destroy(struct vkb_plan *plan)
+{
+    vkb_graph_destroy(&plan->graph);
+    vkb_free(plan->outputs);
+    *plan = (struct vkb_plan){0};
+}
+
+void vkb_planner_destroy(struct vkb_planner *planner)
+{
+    vkb_free(planner->current);
+    vkb_free(planner->needed);
+    vkb_free(planner->wanted);
+    vkb_free(planner->recipe);
+    vkb_graph_destroy(&planner->previous);
+    *planner = (struct vkb_planner){0};
+}
+
+bool vkb_content_begin_writing(struct vkb_content *content, uint64_t *clock, const void *recipe,
+                               size_t size, struct vkb_error *error)
+{
+    content->valid = false;
+    content->version = ++*clock;
+    if (!vkb_grow(error, &content->recipe, &content->recipe_capacity, size, 1))
+        return false;
+    if (size)
+        memcpy(content->recipe, recipe, size);
+    content->recipe_size = size;
+    return true;
+}
+
+static bool append(struct vkb_planner *planner, const void *bytes, size_t size,
+                   struct vkb_error *error)
+{
+    if (!vkb_grow(error, &planner->recipe, &planner->recipe_capacity, planner->recipe_size + size,
+                  1))
+        return false;
+    memcpy(planner->recipe + planner->recipe_size, bytes, size);
+    planner->recipe_size += size;
+    return true;
+}
+
+// What passes first..end-1 make their targets from: their rows, with the versions of what they read
+// in place of the graph's indices.
+static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step *step,
+                         uint32_t first, uint32_t end, struct vkb_error *error)
+{
+    planner->recipe_size = 0;
+    for (uint32_t i = first; i < end; ++i) {
+        struct vkb_pass_row row = step->plan->graph.passes[i];
+        unsigned char bytes[sizeof row];
+        uint64_t versions[VKB_MAX_READS + 1] = {0};
+
+        for (uint32_t read = 0; read < row.read_count; ++read)
+            versions[read] = step->contents[row.reads[read]]->version;
+        if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
+            versions[VKB_MAX_READS] = step->scene;
+        memset(row.reads, 0, sizeof row.reads);
+        memset(row.targets, 0, sizeof row.targets);
+        row.depth = row.depth != VKB_NO_IMAGE;
+        if (!append(planner, bytes, vkb_pass_pack(&row, bytes), error)
+            || !append(planner, versions, sizeof versions, error))
+            return false;
+    }
+    return true;
+}
+
+// Whether the image is there and holds what a pass before `end` would make.
+static bool is_current(const struct vkb_planner *planner, const struct vkb_plan_step *step,
+                       uint32_t image, uint32_t end)
+{
+    const struct vkb_graph *graph = &step->plan->graph;
+    bool current = graph->images[image].input;
+
+    for (uint32_t i = 0; i < end; ++i)
+        current = current || (planner->current[i] && vkb_pass_writes(&graph->passes[i], image));
+    return current && step->contents[image];
+}
+
+static bool holds_recipe(const struct vkb_planner *planner, const struct vkb_content *content)
+{
+    return content && content->valid && content->recipe_size == planner->recipe_size
+        && memcmp(content->recipe, planner->recipe, planner->recipe_size) == 0;
+}
+
+// Whether the targets of the passes first..end-1 hold what these would make; leaves their recipe.
+static bool compare_recipe(struct vkb_planner *planner, const struct vkb_plan_step *step,
+                           uint32_t first, uint32_t end, bool *same, struct vkb_error *error)
+{
+    uint32_t targets[VKB_MAX_TARGETS + 1];
+    const uint32_t count = vkb_pass_targets(&step->plan->graph.passes[first], targets);
+
+    if (!write_recipe(planner, step, first, end, error))
+        return false;
+    *same = true;
+    for (uint32_t i = 0; i < count; ++i)
+        *same = *same && holds_recipe(planner, step->contents[targets[i]]);
+    return true;
+}
+
+// Finds out which passes have nothing to do, from the first to the last: their targets hold what
+// the recipe says, and all that they read is so too.
+static bool mark_current(struct vkb_planner *planner, const struct vkb_plan_step *step,
+                         struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &step->plan->graph;
+
+    memset(planner->current, 0, graph->pass_count * sizeof *planner->current);
+    for (uint32_t first = 0, end; first < graph->pass_count; first = end) {
+        bool found = true;
+
+        end = vkb_graph_group_end(graph, first);
+        for (uint32_t i = first; i < end; ++i)
+            for (uint32_t read = 0; read < graph->passes[i].read_count; ++read)
+                found = found && is_current(planner, step, graph->passes[i].reads[read], first);
+        if (found && !compare_recipe(planner, step, first, end, &found, error))
+            return false;
+        for (uint32_t i = first; i < end; ++i)
+            planner->current[i] = found;
+    }
+    return true;
+}
+
 static void mark_images(const struct vkb_pass_row *pass, bool *wanted)
 {
     for (uint32_t read = 0; read < pass->read_count; ++read)
@@ -22,13 +144,14 @@ static bool writes_wanted(const struct vkb_pass_row *pass, const bool *wanted)
 }
 
 // From the last pass to the first; `skipped` are the passes that others stand for.
-static void mark(const struct vkb_graph *graph, const struct vkb_output *outputs,
-                 uint32_t output_count, const bool *skipped, bool *needed, bool *wanted)
+static void mark(const struct vkb_plan *plan, const bool *skipped, bool *needed, bool *wanted)
 {
+    const struct vkb_graph *graph = &plan->graph;
+
     memset(needed, 0, graph->pass_count * sizeof *needed);
     memset(wanted, 0, graph->image_count * sizeof *wanted);
-    for (uint32_t i = 0; i < output_count; ++i)
-        wanted[outputs[i].image] = true;
+    for (uint32_t i = 0; i < plan->output_count; ++i)
+        wanted[plan->outputs[i]] = true;
     for (uint32_t i = graph->pass_count; i-- > 0;) {
         needed[i] = !skipped[i] && writes_wanted(&graph->passes[i], wanted);
         if (needed[i])
@@ -70,10 +193,15 @@ static bool shares(const struct vkb_graph *graph, const struct vkb_graph *neighb
     return true;
 }
 
-bool vkb_plan(const struct vkb_graph *graph, const struct vkb_neighbours *neighbours,
-              const struct vkb_output *outputs, uint32_t output_count, const bool *current,
-              bool *needed, bool *wanted, struct vkb_error *error)
+// Takes the fused passes that are worth it.
+static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step *step,
+                        struct vkb_error *error)
 {
+    const struct vkb_graph *graph = &step->plan->graph;
+    const struct vkb_graph *previous =
+        step->source == planner->previous_source ? &planner->previous : NULL;
+    bool *needed = planner->needed, *wanted = planner->wanted;
+    const bool *current = planner->current;
     bool *skipped = vkb_alloc(error, (size_t)2 * graph->pass_count, sizeof *skipped);
 
     if (!skipped)
@@ -81,22 +209,84 @@ bool vkb_plan(const struct vkb_graph *graph, const struct vkb_neighbours *neighb
     bool *plain = skipped + graph->pass_count;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         skipped[i] = graph->passes[i].alternative;
-    mark(graph, outputs, output_count, skipped, needed, wanted);
+    mark(step->plan, skipped, needed, wanted);
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         if (!graph->passes[i].alternative)
             continue;
         memcpy(plain, needed, graph->pass_count * sizeof *plain);
         skipped[i] = false;
         skipped[i - 1] = true;
-        mark(graph, outputs, output_count, skipped, needed, wanted);
+        mark(step->plan, skipped, needed, wanted);
         if (count_running(graph, needed, current) < count_running(graph, plain, current)
-            && !shares(graph, neighbours->previous, i, plain, needed, current)
-            && !shares(graph, neighbours->next, i, plain, needed, current))
+            && !shares(graph, previous, i, plain, needed, current)
+            && !shares(graph, step->next, i, plain, needed, current))
             continue;
         skipped[i] = true;
         skipped[i - 1] = false;
-        mark(graph, outputs, output_count, skipped, needed, wanted);
+        mark(step->plan, skipped, needed, wanted);
     }
     vkb_free(skipped);
+    return true;
+}
+
+// A copy of the plan's passes, for it may be gone when the next one comes.
+static bool keep_previous(struct vkb_planner *planner, const struct vkb_plan_step *step,
+                          struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &step->plan->graph;
+    struct vkb_graph *previous = &planner->previous;
+
+    previous->pass_count = 0;
+    if (!vkb_grow(error, &previous->passes, &previous->pass_capacity, graph->pass_count,
+                  sizeof *previous->passes))
+        return false;
+    memcpy(previous->passes, graph->passes, graph->pass_count * sizeof *graph->passes);
+    previous->pass_count = graph->pass_count;
+    planner->previous_source = step->source;
+    return true;
+}
+
+bool vkb_planner_mark(struct vkb_planner *planner, const struct vkb_plan_step *step,
+                      struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &step->plan->graph;
+
+    return vkb_grow(error, &planner->current, &planner->current_capacity, graph->pass_count,
+                    sizeof *planner->current)
+        && vkb_grow(error, &planner->needed, &planner->needed_capacity, graph->pass_count,
+                    sizeof *planner->needed)
+        && vkb_grow(error, &planner->wanted, &planner->wanted_capacity, graph->image_count,
+                    sizeof *planner->wanted)
+        && mark_current(planner, step, error) && mark_needed(planner, step, error)
+        && keep_previous(planner, step, error);
+}
+
+bool vkb_planner_run(struct vkb_planner *planner, const struct vkb_plan_step *step, uint64_t *clock,
+                     vkb_record *record, void *context, struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &step->plan->graph;
+
+    for (uint32_t first = 0, end; first < graph->pass_count; first = end) {
+        uint32_t targets[VKB_MAX_TARGETS + 1];
+        const uint32_t target_count = vkb_pass_targets(&graph->passes[first], targets);
+        bool same;
+
+        end = vkb_graph_group_end(graph, first);
+        // All passes of a group are needed if one is: they share their targets.
+        if (!planner->needed[first])
+            continue;
+        if (!compare_recipe(planner, step, first, end, &same, error))
+            return false;
+        if (same)
+            continue;
+        for (uint32_t i = 0; i < target_count; ++i)
+            if (!vkb_content_begin_writing(step->contents[targets[i]], clock, planner->recipe,
+                                           planner->recipe_size, error))
+                return false;
+        if (!record(context, first, end, error))
+            return false;
+        for (uint32_t i = 0; i < target_count; ++i)
+            step->contents[targets[i]]->valid = true;
+    }
     return true;
 }

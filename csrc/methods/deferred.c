@@ -87,11 +87,12 @@ static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
         .final = size,
         .format = settings->format ? settings->format : HDR,
     };
+    const enum vkb_format extracted = vkb_end_format(settings, source.format);
     const bool as_it_is = source.buffers.width == size.width && source.buffers.height == size.height
-                       && source.format == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE;
+                       && extracted == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE;
 
     if (!as_it_is
-        && (!vkb_add_target(graph, "extracted", source.format, source.buffers, false, &source.glow,
+        && (!vkb_add_target(graph, "extracted", extracted, source.buffers, false, &source.glow,
                             error)
             || !vkb_add_extract(settings, brightness, source.glow, graph, error)))
         return false;

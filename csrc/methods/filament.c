@@ -19,9 +19,10 @@ static void choose_sizes(struct vkb_levels *levels)
     const struct vkb_values *values = &levels->settings->values;
     const struct vkb_size frame = levels->source->buffers;
     const double height = values->resolution;
-    const uint32_t most = (uint32_t)floor(log2(height)) + 1;
+    const double width = height * frame.width / frame.height;
+    const uint32_t most = (uint32_t)log2(floor(fmax(width, height))) + 1;
     const uint32_t wanted = (uint32_t)values->levels, count = wanted < most ? wanted : most;
-    struct vkb_size size = {stepped(height * frame.width / frame.height), stepped(height)};
+    struct vkb_size size = {stepped(width), stepped(height)};
 
     for (; levels->count < count; size = vkb_halved(size))
         levels->sizes[levels->count++] = size;

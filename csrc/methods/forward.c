@@ -50,8 +50,9 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
         struct vkb_mesh_params lamp = params;
         // 8 bits have no room for radiance: the intensity is the deferred system's.
         lamp.glow_intensity = 1.0f;
-        if (!vkb_add_glow(settings, source, &lamp, glow.format, glow.buffers, true,
-                          vkb_threshold_mode(settings), graph, &glow.glow, error)
+        if (!vkb_add_glow(settings, source, &lamp, vkb_end_format(settings, glow.format),
+                          glow.buffers, true, vkb_threshold_mode(settings), graph, &glow.glow,
+                          error)
             || !vkb_add_bloom(settings, &glow, graph, &bloom, error))
             return false;
     }

@@ -23,7 +23,8 @@ bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image
             .final = image->size,
             .format = settings->format ? settings->format : image->format,
         };
-        if (!vkb_add_target(graph, "glow", source.format, source.buffers, true, &source.glow, error)
+        if (!vkb_add_target(graph, "glow", vkb_end_format(settings, source.format), source.buffers,
+                            true, &source.glow, error)
             || !vkb_add_extract(settings, input, source.glow, graph, error)
             || !vkb_add_bloom(settings, &source, graph, &bloom, error))
             return false;

@@ -11,7 +11,7 @@ static double choose_sizes(struct vkb_levels *levels)
 {
     const double radius = levels->settings->values.radius;
     const double lg = log2(levels->source->buffers.height) + radius - 8.0;
-    const uint32_t count = (uint32_t)fmin(fmax(trunc(lg), 1.0), VKB_MAX_LEVELS);
+    const uint32_t count = (uint32_t)fmin(fmax(trunc(lg), 1.0), MAX_LEVELS);
     struct vkb_size size = levels->source->buffers;
 
     while (levels->count < count)

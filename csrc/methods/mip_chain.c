@@ -28,6 +28,12 @@ bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom
             return false;
     combination.radius = settings->values.radius;
     combination.gain = 1.0 / levels.count;
+    if (settings->level_weight_count) {
+        for (uint32_t level = 0; level < levels.count; ++level)
+            combination.own[level] = settings->level_weights[level];
+        combination.smallest = settings->level_weights[levels.count - 1];
+        combination.gain = 1.0;
+    }
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }
 

@@ -78,30 +78,56 @@ static bool add_layer(const struct vkb_settings *settings, const struct vkb_bloo
     return true;
 }
 
+// A pass that stores one image in the other's format.
+static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
+                         struct vkb_error *error)
+{
+    struct vkb_pass_row row =
+        vkb_fullscreen_row(graph->images[to].name, VKB_SHADER_extract_frag, to);
+    const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
+
+    row.constants.threshold_mode = THRESHOLD_NONE;
+    row.constants.sampling = SAMPLING_WHOLE;
+    row.reads[0] = from;
+    row.read_count = 1;
+    row.block = VKB_BLOCK_extract;
+    row.params.extract.target_width = sampling.width;
+    row.params.extract.target_height = sampling.height;
+    row.params.extract.limit = sampling.limit;
+    return vkb_graph_add_pass(graph, &row, error);
+}
+
 bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                        struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
-    uint32_t ends[MAX_LAYERS];
+    // Blending does not round to R11G11B10: there the layers add up in an image of their own.
+    const bool apart = source->format == VKB_FORMAT_RG11B10_UFLOAT && settings->layer_count > 1;
+    const enum vkb_format format = apart ? VKB_FORMAT_RGBA32_FLOAT : source->format;
+    uint32_t ends[MAX_LAYERS], sum;
     char name[VKB_NAME_SIZE];
 
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer)
         if (!add_layer(settings, source, layer, &ends[layer], graph, error))
             return false;
-    if (!vkb_add_target(graph, "bloom", source->format, source->final, true, bloom, error))
+    if (!vkb_add_target(graph, apart ? "layers" : "bloom", format, source->final, !apart, &sum,
+                        error))
         return false;
     // The layers' last passes follow each other, so they share a render pass and add up in it.
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer) {
         snprintf(name, sizeof name, settings->layer_count == 1 ? "bloom" : "bloom_%u", layer);
         struct vkb_pass_row row = blur_row(
             settings, source, name, settings->values.direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
-            layer, settings->layers[layer].strength, ends[layer], *bloom, graph);
+            layer, settings->layers[layer].strength, ends[layer], sum, graph);
         // Blending does not clamp: sums of the largest floats must not overflow. (Half floats keep
         // their whole range; what overflows there, the composite clamps.)
-        if (source->format == VKB_FORMAT_RGBA32_FLOAT)
+        if (format == VKB_FORMAT_RGBA32_FLOAT)
             row.params.blur.limit /= (float)settings->layer_count;
         row.blend = layer ? VKB_BLEND_ADD : VKB_BLEND_NONE;
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }
-    return true;
+    *bloom = sum;
+    return !apart
+        || (vkb_add_target(graph, "bloom", source->format, source->final, true, bloom, error)
+            && add_rounding(sum, *bloom, graph, error));
 }

@@ -7,10 +7,9 @@
 
 #include <math.h>
 
-// Half-kernels: URP's binomial of 12 without its outer terms, HDRP's binomial of 8.
+// URP's half-kernel: a binomial of 12 without its outer terms.
 static const float urp_weights[] = {0.22702703f, 0.19459459f, 0.12162162f, 0.05405405f,
                                     0.01621622f};
-static const float hdrp_weights[] = {0.2734375f, 0.21875f, 0.109375f, 0.03125f, 0.00390625f};
 
 enum { WEIGHT_COUNT = 5 };
 
@@ -61,6 +60,30 @@ static uint32_t rounded(uint32_t side, uint32_t level)
     return size < 1.0 ? 1 : (uint32_t)size;
 }
 
+static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
+                          uint32_t from, uint32_t to, struct vkb_error *error)
+{
+    struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_hdrp_blur_frag, from, to);
+
+    row.constants.direction = direction;
+    row.constants.first = first;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
+// A level from the image above it: blurred along the rows, which are as many as above, then down.
+static bool add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                           struct vkb_error *error)
+{
+    const struct vkb_size size = levels->sizes[level];
+    const struct vkb_size middle = {size.width, levels->graph->images[from].height};
+    uint32_t step;
+
+    return vkb_levels_step(levels, "down_%u_across", level, middle, &step, error)
+        && add_hdrp_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step, error)
+        && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
+        && add_hdrp_blur(levels, DIRECTION_VERTICAL, level == 0, step, levels->downs[level], error);
+}
+
 bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
@@ -70,13 +93,8 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
     const bool cubic = settings->values.high_quality_filtering && frame.width >= HDRP_LEAST_WIDTH
                     && frame.height >= HDRP_LEAST_HEIGHT;
     struct vkb_combination combination =
-        scattered(settings, cubic ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR);
-    const struct vkb_kernel kernel = {
-        .weights = hdrp_weights,
-        .count = WEIGHT_COUNT,
-        .whole_rows = true,
-    };
-    const uint32_t count = level_count(frame.width, frame.height, 2.0, VKB_MAX_LEVELS);
+        scattered(settings, cubic ? UPSAMPLE_INSET_CUBIC : UPSAMPLE_INSET_LINEAR);
+    const uint32_t count = level_count(frame.width, frame.height, 2.0, MAX_LEVELS);
     uint32_t from;
 
     for (; levels.count < count; ++levels.count)
@@ -89,7 +107,7 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 0; level < count; from = levels.downs[level++])
-        if (!vkb_levels_blur(&levels, level, from, &kernel, error))
+        if (!add_hdrp_level(&levels, level, from, error))
             return false;
     combination.last_kernel = UPSAMPLE_CUBIC;
     return vkb_levels_combine(&levels, &combination, bloom, error);

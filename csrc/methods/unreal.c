@@ -5,17 +5,19 @@
 
 #include <math.h>
 
-enum { UNREAL_LONGEST = 22 };
+enum { UNREAL_LEVELS = 5, UNREAL_LONGEST = 22 };
 
 // Taps of each level's half-kernel, the centre counted; a third of it is the deviation.
-static const uint32_t tap_counts[GATHERED_LEVELS] = {6, 10, 14, 18, UNREAL_LONGEST};
+static const uint32_t tap_counts[UNREAL_LEVELS] = {6, 10, 14, 18, UNREAL_LONGEST};
 
 // The levels' shares for a radius of 0; one of 1 mirrors them at 0.6.
-static const double bloom_factors[GATHERED_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
+static const double bloom_factors[UNREAL_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
 
-static struct vkb_size rounded_half(struct vkb_size size)
+// Of the pass rounded, of the node floored.
+static struct vkb_size half_of(const struct vkb_settings *settings, struct vkb_size size)
 {
-    return (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
+    return settings->values.node ? vkb_halved(size)
+                                 : (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
 }
 
 static bool add_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
@@ -34,23 +36,33 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
                     struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
-    double shares[GATHERED_LEVELS];
+    double shares[UNREAL_LEVELS];
     struct vkb_size size = source->buffers;
-    uint32_t from;
+    double whole = 0.0;
+    uint32_t from, sum;
 
-    for (; levels.count < GATHERED_LEVELS; ++levels.count) {
+    for (; levels.count < UNREAL_LEVELS; ++levels.count) {
         const double factor = bloom_factors[levels.count];
-        levels.sizes[levels.count] = size = rounded_half(size);
+        levels.sizes[levels.count] = size = half_of(settings, size);
         shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
+        whole += shares[levels.count];
     }
+    // What ends at 1 holds the mean.
+    if (source->format != VKB_FORMAT_RGBA8_UNORM)
+        whole = 1.0;
+    for (uint32_t level = 0; level < UNREAL_LEVELS; ++level)
+        shares[level] /= whole;
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_unreal_prefilter_frag, source->glow, from);
+    row.constants.node = settings->values.node;
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])
         if (!add_level(&levels, level, from, error))
             return false;
-    return vkb_levels_gather(&levels, shares, bloom, error);
+    return vkb_levels_image(&levels, "up_%u", 0, levels.sizes[0], &sum, error)
+        && vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, sum, error)
+        && vkb_levels_enlarge(&levels, sum, whole, bloom, error);
 }

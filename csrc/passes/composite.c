@@ -1,5 +1,21 @@
 #include "passes/composite.h"
 
+#include <string.h>
+
+// The same as Godot blends, which no variant stands for.
+static struct vkb_pass_row godots(const struct vkb_settings *settings,
+                                  const struct vkb_pass_row *composite)
+{
+    struct vkb_pass_row row = *composite;
+
+    memset(&row.params, 0, sizeof row.params);
+    row.shader = VKB_SHADER_godot_final_frag;
+    row.block = VKB_BLOCK_godot_final;
+    VKB_TAKE_COMPOSITE(&row, godot_final, composite);
+    row.params.godot_final.white = settings->values.white;
+    return row;
+}
+
 bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
                        enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -31,6 +47,8 @@ bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint
     vkb_params_read(row.block, &settings->values, &row.params);
     row.params.composite.limit = vkb_formats[image.format].limit;
     row.params.composite.noise_seed = dither ? settings->values.dither_seed : 0;
+    if (settings->method == VKB_METHOD_GODOT && !off)
+        row = godots(settings, &row);
     return vkb_graph_add_pass(graph, &row, error);
 }
 

@@ -11,10 +11,11 @@ struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coar
         .kernel = kernel,
         .last_kernel = kernel,
         .radius = 1.0,
+        .smallest = 1.0,
         .gain = 1.0,
     };
 
-    for (int level = 0; level < VKB_MAX_LEVELS; ++level) {
+    for (int level = 0; level < MAX_LEVELS; ++level) {
         combination.own[level] = own;
         combination.coarse[level] = coarse;
     }
@@ -43,27 +44,32 @@ void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t
     }
 }
 
-static bool add_image(const struct vkb_levels *levels, const char *name, uint32_t number,
-                      struct vkb_size size, bool framebuffer, uint32_t *image,
+static bool add_image(const struct vkb_levels *levels, enum vkb_format format, const char *name,
+                      uint32_t number, struct vkb_size size, bool framebuffer, uint32_t *image,
                       struct vkb_error *error)
 {
     char numbered[VKB_NAME_SIZE];
 
     snprintf(numbered, sizeof numbered, name, number);
-    return vkb_add_target(levels->graph, numbered, levels->source->format, size, framebuffer, image,
-                          error);
+    return vkb_add_target(levels->graph, numbered, format, size, framebuffer, image, error);
 }
 
 bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
                       struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
-    return add_image(levels, name, number, size, true, image, error);
+    return add_image(levels, levels->source->format, name, number, size, true, image, error);
 }
 
 bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
                      struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
-    return add_image(levels, name, number, size, false, image, error);
+    return add_image(levels, levels->source->format, name, number, size, false, image, error);
+}
+
+bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
+{
+    return add_image(levels, vkb_end_format(levels->settings, levels->source->format), "bloom", 0,
+                     levels->source->final, true, bloom, error);
 }
 
 struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
@@ -163,16 +169,13 @@ bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
 {
     const struct vkb_size size = levels->sizes[level];
     const uint32_t width = levels->graph->images[from].width;
-    const uint32_t height = levels->graph->images[from].height;
-    const struct vkb_size middle = {size.width, kernel->whole_rows ? height : size.height};
     const double across = kernel->across > 0.0 ? kernel->across : (double)width / size.width;
-    const double down = (double)middle.height / size.height;
     uint32_t step;
 
-    return vkb_levels_step(levels, "down_%u_across", level, middle, &step, error)
+    return vkb_levels_step(levels, "down_%u_across", level, size, &step, error)
         && add_blur(levels, kernel, DIRECTION_HORIZONTAL, across, from, step, error)
         && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
-        && add_blur(levels, kernel, DIRECTION_VERTICAL, down, step, levels->downs[level], error);
+        && add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, levels->downs[level], error);
 }
 
 // What the taps of an upsampling to twice the size are on whole texels: those of a pixel at a
@@ -209,14 +212,16 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = own != VKB_NO_IMAGE ? own : from;
     row.read_count = 2;
-    params->step_x = params->step_y = (float)combination->radius;
+    params->step_x = params->step_y =
+        (float)(combination->radius * (combination->width_step ? smaller->width : 1));
     if (combination->target_step) {
         params->step_x = (float)((double)smaller->width / larger->width);
         params->step_y = (float)((double)smaller->height / larger->height);
     }
-    if (is_twice(levels->graph, to, from) && kernel != UPSAMPLE_CUBIC
+    if (is_twice(levels->graph, to, from)
         && (kernel == UPSAMPLE_LINEAR
-            || (params->step_x == params->step_y && fabsf(params->step_x) <= 1.0f))) {
+            || (kernel == UPSAMPLE_TENT && params->step_x == params->step_y
+                && fabsf(params->step_x) <= 1.0f))) {
         row.constants.sampling = SAMPLING_WHOLE;
         find_up_taps(kernel == UPSAMPLE_TENT ? params->step_x : 0.0, params->taps[0]);
     }
@@ -226,56 +231,58 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
 }
 
 // Sums of levels where the format holds them. In rgba8unorm, which ends at 1, each image holds its
-// sum divided by what a flat 1 becomes there (`whole`), and the bloom is multiplied by it.
+// sum divided by what a flat 1 becomes there (`whole`; negative shares count as positive ones), and
+// the bloom is multiplied by it.
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
                         uint32_t *bloom, struct vkb_error *error)
 {
     const bool means = levels->source->format == VKB_FORMAT_RGBA8_UNORM;
     uint32_t top = levels->downs[levels->count - 1];
-    double below = 1.0;
+    double below = combination->smallest;
 
     for (uint32_t level = levels->count - 1; level-- > 0;) {
         const uint32_t from = top;
-        const double own = combination->own[level], coarse = combination->coarse[level];
-        const double whole = means ? own + coarse * below : 1.0;
+        const double own = combination->own[level], coarse = combination->coarse[level] * below;
+        const double sum = fabs(own) + fabs(coarse), whole = means && sum > 0.0 ? sum : 1.0;
         if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &top, error)
             || !add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
-                       own / whole, coarse * below / whole, error))
+                       own / whole, coarse / whole, error))
             return false;
         below = whole;
     }
-    return vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
+    return vkb_levels_bloom(levels, bloom, error)
         && add_up(levels, combination, combination->last_kernel, top, *bloom, VKB_NO_IMAGE, 0.0,
                   combination->gain * below, error);
 }
 
-bool vkb_levels_gather(const struct vkb_levels *levels, const double shares[GATHERED_LEVELS],
-                       uint32_t *bloom, struct vkb_error *error)
+bool vkb_levels_enlarge(const struct vkb_levels *levels, uint32_t from, double gain,
+                        uint32_t *bloom, struct vkb_error *error)
 {
     static const struct vkb_combination enlarging = {0};
-    const struct vkb_size size = levels->sizes[0];
-    double whole = 0.0;
-    uint32_t sum;
 
-    for (int level = 0; level < GATHERED_LEVELS; ++level)
-        whole += shares[level];
-    if (levels->source->format != VKB_FORMAT_RGBA8_UNORM)
-        whole = 1.0;
-    if (!vkb_levels_image(levels, "up_%u", 0, size, &sum, error))
-        return false;
-    struct vkb_pass_row row =
-        vkb_fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], sum);
-    row.read_count = GATHERED_LEVELS;
-    row.block = VKB_BLOCK_gather;
-    for (int level = 0; level < GATHERED_LEVELS; ++level) {
-        row.reads[level] = levels->downs[level];
-        row.params.gather.shares[level / 4][level % 4] = (float)(shares[level] / whole);
-    }
-    row.params.gather.target_width = (int)size.width;
-    row.params.gather.target_height = (int)size.height;
-    row.params.gather.limit = vkb_formats[levels->source->format].limit;
-    return vkb_graph_add_pass(levels->graph, &row, error)
-        && vkb_levels_image(levels, "bloom", 0, levels->source->final, bloom, error)
-        && add_up(levels, &enlarging, UPSAMPLE_LINEAR, sum, *bloom, VKB_NO_IMAGE, 0.0, whole,
+    return vkb_levels_bloom(levels, bloom, error)
+        && add_up(levels, &enlarging, UPSAMPLE_LINEAR, from, *bloom, VKB_NO_IMAGE, 0.0, gain,
                   error);
+}
+
+bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
+                       uint32_t to, struct vkb_error *error)
+{
+    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
+    struct vkb_pass_row row =
+        vkb_fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], to);
+
+    row.constants.upsample = kernel;
+    row.constants.levels = (int32_t)levels->count;
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row.read_count = GATHERED_LEVELS;
+    for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)
+        row.reads[level] = levels->downs[level < levels->count ? level : 0];
+    row.block = VKB_BLOCK_gather;
+    for (uint32_t level = 0; level < levels->count; ++level)
+        row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
+    row.params.gather.target_width = sampling.width;
+    row.params.gather.target_height = sampling.height;
+    row.params.gather.limit = sampling.limit;
+    return vkb_graph_add_pass(levels->graph, &row, error);
 }

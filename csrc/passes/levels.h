@@ -5,25 +5,24 @@
 
 #include "passes/pass.h"
 
-enum { VKB_MAX_LEVELS = 16 };
-
 struct vkb_levels {
     const struct vkb_settings *settings;
     const struct vkb_bloom_source *source;
     struct vkb_graph *graph;
-    struct vkb_size sizes[VKB_MAX_LEVELS];
-    uint32_t downs[VKB_MAX_LEVELS];
+    struct vkb_size sizes[MAX_LEVELS];
+    uint32_t downs[MAX_LEVELS];
     uint32_t count;
 };
 
-// How levels become the bloom: up_k = own[k] down_k + coarse[k] U(up_k+1) with up_N-1 = down_N-1,
-// bloom = gain * V(up_0).
+// How levels become the bloom: up_k = own[k] down_k + coarse[k] U(up_k+1) with
+// up_N-1 = smallest * down_N-1, bloom = gain * V(up_0).
 struct vkb_combination {
     enum vkb_mode kernel, last_kernel;  // U and V, of UPSAMPLE_*
     double radius;                      // of a tent, in texels of the smaller level
+    bool width_step;                    // the radius is a share of the smaller level's width
     bool target_step;                   // instead, one texel of the larger level
-    double own[VKB_MAX_LEVELS], coarse[VKB_MAX_LEVELS];
-    double gain;
+    double own[MAX_LEVELS], coarse[MAX_LEVELS];
+    double smallest, gain;
 };
 
 // The same `own` and `coarse` for all levels.
@@ -69,18 +68,23 @@ struct vkb_kernel {
     uint32_t count;
     double across;  // distance of the taps of the first, horizontal, pass in texels of its source;
                     // 0: one pixel of the level
-    bool whole_rows;  // the first pass keeps the height of its source, which the second one reduces
 };
 
 // Adds the image down_`level` and the two passes that blur `from` into it.
 bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
                      const struct vkb_kernel *kernel, struct vkb_error *error);
 
-// The pass "up_0": the sum of shares[k] down_k, each of the five levels enlarged bilinearly to the
-// size of the first one; then "bloom", which is that enlarged. In rgba8unorm, which ends at 1, up_0
-// is divided by the sum of the shares, and the bloom multiplied by it.
-bool vkb_levels_gather(const struct vkb_levels *levels, const double shares[GATHERED_LEVELS],
-                       uint32_t *bloom, struct vkb_error *error);
+// A pass that gathers shares[k] down_k of up to GATHERED_LEVELS levels, each enlarged by that
+// kernel to the size of `to`.
+bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
+                       uint32_t to, struct vkb_error *error);
+
+// The image "bloom", of the final size.
+bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error);
+
+// The pass "bloom": the image enlarged bilinearly, times a gain.
+bool vkb_levels_enlarge(const struct vkb_levels *levels, uint32_t from, double gain,
+                        uint32_t *bloom, struct vkb_error *error);
 
 // The passes up_N-2 ... up_0 and "bloom".
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,

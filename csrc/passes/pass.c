@@ -50,3 +50,10 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
     snprintf(row.name, sizeof row.name, "%s", name);
     return vkb_graph_add_image(graph, &row, index, error);
 }
+
+enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers)
+{
+    return buffers == VKB_FORMAT_RG11B10_UFLOAT && vkb_is_published(settings)
+             ? VKB_FORMAT_RGBA32_FLOAT
+             : buffers;
+}

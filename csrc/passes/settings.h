@@ -18,7 +18,10 @@
     METHOD(FILAMENT, filament, true) \
     METHOD(URP, urp, true) \
     METHOD(HDRP, hdrp, true) \
-    METHOD(UNREAL, unreal, true)
+    METHOD(UNREAL, unreal, true) \
+    METHOD(GODOT, godot, true) \
+    METHOD(BLENDER, blender, true) \
+    METHOD(PYGFX, pygfx, true)
 
 enum vkb_method {
 #define VKB_METHOD_ENUM(constant, name, published) VKB_METHOD_##constant,
@@ -42,6 +45,8 @@ struct vkb_settings {
     uint32_t weight_count;
     struct vkb_layer layers[MAX_LAYERS];
     uint32_t layer_count;
+    float level_weights[MAX_LEVELS];
+    uint32_t level_weight_count;  // 0: none are given
 };
 
 static inline bool vkb_is_published(const struct vkb_settings *settings)

@@ -14,6 +14,7 @@ enum attribute {
     ATTRIBUTE_BLOOM_SIZE,
     ATTRIBUTE_WEIGHTS,
     ATTRIBUTE_LAYERS,
+    ATTRIBUTE_LEVEL_WEIGHTS,
     ATTRIBUTE_CHOICES,
     ATTRIBUTE_VALUES = ATTRIBUTE_CHOICES + VKB_CHOICE_COUNT,
 };
@@ -21,9 +22,13 @@ enum attribute {
 static const char *attribute_name(size_t attribute)
 {
     static const char *const names[ATTRIBUTE_CHOICES] = {
-        [ATTRIBUTE_METHOD] = "method",   [ATTRIBUTE_THRESHOLD] = "threshold",
-        [ATTRIBUTE_FORMAT] = "format",   [ATTRIBUTE_BLOOM_SIZE] = "bloom_size",
-        [ATTRIBUTE_WEIGHTS] = "weights", [ATTRIBUTE_LAYERS] = "layers",
+        [ATTRIBUTE_METHOD] = "method",
+        [ATTRIBUTE_THRESHOLD] = "threshold",
+        [ATTRIBUTE_FORMAT] = "format",
+        [ATTRIBUTE_BLOOM_SIZE] = "bloom_size",
+        [ATTRIBUTE_WEIGHTS] = "weights",
+        [ATTRIBUTE_LAYERS] = "layers",
+        [ATTRIBUTE_LEVEL_WEIGHTS] = "level_weights",
     };
 
     return attribute < ATTRIBUTE_CHOICES ? names[attribute]
@@ -48,6 +53,7 @@ bool vkb_make_attributes(struct vkb_module_state *state)
 struct reader {
     const struct vkb_module_state *state;
     PyObject *object;
+    PyObject *fields;  // of a dataclass, by name; NULL: it is none
 };
 
 // The attribute, or NULL: without an exception where the object lacks it. One that its type has,
@@ -55,8 +61,11 @@ struct reader {
 static PyObject *optional_attribute(const struct reader *reader, size_t attribute)
 {
     PyObject *name = PyTuple_GetItem(reader->state->attributes, (Py_ssize_t)attribute);
-    PyObject *value = PyObject_GetAttr(reader->object, name);
 
+    // An AttributeError takes ten times as long as this look-up, and most methods lack most fields.
+    if (reader->fields && PyDict_Contains(reader->fields, name) == 0)
+        return NULL;
+    PyObject *value = PyObject_GetAttr(reader->object, name);
     if (value || !PyErr_ExceptionMatches(PyExc_AttributeError))
         return value;
     PyObject *type, *error, *traceback;
@@ -239,17 +248,24 @@ static bool read_method(const struct reader *reader, enum vkb_method *method)
     return false;
 }
 
-static bool read_weights(const struct reader *reader, struct vkb_settings *settings)
+// From 1 to `most` numbers; None leaves them out.
+static bool read_numbers(const struct reader *reader, size_t attribute, Py_ssize_t most,
+                         float *numbers, uint32_t *number_count)
 {
-    PyObject *value = optional_attribute(reader, ATTRIBUTE_WEIGHTS);
+    PyObject *value = optional_attribute(reader, attribute);
 
     if (!value)
         return !PyErr_Occurred();
+    if (value == Py_None) {
+        Py_DECREF(value);
+        return true;
+    }
     Py_ssize_t count = PySequence_Size(value);
-    if (count < 1 || count > MAX_WEIGHTS) {
+    if (count < 1 || count > most) {
+        const char *name = attribute_name(attribute);
         if (!PyErr_Occurred())
-            PyErr_Format(PyExc_ValueError, "weights: %zd weights are out of range, 1 to %d", count,
-                         MAX_WEIGHTS);
+            PyErr_Format(PyExc_ValueError, "%s: %zd weights are out of range, 1 to %zd", name,
+                         count, most);
         Py_DECREF(value);
         return false;
     }
@@ -257,12 +273,12 @@ static bool read_weights(const struct reader *reader, struct vkb_settings *setti
         PyObject *item = PySequence_GetItem(value, i);
         const double weight = item ? PyFloat_AsDouble(item) : 0.0;
         if (!PyErr_Occurred() && !(fabs(weight) <= FLT_MAX))
-            out_of_range("weights", item, -FLT_MAX, FLT_MAX);
+            out_of_range(attribute_name(attribute), item, -FLT_MAX, FLT_MAX);
         else
-            settings->weights[i] = (float)weight;
+            numbers[i] = (float)weight;
         Py_XDECREF(item);
     }
-    settings->weight_count = (uint32_t)count;
+    *number_count = (uint32_t)count;
     Py_DECREF(value);
     return !PyErr_Occurred();
 }
@@ -328,14 +344,30 @@ static bool read_all(const struct reader *reader, struct vkb_settings *settings)
     Py_XDECREF(threshold);
     return !PyErr_Occurred() && read_method(reader, &settings->method)
         && read_format(reader, &settings->format) && read_size(reader, settings)
-        && read_weights(reader, settings) && read_layers(reader, settings)
+        && read_numbers(reader, ATTRIBUTE_WEIGHTS, MAX_WEIGHTS, settings->weights,
+                        &settings->weight_count)
+        && read_layers(reader, settings)
+        && read_numbers(reader, ATTRIBUTE_LEVEL_WEIGHTS, MAX_LEVELS, settings->level_weights,
+                        &settings->level_weight_count)
         && require_kernel(settings);
 }
 
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings)
 {
-    return read_all(&(struct reader){.state = state, .object = object}, settings);
+    PyObject *type = (PyObject *)Py_TYPE(object);
+    struct reader reader = {.state = state, .object = object};
+
+    if (PyObject_HasAttrString(type, "__dataclass_fields__")) {
+        reader.fields = PyObject_GetAttrString(type, "__dataclass_fields__");
+        if (!reader.fields)
+            return false;
+        if (!PyDict_Check(reader.fields))
+            Py_CLEAR(reader.fields);
+    }
+    const bool done = read_all(&reader, settings);
+    Py_XDECREF(reader.fields);
+    return done;
 }
 
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)

@@ -49,25 +49,28 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
 {
-    return Py_BuildValue("(ssssNy#)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
+    return Py_BuildValue("(ssssNy#N)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
                          adapter->driver_info,
                          PyUnicode_FromFormat("%u.%u.%u",
                                               VK_API_VERSION_MAJOR(adapter->api_version),
                                               VK_API_VERSION_MINOR(adapter->api_version),
                                               VK_API_VERSION_PATCH(adapter->api_version)),
-                         (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE);
+                         (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE,
+                         PyBool_FromLong(adapter->bundled));
 }
 
-static PyObject *adapters(PyObject *module, PyObject *unused)
+static PyObject *adapters(PyObject *module, PyObject *arguments)
 {
+    const char *driver;
     struct vkb_adapter_info found[VKB_MAX_ADAPTERS];
     struct vkb_error error = {0};
     uint32_t count = 0;
     bool done;
 
-    (void)unused;
+    if (!PyArg_ParseTuple(arguments, "s:adapters", &driver))
+        return NULL;
     Py_BEGIN_ALLOW_THREADS
-    struct vkb_instance *instance = vkb_instance_open(false, &error);
+    struct vkb_instance *instance = vkb_instance_open(driver, false, &error);
     done = instance && vkb_adapters_list(instance, found, &count, &error);
     if (instance)
         vkb_instance_close(instance);
@@ -88,8 +91,18 @@ static PyObject *adapters(PyObject *module, PyObject *unused)
 }
 
 static PyMethodDef functions[] = {
-    {"adapters", adapters, METH_NOARGS, "Describes the adapters that can run vkbloom."},
-    {"describe", vkb_describe, METH_VARARGS, "The graph of a scene's frame as lists and dicts."},
+    {"adapters", adapters, METH_VARARGS,
+     "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
+    {"image_source", vkb_image_source, METH_O, "image_source(array) -> Source"},
+    {"scene_source", vkb_scene_source, METH_VARARGS,
+     "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
+    {"plan", vkb_any_plan, METH_VARARGS,
+     "plan(source, settings, names, variants) -> Plan. For no renderer: what one with those "
+     "variants would do."},
+    {"dry_run", vkb_dry_run_names, METH_O,
+     "dry_run(((source, plan), ...)) -> [[name, ...], ...]. The passes that a renderer that has "
+     "run "
+     "nothing would run for each plan after those before it."},
 #ifdef VKBLOOM_FAULTS
     {"arm_fault", vkb_fault_arm, METH_VARARGS,
      "arm_fault(n, result, names): the n-th call of those names (\"\": of all) answers result."},
@@ -207,6 +220,12 @@ static PyObject *new_error(const struct vkb_module_state *state, const struct er
     return type;
 }
 
+static bool add_type(PyObject *module, PyType_Spec *spec, const char *name, PyObject **type)
+{
+    *type = PyType_FromModuleAndSpec(module, spec, NULL);
+    return *type && PyModule_AddObjectRef(module, name, *type) == 0;
+}
+
 static int execute(PyObject *module)
 {
     struct vkb_module_state *state = vkb_module_state(module);
@@ -219,12 +238,12 @@ static int execute(PyObject *module)
             return -1;
     }
     state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
-    state->renderer_type = PyType_FromModuleAndSpec(module, &vkb_renderer_spec, NULL);
-    state->batch_type = PyType_FromModuleAndSpec(module, &vkb_batch_spec, NULL);
-    if (!state->renderer_type || !state->batch_type
-        || PyModule_AddObjectRef(module, "Renderer", state->renderer_type) < 0)
-        return -1;
-    return vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
+    return add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
+                && add_type(module, &vkb_source_spec, "Source", &state->source_type)
+                && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
+                && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
+                && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
+                && vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
                 && add_steal(module, "CHOICES", choice_table())
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
@@ -237,7 +256,10 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     struct vkb_module_state *state = vkb_module_state(module);
 
     Py_VISIT(state->renderer_type);
-    Py_VISIT(state->batch_type);
+    Py_VISIT(state->source_type);
+    Py_VISIT(state->plan_type);
+    Py_VISIT(state->submission_type);
+    Py_VISIT(state->pages_type);
     Py_VISIT(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
@@ -249,7 +271,10 @@ static int clear(PyObject *module)
     struct vkb_module_state *state = vkb_module_state(module);
 
     Py_CLEAR(state->renderer_type);
-    Py_CLEAR(state->batch_type);
+    Py_CLEAR(state->source_type);
+    Py_CLEAR(state->plan_type);
+    Py_CLEAR(state->submission_type);
+    Py_CLEAR(state->pages_type);
     Py_CLEAR(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);

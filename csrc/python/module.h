@@ -1,5 +1,5 @@
-// What the files that speak Python share: module.c, renderer.c, batch.c, array_memory.c,
-// arguments.c, scene_arguments.c, describe.c, and faults.c in test builds. The only header of the
+// What the files that speak Python share: module.c, renderer.c, source.c, plan.c, requests.c,
+// arrays.c, arguments.c, scene_arguments.c, and faults.c in test builds. The only header of the
 // core that includes Python.h.
 #ifndef VKB_MODULE_H
 #define VKB_MODULE_H
@@ -7,7 +7,7 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
-#include "methods/methods.h"
+#include "methods/source.h"
 #include "run/frame.h"
 #include "variants/forms.h"
 #include "vulkan/process.h"
@@ -15,7 +15,7 @@
 #include <stdatomic.h>
 
 struct vkb_module_state {
-    PyObject *renderer_type, *batch_type;
+    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
 };
@@ -28,28 +28,37 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 // (name, type, driver, driver_info, api_version, driver UUID as bytes)
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
-extern PyType_Spec vkb_renderer_spec, vkb_batch_spec;
+extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
+    vkb_pages_spec;
 
-// A batch's flight that nobody waits for any more, with what it writes to until it is over.
-struct vkb_cargo {
-    struct vkb_flight *flight;  // NULL: over
-    void (*release)(struct vkb_cargo *cargo);
-    struct vkb_cargo *next;
+// What a submission needs until the device is done with it. Once it is abandoned, because nobody
+// waits for it any more, the renderer has it.
+struct vkb_pending {
+    struct vkb_flight *flight;  // NULL: not submitted
+    PyObject *plans;            // a tuple: their graphs are read until then
+    struct vkb_request *requests;
+    struct vkb_output *outputs;  // of all requests, one after the other
+    Py_buffer *views;            // of the outputs
+    struct vkb_timing *timings;
+    uint32_t count;  // of the requests
+    size_t view_count;
+    struct vkb_specials specials;
+    struct vkb_pending *next;
 };
 
 struct vkb_renderer {
     PyObject_HEAD
-    PyThread_type_lock lock;   // held, without the GIL, around all that touches the device
-    unsigned long holder;      // the thread that holds it, 0: none; read and written with the GIL
-    PyThreadState *thread;     // that thread's, while it has given the GIL back
-    struct vkb_cargo *adrift;  // touched with the GIL
-    long process;              // that opened it: the device is no other's, not even a forked one's
-    atomic_bool open;          // changed with the lock, looked at without
+    PyThread_type_lock lock;  // held, without the GIL, around all that touches the device
+    unsigned long holder;     // the thread that holds it, 0: none; read and written with the GIL
+    PyThreadState *thread;    // that thread's, while it has given the GIL back
+    struct vkb_pending *abandoned;  // touched with the GIL
+    long process;      // that opened it: the device is no other's, not even a forked one's
+    atomic_bool open;  // changed with the lock, looked at without
     const struct vkb_messages *before;  // whose the messages are when the holder leaves
-    PyObject *array_memory;             // a capsule, which the arrays hold too; NULL: closed
-    PyObject *array_context;   // a contextvars.Context that has it; NULL: no NumPy that takes it
-    size_t pipeline_count;     // made so far; read and written with the GIL
-    struct vkb_cached cached;  // read and written with the GIL
+    uint64_t serial;                    // by which plans know it; never 0
+    struct vkb_pages *pages;            // of large arrays; NULL: closed
+    size_t pipeline_count;              // made so far; read and written with the GIL
+    struct vkb_cached cached;           // read and written with the GIL
     enum vkb_forms forms;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -60,8 +69,8 @@ bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *err
 
 // Takes the renderer's lock and gives the GIL back, and the other way round. Waiting for the lock
 // can be interrupted by a signal; then, and where a signal's handler asks for what the thread that
-// it interrupted has, the first one fails, with the GIL. The second one gives up what is adrift and
-// over.
+// it interrupted has, the first one fails, with the GIL. The second one releases what is
+// abandoned and over.
 bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
 void vkb_renderer_leave(struct vkb_renderer *renderer);
 
@@ -72,21 +81,12 @@ bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struc
 
 // Whether this is the process that opened the renderer.
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
-// Takes the cargo over, whose flight may be in the air.
-void vkb_renderer_set_adrift(struct vkb_renderer *renderer, struct vkb_cargo *cargo);
+// Takes over what nobody waits for any more. With the GIL.
+void vkb_renderer_abandon(struct vkb_renderer *renderer, struct vkb_pending *pending);
 
-// Memory for large arrays that the device writes to without a copy; false with an exception set.
-bool vkb_array_memory_create(struct vkb_renderer *renderer);
-// Before the device goes, with the GIL; arrays keep what they have.
-void vkb_array_memory_close(struct vkb_renderer *renderer);
-// The pages that the array's memory is in; NULL: it is not the renderer's. With the GIL.
-struct vkb_page_run *vkb_array_pages(const struct vkb_renderer *renderer, const void *memory);
-// Method of the Renderer: new_array(empty, shape, dtype), what empty(shape, dtype) makes there.
-PyObject *vkb_new_array(PyObject *renderer, PyObject *arguments);
-
-// Methods of the Renderer: a new Batch of points of one scene or of one image.
-PyObject *vkb_batch_of_scene(PyObject *renderer, PyObject *arguments);
-PyObject *vkb_batch_of_image(PyObject *renderer, PyObject *arguments);
+// With the GIL; the device must be done with it.
+void vkb_pending_release(struct vkb_pending *pending);
+int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg);
 
 // Makes what vkb_read_settings keeps in the state; false with an exception set.
 bool vkb_make_attributes(struct vkb_module_state *state);
@@ -140,8 +140,34 @@ struct vkb_held_image {
 bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
 
-// The graph of a scene's frame as Python data: describe(settings, size, has_sky, shading).
-PyObject *vkb_describe(PyObject *module, PyObject *arguments);
+struct vkb_source_object {
+    PyObject_HEAD
+    struct vkb_source source;
+    struct vkb_held_scene scene;
+    struct vkb_held_image image;
+};
+
+struct vkb_plan_object {
+    PyObject_HEAD
+    struct vkb_source source;
+    struct vkb_plan plan;
+    uint64_t renderer;  // whose plan it is; 0: nobody's, to be looked at
+    PyObject *outputs;  // ((name, shape, dtype), ...)
+};
+
+// Bytes of an output in the caller's array.
+size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
+
+// Functions of the module.
+PyObject *vkb_image_source(PyObject *module, PyObject *array);
+PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
+PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
+PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
+
+// Methods of the Renderer.
+PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);

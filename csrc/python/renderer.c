@@ -47,29 +47,29 @@ static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
     return true;
 }
 
-// Takes out of what is adrift what is over. With the lock and the GIL, or without a device.
-static struct vkb_cargo *take_over(struct vkb_renderer *self)
+// Takes out of what is abandoned what is over. With the lock and the GIL, or without a device.
+static struct vkb_pending *take_over(struct vkb_renderer *self)
 {
-    struct vkb_cargo **link = &self->adrift, *over = NULL;
+    struct vkb_pending **link = &self->abandoned, *over = NULL;
 
     while (*link) {
-        struct vkb_cargo *cargo = *link;
+        struct vkb_pending *pending = *link;
         // Without a device all is over; one that was left behind at work keeps what it has.
         if (self->device.handle
-            && !(self->open && vkb_frame_drop(&self->device, &self->frame, cargo->flight))) {
-            link = &cargo->next;
+            && !(self->open && vkb_frame_drop(&self->device, &self->frame, pending->flight))) {
+            link = &pending->next;
             continue;
         }
-        *link = cargo->next;
-        cargo->next = over;
-        over = cargo;
+        *link = pending->next;
+        pending->next = over;
+        over = pending;
     }
     return over;
 }
 
 // With the GIL, without the lock: it runs Python's code, which may wait for another thread that
 // waits for the renderer. An exception that is set stays.
-static void release_all(struct vkb_cargo *over)
+static void release_all(struct vkb_pending *over)
 {
     PyObject *type, *value, *traceback;
 
@@ -77,17 +77,17 @@ static void release_all(struct vkb_cargo *over)
         return;
     PyErr_Fetch(&type, &value, &traceback);
     while (over) {
-        struct vkb_cargo *next = over->next;
-        over->release(over);
+        struct vkb_pending *next = over->next;
+        vkb_pending_release(over);
         over = next;
     }
     PyErr_Restore(type, value, traceback);
 }
 
-void vkb_renderer_set_adrift(struct vkb_renderer *self, struct vkb_cargo *cargo)
+void vkb_renderer_abandon(struct vkb_renderer *self, struct vkb_pending *pending)
 {
-    cargo->next = self->adrift;
-    self->adrift = cargo;
+    pending->next = self->abandoned;
+    self->abandoned = pending;
 }
 
 bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
@@ -113,7 +113,7 @@ void vkb_renderer_leave(struct vkb_renderer *self)
         self->pipeline_count = self->frame.pipelines.created;
         self->cached = vkb_frame_cached(&self->frame);
     }
-    struct vkb_cargo *over = take_over(self);
+    struct vkb_pending *over = take_over(self);
     vkb_messages_end(self->before);
     self->holder = 0;
     PyThread_release_lock(self->lock);
@@ -127,17 +127,18 @@ bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vk
     return vkb_messages_check(&self->device.messages, error) && done;
 }
 
-// create(adapter, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes of an
-// earlier run's pipeline cache, or None.
-static bool create(struct vkb_renderer *self, const char *adapter, bool validation,
-                   const char *forms, PyObject *read_cache, struct vkb_error *error)
+// create(adapter, driver, validation, forms, read_cache): read_cache(driver_uuid) gives the bytes
+// of an earlier run's pipeline cache, or None.
+static bool create(struct vkb_renderer *self, const char *adapter, const char *driver,
+                   bool validation, const char *forms, PyObject *read_cache,
+                   struct vkb_error *error)
 {
     bool done;
     char *data = NULL;
     Py_ssize_t size = 0;
 
     Py_BEGIN_ALLOW_THREADS
-    done = vkb_device_create(&self->device, adapter, validation, error);
+    done = vkb_device_create(&self->device, adapter, driver, validation, error);
     Py_END_ALLOW_THREADS
     if (!done)
         return false;
@@ -169,7 +170,7 @@ static bool create(struct vkb_renderer *self, const char *adapter, bool validati
 
 static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject *keywords)
 {
-    const char *adapter, *forms;
+    const char *adapter, *driver, *forms;
     int validation;
     double frame_seconds;
     PyObject *read_cache;
@@ -179,7 +180,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(arguments, "spsdO:Renderer", &adapter, &validation, &forms,
+    if (!PyArg_ParseTuple(arguments, "sspsdO:Renderer", &adapter, &driver, &validation, &forms,
                           &frame_seconds, &read_cache))
         return NULL;
     if (!(frame_seconds > 0.0)) {
@@ -190,12 +191,14 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
     if (!self)
         return NULL;
+    static uint64_t last_serial;
+    self->serial = ++last_serial;
     self->process = vkb_current_process();
     self->lock = PyThread_allocate_lock();
     if (!self->lock)
         PyErr_NoMemory();
-    else if (vkb_array_memory_create(self))
-        self->open = create(self, adapter, validation, forms, read_cache, &error);
+    else if ((self->pages = vkb_pages_create(&self->device, &error)))
+        self->open = create(self, adapter, driver, validation, forms, read_cache, &error);
     if (self->open) {
         self->device.interrupted = interrupted;
         self->device.asked = self;
@@ -227,7 +230,8 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
-    vkb_array_memory_close(self);
+    vkb_pages_close(self->pages);
+    self->pages = NULL;
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);
@@ -254,6 +258,7 @@ static void dealloc(PyObject *object)
     freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
     struct vkb_error error = {0};
 
+    PyObject_GC_UnTrack(object);
     self->device.interrupted = interrupted_at_the_end;
     if (vkb_renderer_is_ours(self)) {
         self->thread = PyEval_SaveThread();
@@ -264,12 +269,11 @@ static void dealloc(PyObject *object)
     }
     self->open = false;
     // A device that is at work still, or another process's, is left behind, and with it what the
-    // driver may still use: what is adrift, and this object, which has the device's messages.
+    // driver may still use: what is abandoned, and this object, which has the device's messages.
     if (self->device.handle)
         return;
     release_all(take_over(self));
-    Py_CLEAR(self->array_context);
-    Py_CLEAR(self->array_memory);
+    vkb_pages_close(self->pages);
     if (self->lock)
         PyThread_free_lock(self->lock);
     release(self);
@@ -354,12 +358,14 @@ static PyObject *get_cached(PyObject *object, void *unused)
 
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Gives all back; may be called twice."},
-    {"render", vkb_batch_of_scene, METH_VARARGS,
-     "render(scene, camera, size, shading, time, glow_intensity, names) -> Batch"},
-    {"apply", vkb_batch_of_image, METH_VARARGS, "apply(image, names) -> Batch"},
-    {"new_array", vkb_new_array, METH_VARARGS,
-     "new_array(empty, shape, dtype): what empty(shape, dtype) makes, in memory that is used "
-     "again."},
+    {"plan", vkb_renderer_plan, METH_VARARGS,
+     "plan(source, settings, names) -> Plan. Without a wait, without the device; None: all "
+     "framebuffers."},
+    {"run", vkb_renderer_run, METH_VARARGS,
+     "run(source, plans, arrays) -> Submission. Hands plans with the same images to the device; "
+     "arrays holds a tuple for each plan, in the order of its outputs."},
+    {"pages", vkb_new_pages, METH_O,
+     "pages(size) -> Pages. Memory for an array, used again when the array is gone."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };
@@ -373,9 +379,24 @@ static PyGetSetDef attributes[] = {
     {0},
 };
 
+// There is nothing to clear: what is abandoned stays until the device is done with it.
+static int traverse(PyObject *object, visitproc visit, void *arg)
+{
+    const struct vkb_renderer *self = (const struct vkb_renderer *)object;
+
+    Py_VISIT(Py_TYPE(object));
+    for (const struct vkb_pending *pending = self->abandoned; pending; pending = pending->next) {
+        const int result = vkb_pending_traverse(pending, visit, arg);
+        if (result)
+            return result;
+    }
+    return 0;
+}
+
 static PyType_Slot slots[] = {
     {Py_tp_new, new_renderer},
     {Py_tp_dealloc, dealloc},
+    {Py_tp_traverse, traverse},
     {Py_tp_methods, methods},
     {Py_tp_getset, attributes},
     {Py_tp_doc, "A device and all that lives on it; vkbloom.Renderer wraps it."},
@@ -385,6 +406,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_renderer_spec = {
     .name = "vkbloom._core.Renderer",
     .basicsize = sizeof(struct vkb_renderer),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE,
+    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE,
     .slots = slots,
 };

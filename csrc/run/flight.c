@@ -61,10 +61,10 @@ void vkb_flights_give_back(const struct vkb_device *device, struct vkb_flights *
     size_t free_count = 0;
 
     flight->taken = false;
-    flight->points = NULL;
+    flight->requests = NULL;
     if (flight->airborne)
         return;
-    flight->point_count = 0;
+    flight->request_count = 0;
     vkb_readback_release(device, &flight->readback);
     for (size_t i = 0; i < flights->count; ++i)
         free_count += !flights->flights[i]->taken;
@@ -98,14 +98,14 @@ bool vkb_flight_over(const struct vkb_device *device, const struct vkb_flight *f
     return !flight->airborne || vkb_commands_over(device, &flight->commands);
 }
 
-// All that is in the air may come before the flight; one without points loads a scene.
+// All that is in the air may come before the flight; one without requests loads a scene.
 static uint32_t count_frames(const struct vkb_flights *flights)
 {
     uint32_t count = 0;
 
     for (size_t i = 0; i < flights->count; ++i)
         if (flights->flights[i]->airborne)
-            count += flights->flights[i]->point_count ? flights->flights[i]->point_count : 1;
+            count += flights->flights[i]->request_count ? flights->flights[i]->request_count : 1;
     return count;
 }
 

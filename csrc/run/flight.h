@@ -15,9 +15,9 @@ struct vkb_flight {
     uint32_t descriptor_capacity;  // in sets
     struct vkb_timer timer;
     struct vkb_readback readback;
-    uint64_t number;           // of the submission; they count up
-    struct vkb_point *points;  // what it runs; the submitter's
-    uint32_t point_count;
+    uint64_t number;               // of the submission; they count up
+    struct vkb_request *requests;  // what it runs; the submitter's
+    uint32_t request_count;
     bool taken;     // by a submitter that has not given it back
     bool airborne;  // the device may still be at work on it, also where nobody waits any more
 };

@@ -1,6 +1,5 @@
 #include "run/frame.h"
 
-#include "graph/plan.h"
 #include "run/record.h"
 
 #include <string.h>
@@ -19,118 +18,8 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     vkb_upload_destroy(device, &frame->upload);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
-    vkb_graph_destroy(&frame->previous.graph);
+    vkb_planner_destroy(&frame->planner);
     *frame = (struct vkb_frame){0};
-}
-
-static bool append(struct vkb_run *run, const void *bytes, size_t size, struct vkb_error *error)
-{
-    if (!vkb_grow(error, &run->recipe, &run->recipe_capacity, run->recipe_size + size, 1))
-        return false;
-    memcpy(run->recipe + run->recipe_size, bytes, size);
-    run->recipe_size += size;
-    return true;
-}
-
-// What passes first..end-1 make their targets from: their rows, with the versions of what they read
-// in place of the graph's indices.
-static bool write_recipe(struct vkb_run *run, uint32_t first, uint32_t end, struct vkb_error *error)
-{
-    run->recipe_size = 0;
-    for (uint32_t i = first; i < end; ++i) {
-        struct vkb_pass_row row = run->graph->passes[i];
-        unsigned char bytes[sizeof row];
-        uint64_t versions[VKB_MAX_READS + 1] = {0};
-
-        for (uint32_t read = 0; read < row.read_count; ++read)
-            versions[read] = run->slots[row.reads[read]]->version;
-        if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
-            versions[VKB_MAX_READS] = run->frame->scene.serial;
-        memset(row.reads, 0, sizeof row.reads);
-        memset(row.targets, 0, sizeof row.targets);
-        row.depth = row.depth != VKB_NO_IMAGE;
-        if (!append(run, bytes, vkb_pass_pack(&row, bytes), error)
-            || !append(run, versions, sizeof versions, error))
-            return false;
-    }
-    return true;
-}
-
-// Whether the image is there and holds what a pass before `end` would make.
-static bool is_current(const struct vkb_run *run, uint32_t image, uint32_t end)
-{
-    bool current = run->graph->images[image].input;
-
-    for (uint32_t i = 0; i < end; ++i)
-        current = current || (run->current[i] && vkb_pass_writes(&run->graph->passes[i], image));
-    return current && run->slots[image];
-}
-
-// The slots of a pass's targets, the depth last; returns how many.
-static uint32_t target_slots(const struct vkb_run *run, const struct vkb_pass_row *pass,
-                             struct vkb_slot **slots)
-{
-    uint32_t count = 0;
-
-    for (uint32_t i = 0; i < pass->target_count; ++i)
-        slots[count++] = run->slots[pass->targets[i]];
-    if (pass->depth != VKB_NO_IMAGE)
-        slots[count++] = run->slots[pass->depth];
-    return count;
-}
-
-// Finds out which passes have nothing to do, from the first to the last: their targets hold what
-// the recipe says, and all that they read is so too.
-static bool mark_current(struct vkb_run *run, struct vkb_error *error)
-{
-    const struct vkb_graph *graph = run->graph;
-
-    for (uint32_t i = 0; i < graph->image_count; ++i)
-        run->slots[i] = vkb_slots_find(&run->frame->slots, &graph->images[i]);
-    memset(run->current, 0, graph->pass_count * sizeof *run->current);
-    for (uint32_t first = 0, end; first < graph->pass_count; first = end) {
-        struct vkb_slot *targets[VKB_MAX_TARGETS + 1] = {0};
-        const uint32_t target_count = target_slots(run, &graph->passes[first], targets);
-        bool found = true;
-
-        end = vkb_graph_group_end(graph, first);
-        for (uint32_t i = first; i < end; ++i)
-            for (uint32_t read = 0; read < graph->passes[i].read_count; ++read)
-                found = found && is_current(run, graph->passes[i].reads[read], first);
-        for (uint32_t i = 0; i < target_count; ++i)
-            found = found && targets[i];
-        if (found && !write_recipe(run, first, end, error))
-            return false;
-        for (uint32_t i = 0; i < target_count; ++i)
-            found = found && vkb_slot_up_to_date(targets[i], run->recipe, run->recipe_size);
-        for (uint32_t i = first; i < end; ++i)
-            run->current[i] = found;
-    }
-    return true;
-}
-
-static bool record_passes(struct vkb_run *run, struct vkb_error *error)
-{
-    const struct vkb_graph *graph = run->graph;
-
-    for (uint32_t first = 0, end; first < graph->pass_count; first = end) {
-        struct vkb_slot *targets[VKB_MAX_TARGETS + 1] = {0};
-        uint32_t target_count;
-        bool current = true;
-
-        end = vkb_graph_group_end(graph, first);
-        // All passes of a group are needed if one is: they share their targets.
-        if (!run->needed[first])
-            continue;
-        if (!write_recipe(run, first, end, error))
-            return false;
-        target_count = target_slots(run, &graph->passes[first], targets);
-        for (uint32_t i = 0; i < target_count; ++i)
-            current = current && vkb_slot_up_to_date(targets[i], run->recipe, run->recipe_size);
-        if (!current && !vkb_record_group(run, first, end, targets, target_count, error))
-            return false;
-    }
-    return true;
 }
 
 static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_error *error)
@@ -163,8 +52,8 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
     return true;
 }
 
-// Room for all that the points can need.
-static bool reserve(struct vkb_run *run, struct vkb_point *points, uint32_t point_count,
+// Room for all that the requests can need.
+static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
                     struct vkb_error *error)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
@@ -174,33 +63,43 @@ static bool reserve(struct vkb_run *run, struct vkb_point *points, uint32_t poin
     struct vkb_flight *flight = run->flight;
     uint32_t passes = 0;
 
-    for (uint32_t i = 0; i < point_count; ++i) {
-        struct vkb_point *point = &points[i];
-        passes += point->graph.pass_count;
-        for (uint32_t output = 0; output < point->output_count; ++output) {
-            const struct vkb_image_row *row = &point->graph.images[point->outputs[output].image];
+    for (uint32_t i = 0; i < request_count; ++i) {
+        const struct vkb_plan *plan = requests[i].plan;
+        passes += plan->graph.pass_count;
+        for (uint32_t output = 0; output < plan->output_count; ++output) {
+            const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
             if (!vkb_readback_plan(run->device, &flight->readback, row->format, row->width,
-                                   row->height, &point->outputs[output], error))
+                                   row->height, &requests[i].outputs[output], error))
                 return false;
         }
     }
-    return reserve_descriptors(run, passes + point_count * surfaces, error)
+    return reserve_descriptors(run, passes + request_count * surfaces, error)
         && vkb_timer_reserve(run->device, passes, &flight->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
                               params * passes, &flight->uniforms, error)
         && vkb_readback_reserve(run->device, &flight->readback, error);
 }
 
+static void set_slot(struct vkb_run *run, uint32_t image, struct vkb_slot *slot)
+{
+    run->slots[image] = slot;
+    run->contents[image] = slot ? &slot->content : NULL;
+}
+
 // The slot of the graph's image. One that other commands may still use is replaced only when those
-// have run; the points of this flight have the same images.
+// have run; the requests of this flight have the same images.
 static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
 {
     const struct vkb_image_row *row = &run->graph->images[image];
     struct vkb_slots *slots = &run->frame->slots;
+    struct vkb_slot *slot;
 
-    return (!vkb_slots_replaces(slots, row)
-            || vkb_flights_land(run->device, &run->frame->flights, error))
-        && vkb_slots_resolve(run->device, slots, row, &run->slots[image], error);
+    if ((vkb_slots_replaces(slots, row)
+         && !vkb_flights_land(run->device, &run->frame->flights, error))
+        || !vkb_slots_resolve(run->device, slots, row, &slot, error))
+        return false;
+    set_slot(run, image, slot);
+    return true;
 }
 
 static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
@@ -233,14 +132,15 @@ static bool stage_input(struct vkb_run *run, const struct vkb_input *input, stru
             run->input = run->slots[i];
         }
     // An image that its last writing did not reach holds nothing to compare with.
-    if (run->input->image.mapped && !run->input->valid)
+    if (run->input->image.mapped && !run->input->content.valid)
         vkb_upload_forget(&run->frame->upload);
     if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->flights, input,
                           &run->input->image, &changed, error))
         return false;
-    run->send_input = changed || !run->input->valid;
+    run->send_input = changed || !run->input->content.valid;
     return !run->send_input
-        || vkb_slot_begin_writing(&run->frame->slots, run->input, NULL, 0, error);
+        || vkb_content_begin_writing(&run->input->content, &run->frame->slots.clock, NULL, 0,
+                                     error);
 }
 
 static void record_input(struct vkb_run *run)
@@ -248,63 +148,50 @@ static void record_input(struct vkb_run *run)
     if (!run->input->image.mapped)
         vkb_upload_record(run->device, run->flight->commands.buffer, &run->frame->upload,
                           &run->input->image);
-    run->input->valid = true;
+    run->input->content.valid = true;
 }
 
 static uint64_t source_version(const struct vkb_run *run)
 {
-    return run->input ? run->input->version : run->frame->scene.serial;
+    return run->input ? run->input->content.version : run->frame->scene.serial;
 }
 
-// A copy of the point's passes, for it may be gone when the next one comes.
-static bool keep_previous(struct vkb_run *run, struct vkb_error *error)
-{
-    struct vkb_previous *previous = &run->frame->previous;
-    struct vkb_graph *graph = &previous->graph;
-
-    graph->pass_count = 0;
-    if (!vkb_grow(error, &graph->passes, &graph->pass_capacity, run->graph->pass_count,
-                  sizeof *graph->passes))
-        return false;
-    memcpy(graph->passes, run->graph->passes, run->graph->pass_count * sizeof *graph->passes);
-    graph->pass_count = run->graph->pass_count;
-    previous->source = source_version(run);
-    return true;
-}
-
-// `next` is the point after it, NULL after the last.
-static bool record_point(struct vkb_run *run, struct vkb_point *point, const struct vkb_point *next,
-                         struct vkb_error *error)
+// `next` is the request after it, NULL after the last.
+static bool record_request(struct vkb_run *run, struct vkb_request *request,
+                           const struct vkb_request *next, struct vkb_error *error)
 {
     struct vkb_flight *flight = run->flight;
-    const struct vkb_previous *previous = &run->frame->previous;
-    const struct vkb_neighbours neighbours = {
-        .previous = previous->source == source_version(run) ? &previous->graph : NULL,
-        .next = next ? &next->graph : NULL,
+    struct vkb_frame *frame = run->frame;
+    const struct vkb_graph *graph = &request->plan->graph;
+    const struct vkb_plan_step step = {
+        .plan = request->plan,
+        .next = next ? &next->plan->graph : NULL,
+        .contents = run->contents,
+        .source = source_version(run),
+        .scene = frame->scene.serial,
     };
 
-    run->point = point;
-    run->graph = &point->graph;
-    point->timing_count = 0;
-    point->first_span = flight->timer.span_count;
-    if (!mark_current(run, error)
-        || !vkb_plan(run->graph, &neighbours, point->outputs, point->output_count, run->current,
-                     run->needed, run->wanted, error)
-        || !keep_previous(run, error))
+    run->request = request;
+    run->graph = graph;
+    request->timing_count = 0;
+    request->first_span = flight->timer.span_count;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        set_slot(run, i, vkb_slots_find(&frame->slots, &graph->images[i]));
+    if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
-    for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (run->wanted[i] && !resolve(run, i, error))
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (frame->planner.wanted[i] && !resolve(run, i, error))
             return false;
-    if (!record_passes(run, error))
+    if (!vkb_planner_run(&frame->planner, &step, &frame->slots.clock, vkb_record_group, run, error))
         return false;
-    for (uint32_t i = 0; i < point->output_count; ++i)
+    for (uint32_t i = 0; i < request->plan->output_count; ++i)
         vkb_readback_record(run->device, flight->commands.buffer, &flight->readback,
-                            &run->slots[point->outputs[i].image]->image, &point->outputs[i]);
+                            &run->slots[request->plan->outputs[i]]->image, &request->outputs[i]);
     return true;
 }
 
-static bool record_and_submit(struct vkb_run *run, struct vkb_point *points, uint32_t point_count,
-                              struct vkb_error *error)
+static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
+                              uint32_t request_count, struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
     struct vkb_flight *flight = run->flight;
@@ -315,8 +202,9 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_point *points, uin
     vkb_timer_reset(device, commands, &flight->timer);
     if (run->send_input)
         record_input(run);
-    for (uint32_t i = 0; i < point_count; ++i)
-        if (!record_point(run, &points[i], i + 1 < point_count ? &points[i + 1] : NULL, error))
+    for (uint32_t i = 0; i < request_count; ++i)
+        if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
+                            error))
             return false;
     vkb_barrier_record_host_read(device, commands);
     return vkb_buffer_flush(device, &flight->uniforms, error)
@@ -324,13 +212,13 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_point *points, uin
 }
 
 static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
-                   struct vkb_point *points, uint32_t point_count, struct vkb_error *error)
+                   struct vkb_request *requests, uint32_t request_count, struct vkb_error *error)
 {
-    run->graph = &points[0].graph;
+    run->graph = &requests[0].plan->graph;
     return (!source->scene || load_scene(run, source->scene, error))
         && (!source->input || stage_input(run, source->input, error))
-        && reserve(run, points, point_count, error)
-        && record_and_submit(run, points, point_count, error);
+        && reserve(run, requests, request_count, error)
+        && record_and_submit(run, requests, request_count, error);
 }
 
 // After a failure nothing is known of what the device did: images and commands are made anew. The
@@ -379,34 +267,26 @@ struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
 }
 
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
-                      const struct vkb_frame_source *source, struct vkb_point *points,
-                      uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error)
+                      const struct vkb_frame_source *source, struct vkb_request *requests,
+                      uint32_t request_count, struct vkb_flight **flight, struct vkb_error *error)
 {
     struct vkb_run run = {.device = device, .frame = frame};
-    const uint32_t image_count = points[0].graph.image_count;
-    uint32_t pass_count = 0;
+    // All requests have the same images.
+    const uint32_t image_count = requests[0].plan->graph.image_count;
     bool done;
 
-    for (uint32_t i = 0; i < point_count; ++i)
-        if (points[i].graph.pass_count > pass_count)
-            pass_count = points[i].graph.pass_count;
     if (!renew(device, frame, error)
         || !vkb_flights_take(device, &frame->flights, &run.flight, error))
         return false;
     trim(device, frame, run.flight);
     done = (run.slots = vkb_alloc(error, image_count, sizeof *run.slots))
-        && (run.wanted = vkb_alloc(error, image_count, sizeof *run.wanted))
-        && (run.needed = vkb_alloc(error, pass_count, sizeof *run.needed))
-        && (run.current = vkb_alloc(error, pass_count, sizeof *run.current))
-        && submit(&run, source, points, point_count, error);
+        && (run.contents = vkb_alloc(error, image_count, sizeof *run.contents))
+        && submit(&run, source, requests, request_count, error);
     vkb_free(run.slots);
-    vkb_free(run.wanted);
-    vkb_free(run.needed);
-    vkb_free(run.current);
-    vkb_free(run.recipe);
+    vkb_free(run.contents);
     if (done) {
-        run.flight->points = points;
-        run.flight->point_count = point_count;
+        run.flight->requests = requests;
+        run.flight->request_count = request_count;
         *flight = run.flight;
     } else {
         fail_frame(device, frame, run.flight, error);
@@ -416,33 +296,33 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
 }
 
 // Times of the same name are of steps of one thing: they become one.
-static void merge_timings(struct vkb_point *point)
+static void merge_timings(struct vkb_request *request)
 {
     uint32_t count = 0;
 
-    for (uint32_t i = 0; i < point->timing_count; ++i) {
+    for (uint32_t i = 0; i < request->timing_count; ++i) {
         uint32_t at = 0;
-        while (at < count && strcmp(point->timings[at].name, point->timings[i].name) != 0)
+        while (at < count && strcmp(request->timings[at].name, request->timings[i].name) != 0)
             ++at;
         if (at < count)
-            point->timings[at].seconds += point->timings[i].seconds;
+            request->timings[at].seconds += request->timings[i].seconds;
         else
-            point->timings[count++] = point->timings[i];
+            request->timings[count++] = request->timings[i];
     }
-    point->timing_count = count;
+    request->timing_count = count;
 }
 
-// What the device has left for the points of a flight that is over.
+// What the device has left for the requests of a flight that is over.
 static void fetch(const struct vkb_device *device, const struct vkb_flight *flight)
 {
-    for (uint32_t i = 0; i < flight->point_count; ++i) {
-        struct vkb_point *point = &flight->points[i];
-        for (uint32_t timing = 0; timing < point->timing_count; ++timing)
-            point->timings[timing].seconds =
-                vkb_timer_seconds(device, &flight->timer, point->first_span + timing);
-        merge_timings(point);
-        for (uint32_t output = 0; output < point->output_count; ++output)
-            vkb_readback_fetch(&flight->readback, &point->outputs[output]);
+    for (uint32_t i = 0; i < flight->request_count; ++i) {
+        struct vkb_request *request = &flight->requests[i];
+        for (uint32_t timing = 0; timing < request->timing_count; ++timing)
+            request->timings[timing].seconds =
+                vkb_timer_seconds(device, &flight->timer, request->first_span + timing);
+        merge_timings(request);
+        for (uint32_t output = 0; output < request->plan->output_count; ++output)
+            vkb_readback_fetch(&flight->readback, &request->outputs[output]);
     }
 }
 

@@ -3,18 +3,12 @@
 #ifndef VKB_FRAME_H
 #define VKB_FRAME_H
 
-#include "graph/graph.h"
+#include "graph/plan.h"
 #include "run/flight.h"
 #include "run/pipeline.h"
 #include "run/slots.h"
 #include "run/upload.h"
 #include "scene/scene.h"
-
-// The passes of the point that was recorded last, and what its source was.
-struct vkb_previous {
-    struct vkb_graph graph;  // without images
-    uint64_t source;
-};
 
 // Everything that lives from frame to frame. What the flights share is changed by the device in the
 // order of the submissions, and by the host only when nothing is in the air.
@@ -24,7 +18,7 @@ struct vkb_frame {
     struct vkb_scene scene;
     struct vkb_upload upload;
     struct vkb_slots slots;
-    struct vkb_previous previous;
+    struct vkb_planner planner;
     uint64_t submissions;  // so far
     bool stale;            // something failed: the images are made anew before anything is recorded
 };
@@ -46,27 +40,27 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
                       struct vkb_frame *frame, struct vkb_error *error);
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame);
 
-// One graph to run. `timings` has room for every pass of the graph and gets the render passes that
-// ran. All of it must stay where it is until the flight is over.
-struct vkb_point {
-    struct vkb_graph graph;
+// One source with one settings, as a plan of its own. `outputs` are the plan's, in its order;
+// `timings` has room for every pass of the graph and gets the render passes that ran. All of it,
+// the plan too, must stay where it is until the flight is over.
+struct vkb_request {
+    const struct vkb_plan *plan;
     struct vkb_output *outputs;
-    uint32_t output_count;
     struct vkb_timing *timings;
     uint32_t timing_count;
     uint32_t first_span;  // of its timings, in the flight's timer
 };
 
-// Records what the points' outputs need and is out of date, point after point, and hands it to the
-// device. All points have the same images (vkb_graph_same_images). The source is read before this
-// returns. A failure leaves no flight, the frame usable, unless the device is lost, and earlier
-// flights as they were.
+// Records what the requests' outputs need and is out of date, request after request, and hands it
+// to the device. All requests have the same images (vkb_graph_same_images). The source is read
+// before this returns. A failure leaves no flight, the frame usable, unless the device is lost, and
+// earlier flights as they were.
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
-                      const struct vkb_frame_source *source, struct vkb_point *points,
-                      uint32_t point_count, struct vkb_flight **flight, struct vkb_error *error);
+                      const struct vkb_frame_source *source, struct vkb_request *requests,
+                      uint32_t request_count, struct vkb_flight **flight, struct vkb_error *error);
 
-// Waits for the flight and fills its points' outputs and timings. *over: whether the device is done
-// with it, which it need not be after a failure.
+// Waits for the flight and fills its requests' outputs and timings. *over: whether the device is
+// done with it, which it need not be after a failure.
 bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
                        struct vkb_flight *flight, bool *over, struct vkb_error *error);
 

@@ -13,6 +13,21 @@
 #include <sys/mman.h>
 #endif
 
+struct vkb_pages {
+    const struct vkb_device *device;    // NULL: closed
+    struct vkb_page_run *taken, *idle;  // the latest first
+    size_t idle_size;
+};
+
+struct vkb_pages *vkb_pages_create(const struct vkb_device *device, struct vkb_error *error)
+{
+    struct vkb_pages *pages = vkb_alloc(error, 1, sizeof *pages);
+
+    if (pages)
+        pages->device = device;
+    return pages;
+}
+
 static void advise(const struct vkb_page_run *run)
 {
 #ifdef MADV_HUGEPAGE
@@ -58,15 +73,23 @@ static void destroy_run(const struct vkb_device *device, struct vkb_page_run *ru
     vkb_free(run);
 }
 
-// Takes out of the list the run that `memory` is in.
-static struct vkb_page_run *unlink_run(struct vkb_page_run **list, const void *memory)
+static void push(struct vkb_page_run **list, struct vkb_page_run *run)
 {
-    while (*list && (*list)->memory != memory)
-        list = &(*list)->next;
-    struct vkb_page_run *run = *list;
-    if (run)
+    run->previous = NULL;
+    run->next = *list;
+    if (run->next)
+        run->next->previous = run;
+    *list = run;
+}
+
+static void unlink_run(struct vkb_page_run **list, struct vkb_page_run *run)
+{
+    if (run->previous)
+        run->previous->next = run->next;
+    else
         *list = run->next;
-    return run;
+    if (run->next)
+        run->next->previous = run->previous;
 }
 
 // An eighth more than is needed is still a fit: sizes that change a little share runs.
@@ -81,19 +104,18 @@ static struct vkb_page_run *find_idle(const struct vkb_pages *pages, size_t size
     return found;
 }
 
-void *vkb_pages_take(struct vkb_pages *pages, size_t size)
+struct vkb_page_run *vkb_pages_take(struct vkb_pages *pages, size_t size, struct vkb_error *error)
 {
     struct vkb_page_run *run = find_idle(pages, size);
 
     if (run) {
-        unlink_run(&pages->idle, run->memory);
+        unlink_run(&pages->idle, run);
         pages->idle_size -= run->size;
-    } else if (!(run = create_run(pages->device, size, &pages->error))) {
+    } else if (!(run = create_run(pages->device, size, error))) {
         return NULL;
     }
-    run->next = pages->taken;
-    pages->taken = run;
-    return run->memory;
+    push(&pages->taken, run);
+    return run;
 }
 
 static void drop_oldest(struct vkb_pages *pages)
@@ -102,22 +124,27 @@ static void drop_oldest(struct vkb_pages *pages)
 
     while (oldest->next)
         oldest = oldest->next;
-    unlink_run(&pages->idle, oldest->memory);
+    unlink_run(&pages->idle, oldest);
     pages->idle_size -= oldest->size;
     destroy_run(pages->device, oldest);
 }
 
-void vkb_pages_give_back(struct vkb_pages *pages, void *memory)
+// Nobody asks a closed one for more.
+static void free_closed(struct vkb_pages *pages)
 {
-    struct vkb_page_run *run = unlink_run(&pages->taken, memory);
+    if (!pages->device && !pages->taken)
+        vkb_free(pages);
+}
 
-    // Nobody asks a closed one for more.
+void vkb_pages_give_back(struct vkb_pages *pages, struct vkb_page_run *run)
+{
+    unlink_run(&pages->taken, run);
     if (!pages->device) {
         destroy_run(NULL, run);
+        free_closed(pages);
         return;
     }
-    run->next = pages->idle;
-    pages->idle = run;
+    push(&pages->idle, run);
     pages->idle_size += run->size;
     while (pages->idle_size > KEPT_BYTES)
         drop_oldest(pages);
@@ -134,9 +161,12 @@ struct vkb_page_run *vkb_pages_find(const struct vkb_pages *pages, const void *m
 
 void vkb_pages_close(struct vkb_pages *pages)
 {
+    if (!pages)
+        return;
     while (pages->idle)
         drop_oldest(pages);
     for (struct vkb_page_run *run = pages->taken; run; run = run->next)
         vkb_buffer_destroy(pages->device, &run->buffer);
     pages->device = NULL;
+    free_closed(pages);
 }

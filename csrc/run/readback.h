@@ -14,7 +14,6 @@ enum { VKB_IMPORTED_BYTES = 1 << 20 };
 // One image wanted on the host: tightly packed rows, top row first, the first `channels` channels
 // of each pixel.
 struct vkb_output {
-    uint32_t image;  // in the graph
     uint32_t channels;
     void *memory;
     struct vkb_page_run

@@ -254,17 +254,11 @@ static void begin_render_pass(const struct vkb_run *run, VkRenderPass render_pas
     vk->vkCmdSetScissor(commands, 0, 1, &(VkRect2D){.extent = extent});
 }
 
-// The render pass just recorded goes by the name of the image that it writes, a dispatch by its
-// own.
 static void add_timing(struct vkb_run *run, uint32_t first)
 {
-    const struct vkb_pass_row *pass = &run->graph->passes[first];
-    struct vkb_timing *timing = &run->point->timings[run->point->timing_count++];
+    struct vkb_timing *timing = &run->request->timings[run->request->timing_count++];
 
-    memcpy(timing->name,
-           pass->geometry == VKB_GEOMETRY_DISPATCH ? pass->name
-                                                   : run->graph->images[pass->targets[0]].name,
-           sizeof timing->name);
+    memcpy(timing->name, vkb_graph_timed_as(run->graph, first), sizeof timing->name);
 }
 
 static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_error *error)
@@ -284,16 +278,28 @@ static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_erro
     return true;
 }
 
+static uint32_t target_slots(const struct vkb_run *run, const struct vkb_pass_row *pass,
+                             struct vkb_slot **slots)
+{
+    uint32_t targets[VKB_MAX_TARGETS + 1];
+    const uint32_t count = vkb_pass_targets(pass, targets);
+
+    for (uint32_t i = 0; i < count; ++i)
+        slots[i] = run->slots[targets[i]];
+    return count;
+}
+
 // Passes first..end-1 in one render pass, timed as one: within a render pass tiling devices and
 // lavapipe do not keep the order that single draws could be timed by.
 static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end,
-                               struct vkb_slot **targets, uint32_t target_count,
                                struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
     struct vkb_frame *frame = run->frame;
     struct vkb_flight *flight = run->flight;
     VkCommandBuffer commands = flight->commands.buffer;
+    struct vkb_slot *targets[VKB_MAX_TARGETS + 1];
+    const uint32_t target_count = target_slots(run, &run->graph->passes[first], targets);
     VkRenderPass render_pass;
     VkFramebuffer framebuffer;
 
@@ -314,20 +320,14 @@ static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end
     return true;
 }
 
-bool vkb_record_group(struct vkb_run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
-                      uint32_t target_count, struct vkb_error *error)
+bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_error *error)
 {
+    struct vkb_run *run = context;
     const bool is_dispatch = run->graph->passes[first].geometry == VKB_GEOMETRY_DISPATCH;
 
-    for (uint32_t i = 0; i < target_count; ++i)
-        if (!vkb_slot_begin_writing(&run->frame->slots, targets[i], run->recipe, run->recipe_size,
-                                    error))
-            return false;
     if (is_dispatch ? !record_dispatch(run, first, error)
-                    : !record_render_pass(run, first, end, targets, target_count, error))
+                    : !record_render_pass(run, first, end, error))
         return false;
     add_timing(run, first);
-    for (uint32_t i = 0; i < target_count; ++i)
-        targets[i]->valid = true;
     return true;
 }

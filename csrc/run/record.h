@@ -4,25 +4,20 @@
 
 #include "run/frame.h"
 
-// The state of one submission, and of the point that is being recorded.
+// The state of one submission, and of the request that is being recorded.
 struct vkb_run {
     struct vkb_device *device;
     struct vkb_frame *frame;
     struct vkb_flight *flight;
-    struct vkb_point *point;
-    const struct vkb_graph *graph;  // the point's
+    struct vkb_request *request;
+    const struct vkb_graph *graph;  // the request's
     struct vkb_slot **slots;        // by the graph's image index
-    bool *wanted;                   // by image
-    bool *needed, *current;         // by pass
+    struct vkb_content **contents;  // of the slots
     struct vkb_slot *input;         // NULL: none
     bool send_input;                // the device does not have it yet
-    unsigned char *recipe;
-    size_t recipe_size, recipe_capacity;
 };
 
-// Records the passes first..end-1, which have the same targets, and notes that these are made by
-// run->recipe. A dispatch is a group of its own.
-bool vkb_record_group(struct vkb_run *run, uint32_t first, uint32_t end, struct vkb_slot **targets,
-                      uint32_t target_count, struct vkb_error *error);
+// What a planner calls for each group of passes that has to run; `run` is a struct vkb_run.
+vkb_record vkb_record_group;
 
 #endif

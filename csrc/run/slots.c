@@ -37,7 +37,7 @@ void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots)
         struct vkb_slot *slot = slots->slots[i];
         destroy_framebuffers(device, slots, slot->image_id);
         vkb_image_destroy(device, &slot->image);
-        vkb_free(slot->recipe);
+        vkb_free(slot->content.recipe);
         vkb_free(slot);
     }
     vkb_free(slots->slots);
@@ -50,7 +50,7 @@ void vkb_slots_destroy(const struct vkb_device *device, struct vkb_slots *slots)
 static void destroy_image(const struct vkb_device *device, struct vkb_slots *slots,
                           struct vkb_slot *slot)
 {
-    slot->valid = false;
+    slot->content.valid = false;
     destroy_framebuffers(device, slots, slot->image_id);
     vkb_image_destroy(device, &slot->image);
 }
@@ -207,24 +207,6 @@ bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
                                 .mapped = is_mapped(device, row),
                             },
                             &slot->image, error);
-}
-
-bool vkb_slot_up_to_date(const struct vkb_slot *slot, const void *recipe, size_t size)
-{
-    return slot->valid && slot->recipe_size == size && memcmp(slot->recipe, recipe, size) == 0;
-}
-
-bool vkb_slot_begin_writing(struct vkb_slots *slots, struct vkb_slot *slot, const void *recipe,
-                            size_t size, struct vkb_error *error)
-{
-    slot->valid = false;
-    slot->version = ++slots->clock;
-    if (!vkb_grow(error, &slot->recipe, &slot->recipe_capacity, size, 1))
-        return false;
-    if (size)
-        memcpy(slot->recipe, recipe, size);
-    slot->recipe_size = size;
-    return true;
 }
 
 bool vkb_slots_framebuffer(const struct vkb_device *device, struct vkb_slots *slots,

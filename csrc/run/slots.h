@@ -4,19 +4,16 @@
 #ifndef VKB_SLOTS_H
 #define VKB_SLOTS_H
 
-#include "graph/graph.h"
+#include "graph/plan.h"
 #include "run/age.h"
 #include "vulkan/memory.h"
 
 struct vkb_slot {
     char name[VKB_NAME_SIZE];
     struct vkb_image image;
-    uint64_t image_id;      // given anew each time that the image is created
-    uint64_t version;       // given anew each time that the image is written
-    unsigned char *recipe;  // what it was last made from, byte by byte comparable
-    size_t recipe_size, recipe_capacity;
-    uint64_t used;  // by which submission last
-    bool valid;     // once the device has run all that was recorded, it holds what the recipe says
+    uint64_t image_id;  // given anew each time that the image is created
+    uint64_t used;      // by which submission last
+    struct vkb_content content;
 };
 
 struct vkb_framebuffer_entry;
@@ -56,13 +53,6 @@ bool vkb_slots_replaces(const struct vkb_slots *slots, const struct vkb_image_ro
 bool vkb_slots_resolve(const struct vkb_device *device, struct vkb_slots *slots,
                        const struct vkb_image_row *row, struct vkb_slot **slot,
                        struct vkb_error *error);
-
-bool vkb_slot_up_to_date(const struct vkb_slot *slot, const void *recipe, size_t size);
-
-// From here until the caller, having recorded the writing, sets `valid`, the image holds nothing
-// that counts.
-bool vkb_slot_begin_writing(struct vkb_slots *slots, struct vkb_slot *slot, const void *recipe,
-                            size_t size, struct vkb_error *error);
 
 // The framebuffer of those targets, kept until one of their images is replaced.
 bool vkb_slots_framebuffer(const struct vkb_device *device, struct vkb_slots *slots,

@@ -191,7 +191,7 @@ void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
     *scene = (struct vkb_scene){0};
 }
 
-// Matrices are column by column: m[column][row].
+// Column-major: m[column][row].
 typedef double matrix[4][4];
 
 static void set_identity(matrix m)

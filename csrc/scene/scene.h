@@ -1,4 +1,4 @@
-// A scene on the device: two meshes, their textures and a sky; and the matrices of a frame.
+// A scene on the device: two meshes, their textures and a sky. The matrices of a frame.
 #ifndef VKB_SCENE_H
 #define VKB_SCENE_H
 
@@ -6,13 +6,13 @@
 #include "scene/texture.h"
 #include "vulkan/commands.h"
 
-// As the meshes lie on the device, tightly packed.
+// The vertex layout on the device, tightly packed.
 struct vkb_vertex {
     float position[3], normal[3], colour[3], emission[3];
 };
 
-// Binding 0 holds struct vkb_vertex; binding 1, which only textured triangles have, places in two
-// textures.
+// Binding 0 has struct vkb_vertex. Binding 1, only for textured triangles, has the coordinates in
+// two textures.
 enum {
     VKB_VERTEX_ATTRIBUTES = 4,
     VKB_TEXTURED_ATTRIBUTES = 5,
@@ -23,25 +23,25 @@ enum {
 extern const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES];
 extern const VkVertexInputBindingDescription vkb_vertex_bindings[VKB_VERTEX_BINDINGS];
 
-// Triangles that have textures, by their indices among the scene's.
+// Consecutive triangles with the same pair of textures, as indices into the scene's textures.
 struct vkb_surface {
     uint32_t index_count;
     uint32_t base, emission;
 };
 
-// Host memory that the caller keeps alive; no vertices: no such mesh. The last indices are those of
-// the surfaces, one after the other.
+// Host memory that the caller keeps alive. No vertices: there is no such mesh. The last indices are
+// those of the surfaces, in order.
 struct vkb_mesh_data {
-    const float *vertices;   // position, normal and colour of each
-    const float *emission;   // three floats of each, NULL: nothing emits
-    const float *texcoords;  // four of each: base colour's, emission's; NULL: no surfaces
+    const float *vertices;   // position, normal and colour of each vertex
+    const float *emission;   // three floats for each vertex; NULL: no emission
+    const float *texcoords;  // four for each: base colour, emission; NULL: no surfaces
     const uint32_t *indices;
     struct vkb_surface *surfaces;
     uint32_t vertex_count, index_count, surface_count;
 };
 
 struct vkb_scene_data {
-    uint64_t serial;  // differs between any two scenes but by camera or intensity; never 0
+    uint64_t serial;  // equal only for scenes that differ in camera or intensity; never 0
     struct vkb_mesh_data body, glow;
     struct vkb_picture_data sky;
     struct vkb_texture_data *textures;
@@ -56,8 +56,8 @@ struct vkb_mesh {
 };
 
 struct vkb_scene {
-    uint64_t serial;             // of the data that is on the device; 0: none
-    struct vkb_staging staging;  // while it comes there
+    uint64_t serial;             // of the data on the device; 0: none
+    struct vkb_staging staging;  // during the upload
     struct vkb_mesh body, glow;
     struct vkb_image sky;
     struct vkb_texture *textures;
@@ -71,9 +71,9 @@ struct vkb_camera {
     double near, far;
 };
 
-// Records what brings the data to the device, in place of what the scene holds and the device must
-// be done with. After it has run, vkb_scene_end says that it is there. On failure the scene holds
-// nothing, or what it held; an index without a vertex is one.
+// Records the upload of the data, which replaces the scene's content. The device must not use the
+// old content any more. Call vkb_scene_end when the commands have run. On failure the scene is
+// empty or unchanged. An index beyond the vertices is a failure.
 bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *commands,
                      const struct vkb_scene_data *data, struct vkb_scene *scene,
                      struct vkb_error *error);
@@ -81,7 +81,7 @@ void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data 
                    struct vkb_scene *scene);
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene);
 
-// Projection, view and model of the frame at `time` turns, column by column.
+// Writes projection, view and model matrix at `time` (in turns), column by column.
 void vkb_scene_matrices(const struct vkb_camera *camera, double time, double aspect,
                         struct vkb_mesh_params *params);
 

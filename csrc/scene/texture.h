@@ -1,4 +1,4 @@
-// Textures of a scene's meshes: pictures with samplers of their own.
+// Textures of a scene's meshes: images, each with its own sampler.
 #ifndef VKB_TEXTURE_H
 #define VKB_TEXTURE_H
 
@@ -6,7 +6,7 @@
 
 struct vkb_texture_data {
     struct vkb_picture_data picture;
-    VkSamplerAddressMode address_modes[2];  // across, down
+    VkSamplerAddressMode address_modes[2];  // horizontal, vertical
     VkFilter mag_filter, min_filter;
     VkSamplerMipmapMode mipmap_filter;
 };
@@ -16,7 +16,7 @@ struct vkb_texture {
     VkSampler sampler;
 };
 
-// Destroying a zeroed or half-loaded texture is fine.
+// Destroying a zeroed or half-loaded texture is safe.
 bool vkb_texture_load(const struct vkb_device *device, VkCommandBuffer commands,
                       struct vkb_staging *staging, const struct vkb_texture_data *data,
                       struct vkb_texture *texture, struct vkb_error *error);

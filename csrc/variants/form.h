@@ -30,6 +30,7 @@ vkb_form_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
         [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
         [VKB_FORMAT_RGBA16_FLOAT] = VKB_SHADER_##shader##_rgba16float, \
         [VKB_FORMAT_RGBA32_FLOAT] = VKB_SHADER_##shader##_rgba32float, \
+        [VKB_FORMAT_RG11B10_UFLOAT] = VKB_SHADER_##shader##_rgba32float, \
     }
 
 // What an image of the format gives back of what is stored: of STORED_*.

@@ -37,7 +37,9 @@ enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format for
     if (format == VKB_FORMAT_RGBA8_UNORM)
         return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? STORED_UNORM8_SCALED
                                                                           : STORED_UNORM8;
-    return format == VKB_FORMAT_RGBA16_FLOAT ? STORED_HALF : STORED_SINGLE;
+    return format == VKB_FORMAT_RGBA16_FLOAT   ? STORED_HALF
+         : format == VKB_FORMAT_RG11B10_UFLOAT ? STORED_UFLOAT
+                                               : STORED_SINGLE;
 }
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
@@ -127,6 +129,7 @@ static bool add_pixels(const struct vkb_form_choice *choice, const struct vkb_pa
 
 struct form {
     enum vkb_forms forms;
+    const char *name;
     vkb_form_add *add;
     uint32_t least_pixels;  // of the target
 };
@@ -137,22 +140,33 @@ struct form {
 enum { HALVE_STRIPS = 1 << 17, DOUBLE_STRIPS = 1 << 19 };
 
 static const struct form forms_table[] = {
-    {VKB_FORMS_CPU, vkb_add_line, 0},
-    {VKB_FORMS_CPU, vkb_add_enlarged, 0},
-    {VKB_FORMS_CPU, vkb_add_strips, 0},
-    {VKB_FORMS_CPU, vkb_add_from_lines, 0},
-    {VKB_FORMS_CPU, vkb_add_halved, 0},
-    {VKB_FORMS_CPU, vkb_add_doubled, 0},
-    {VKB_FORMS_CPU, vkb_add_doubled_final, 0},
-    {VKB_FORMS_CPU, add_pixels, 0},
-    {VKB_FORMS_GPU, vkb_add_enlarged, 0},
-    {VKB_FORMS_GPU, vkb_add_from_lines, 0},
-    {VKB_FORMS_GPU, vkb_add_tiles, 0},
-    {VKB_FORMS_GPU, vkb_add_halved, HALVE_STRIPS},
-    {VKB_FORMS_GPU, vkb_add_doubled, DOUBLE_STRIPS},
-    {VKB_FORMS_GPU, vkb_add_doubled_final, DOUBLE_STRIPS},
-    {VKB_FORMS_GPU, add_pixels, 0},
+    {VKB_FORMS_CPU, "line", vkb_add_line, 0},
+    {VKB_FORMS_CPU, "enlarged", vkb_add_enlarged, 0},
+    {VKB_FORMS_CPU, "strips", vkb_add_strips, 0},
+    {VKB_FORMS_CPU, "from_lines", vkb_add_from_lines, 0},
+    {VKB_FORMS_CPU, "halved", vkb_add_halved, 0},
+    {VKB_FORMS_CPU, "doubled", vkb_add_doubled, 0},
+    {VKB_FORMS_CPU, "doubled_final", vkb_add_doubled_final, 0},
+    {VKB_FORMS_CPU, "pixels", add_pixels, 0},
+    {VKB_FORMS_GPU, "enlarged", vkb_add_enlarged, 0},
+    {VKB_FORMS_GPU, "from_lines", vkb_add_from_lines, 0},
+    {VKB_FORMS_GPU, "tiles", vkb_add_tiles, 0},
+    {VKB_FORMS_GPU, "halved", vkb_add_halved, HALVE_STRIPS},
+    {VKB_FORMS_GPU, "doubled", vkb_add_doubled, DOUBLE_STRIPS},
+    {VKB_FORMS_GPU, "doubled_final", vkb_add_doubled_final, DOUBLE_STRIPS},
+    {VKB_FORMS_GPU, "pixels", add_pixels, 0},
 };
+
+// The rows from `first` on, by what stands in the table; one before a fused pass is the method's
+// own.
+static void name_variant(struct vkb_graph *graph, uint32_t first, const char *name)
+{
+    for (uint32_t i = first; i < graph->pass_count; ++i) {
+        struct vkb_pass_row *pass = &graph->passes[i];
+        const bool own = i + 1 < graph->pass_count && pass[1].alternative;
+        pass->variant = !own ? name : pass->geometry == VKB_GEOMETRY_DISPATCH ? "pixels" : NULL;
+    }
+}
 
 static bool add_in_its_form(const struct vkb_form_choice *choice, const struct vkb_pass_row *pass,
                             struct vkb_error *error)
@@ -161,13 +175,16 @@ static bool add_in_its_form(const struct vkb_form_choice *choice, const struct v
     const uint64_t pixels = (uint64_t)target->width * target->height;
 
     for (size_t i = 0; i < sizeof forms_table / sizeof forms_table[0]; ++i) {
+        const uint32_t first = choice->graph->pass_count;
         bool fits = false;
         if (forms_table[i].forms != choice->forms || pixels < forms_table[i].least_pixels)
             continue;
         if (!forms_table[i].add(choice, pass, &fits, error))
             return false;
-        if (fits)
-            return true;
+        if (!fits)
+            continue;
+        name_variant(choice->graph, first, forms_table[i].name);
+        return true;
     }
     return vkb_graph_add_pass(choice->graph, pass, error);
 }

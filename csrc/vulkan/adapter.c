@@ -20,7 +20,7 @@ const char *vkb_adapter_type(const struct vkb_adapter_info *adapter)
     }
 }
 
-// A queue family that draws, computes and so can copy as well; UINT32_MAX where there is none.
+// A queue family with graphics and compute, which implies transfer; UINT32_MAX if there is none.
 static uint32_t find_queue_family(const struct vkb_instance *instance, VkPhysicalDevice physical)
 {
     VkQueueFamilyProperties families[16];
@@ -52,7 +52,7 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     instance->vk.vkGetPhysicalDeviceProperties(physical, &plain);
     if (plain.apiVersion < VK_API_VERSION_1_1)
         return false;
-    // The driver's name is core from 1.2 on only.
+    // Driver properties are core since Vulkan 1.2.
     if (plain.apiVersion >= VK_API_VERSION_1_2)
         id.pNext = &driver;
     instance->vk.vkGetPhysicalDeviceProperties2(physical, &properties);
@@ -63,6 +63,7 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
         .api_version = plain.apiVersion,
         .driver_version = plain.driverVersion,
         .queue_family = find_queue_family(instance, physical),
+        .bundled = instance->driver[0] != 0,
     };
     memcpy(adapter->name, plain.deviceName, sizeof adapter->name);
     memcpy(adapter->driver, driver.driverName, sizeof adapter->driver);
@@ -80,7 +81,7 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
         instance->vk.vkEnumeratePhysicalDevices(instance->handle, &device_count, devices));
 
     *count = 0;
-    // Some loaders answer so where they have no driver at all.
+    // Some loaders return this if they have no driver.
     if (result == VK_ERROR_INITIALIZATION_FAILED)
         return true;
     if (result != VK_INCOMPLETE && !vkb_check(error, result, "vkEnumeratePhysicalDevices"))
@@ -90,7 +91,7 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
     return true;
 }
 
-// Lower is better; the order of "auto".
+// The rank of an adapter for "auto"; lower is better.
 static int preference(const struct vkb_adapter_info *adapter)
 {
     switch (adapter->device_type) {
@@ -132,28 +133,89 @@ static bool fits(const struct vkb_adapter_info *adapter, const char *choice)
     return contains(adapter->name, choice);
 }
 
-bool vkb_adapter_choose(const struct vkb_instance *instance, const char *choice,
-                        struct vkb_adapter_info *chosen, struct vkb_error *error)
+// The best adapter of one source: the system's loader, or a driver without it.
+struct source {
+    struct vkb_instance *instance;
+    struct vkb_adapter_info best;
+    bool found;
+};
+
+// Opens the source, and finds the best adapter that fits; adds the names of all to the text.
+static bool open_source(struct source *source, const char *choice, const char *driver,
+                        bool validation, char (*names)[1024], struct vkb_error *error)
 {
     struct vkb_adapter_info adapters[VKB_MAX_ADAPTERS];
     uint32_t count;
-    const struct vkb_adapter_info *best = NULL;
 
-    if (!vkb_adapters_list(instance, adapters, &count, error))
+    *source = (struct source){.instance = vkb_instance_open(driver, validation, error)};
+    if (!source->instance || !vkb_adapters_list(source->instance, adapters, &count, error))
         return false;
-    for (uint32_t i = 0; i < count; ++i)
-        if (fits(&adapters[i], choice) && (!best || preference(&adapters[i]) < preference(best)))
-            best = &adapters[i];
-    if (best) {
-        *chosen = *best;
-        return true;
+    for (uint32_t i = 0; i < count; ++i) {
+        const size_t length = strlen(*names);
+        snprintf(*names + length, sizeof *names - length, "%s%s (%s%s)", length ? ", " : "",
+                 adapters[i].name, vkb_adapter_type(&adapters[i]),
+                 adapters[i].bundled ? ", bundled" : "");
+        if (fits(&adapters[i], choice)
+            && (!source->found || preference(&adapters[i]) < preference(&source->best))) {
+            source->best = adapters[i];
+            source->found = true;
+        }
     }
+    return true;
+}
 
-    char found[1024] = "none";
-    size_t length = 0;
-    for (uint32_t i = 0; i < count && length < sizeof found; ++i)
-        length += (size_t)snprintf(found + length, sizeof found - length, "%s%s (%s)",
-                                   i ? ", " : "", adapters[i].name, vkb_adapter_type(&adapters[i]));
-    return vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
-                    "no Vulkan adapter for \"%s\"; found: %s. %s", choice, found, vkb_install_hint);
+static void close_source(struct source *source)
+{
+    if (source->instance)
+        vkb_instance_close(source->instance);
+    *source = (struct source){0};
+}
+
+// Whether an adapter of the bundled driver, which is a CPU, would come before that one.
+static bool is_last_resort(const struct source *source)
+{
+    return !source->found
+        || preference(&source->best) >= preference(&(struct vkb_adapter_info){
+               .device_type = VK_PHYSICAL_DEVICE_TYPE_CPU,
+           });
+}
+
+// The system's adapters, then the driver's where it could be better. No system's adapter is no
+// failure where there is a driver.
+static bool open_sources(struct source *system, struct source *bundled, const char *choice,
+                         const char *driver, bool validation, char (*names)[1024],
+                         struct vkb_error *error)
+{
+    if (!driver[0] || strcmp(choice, "software") != 0) {
+        if (!open_source(system, choice, "", validation, names, error)
+            && (!driver[0] || error->kind != VKB_ERROR_ADAPTER_NOT_FOUND))
+            return false;
+        if (!driver[0] || !is_last_resort(system))
+            return true;
+    }
+    *error = (struct vkb_error){0};
+    return open_source(bundled, choice, driver, validation, names, error);
+}
+
+bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
+                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
+                      struct vkb_error *error)
+{
+    struct source system = {0}, bundled = {0};
+    char names[1024] = "";
+    bool done = open_sources(&system, &bundled, choice, driver, validation, &names, error);
+    struct source *best = bundled.found ? &bundled : &system;
+
+    if (done && !best->found)
+        done = vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                        "no Vulkan adapter for \"%s\"; found: %s. %s", choice,
+                        names[0] ? names : "none", vkb_install_hint);
+    if (done) {
+        *instance = best->instance;
+        *chosen = best->best;
+        best->instance = NULL;
+    }
+    close_source(&system);
+    close_source(&bundled);
+    return done;
 }

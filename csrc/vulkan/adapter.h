@@ -1,4 +1,4 @@
-// The adapters that an instance finds, and the choice of one.
+// The adapters of an instance, and the selection of one.
 #ifndef VKB_ADAPTER_H
 #define VKB_ADAPTER_H
 
@@ -16,6 +16,7 @@ struct vkb_adapter_info {
     uint32_t driver_version;
     uint8_t driver_uuid[VK_UUID_SIZE];
     uint32_t queue_family;  // one with graphics and compute
+    bool bundled;           // of a driver that the loader did not find
 };
 
 enum { VKB_MAX_ADAPTERS = 32 };
@@ -27,8 +28,12 @@ const char *vkb_adapter_type(const struct vkb_adapter_info *adapter);
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,
                        uint32_t *count, struct vkb_error *error);
 
-// The adapter that `choice` names: "auto", "software", "hardware", or a part of a name.
-bool vkb_adapter_choose(const struct vkb_instance *instance, const char *choice,
-                        struct vkb_adapter_info *chosen, struct vkb_error *error);
+// Opens the instance of the adapter that `choice` selects: "auto", "software", "hardware", or a
+// part of a name. `driver` is the path of a bundled driver; "" means none. The bundled software
+// adapter takes precedence over the system's; for "software" the system's drivers are then not
+// opened. On failure no instance is left open.
+bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
+                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
+                      struct vkb_error *error);
 
 #endif

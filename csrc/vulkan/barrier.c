@@ -9,7 +9,7 @@ static const struct access_info {
     VkPipelineStageFlags stages;
     VkAccessFlags reads, writes;
     VkImageLayout layout;
-    bool attachment;  // touches each pixel at its own place only
+    bool attachment;  // accesses only the pixel's own position
 } accesses[VKB_ACCESS_COUNT] = {
     [VKB_ACCESS_NONE] =
         {
@@ -132,11 +132,11 @@ static uint32_t add_dependency(VkSubpassDependency *dependencies, uint32_t count
         .dstSubpass = to_subpass,
         .srcStageMask = before->stages,
         .dstStageMask = after->stages,
-        // What only reads has nothing to make available; it is named to show what is waited for.
+        // Reads need no availability operation; their access mask only documents the dependency.
         .srcAccessMask = before->writes ? before->writes : before->reads,
         .dstAccessMask = after->reads | after->writes,
-        // By region only between attachments: a blur reads its neighbours, so a pixel of the next
-        // pass depends on pixels at other places of this one.
+        // By region only between attachments. A blur reads neighbouring pixels, so a pixel of the
+        // next pass depends on pixels at other positions.
         .dependencyFlags =
             before->attachment && after->attachment ? VK_DEPENDENCY_BY_REGION_BIT : 0,
     };

@@ -1,14 +1,14 @@
-// What is done with an image, by name; stages, access masks and layouts are derived from the name.
-// The only place of the core that knows stage masks.
+// Named accesses to images. Stages, access masks and layouts are derived from the name. Only
+// barrier.c uses stage masks.
 #ifndef VKB_BARRIER_H
 #define VKB_BARRIER_H
 
 #include "vulkan/device.h"
 
 enum vkb_access {
-    VKB_ACCESS_NONE,          // never used, or what it held does not matter
+    VKB_ACCESS_NONE,          // not used yet, or the content is discarded
     VKB_ACCESS_COLOR_TARGET,  // written as a colour attachment
-    VKB_ACCESS_COLOR_BLEND,   // the same, reading what is there
+    VKB_ACCESS_COLOR_BLEND,   // the same, with blending
     VKB_ACCESS_DEPTH_TARGET,
     VKB_ACCESS_SAMPLED,           // read by a fragment shader
     VKB_ACCESS_DISPATCH_SAMPLED,  // read by a compute shader, through a sampler
@@ -21,28 +21,28 @@ enum vkb_access {
 
 VkImageLayout vkb_access_layout(enum vkb_access access);
 
-// Records the barrier that orders two accesses to an image, with the layouts given. Nothing is
-// recorded between two equal accesses that only read.
+// Records the barrier between two accesses to an image, with the given layouts. Two equal read
+// accesses need no barrier.
 void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,
                         const VkImageMemoryBarrier *image, enum vkb_access from,
                         enum vkb_access to);
 
-// Makes what copies wrote to host-visible buffers readable for the host after the fence.
+// Makes copies to host-visible buffers available to the host after the fence.
 void vkb_barrier_record_host_read(const struct vkb_device *device, VkCommandBuffer commands);
 
-// Makes what copies wrote to buffers readable as vertices and indices.
+// Makes copies to buffers visible to vertex input.
 void vkb_barrier_record_upload(const struct vkb_device *device, VkCommandBuffer commands);
 
-// How a render pass uses one of its targets: the access that went before it, its own, and the one
-// that comes after it. NONE after: whoever comes next records a barrier.
+// The accesses to one attachment before, during and after a render pass. NONE after it: the next
+// user of the image records a barrier.
 struct vkb_target_use {
     enum vkb_access before, during, after;
 };
 
-enum { VKB_MAX_DEPENDENCIES = 10 };  // two for each of up to five targets
+enum { VKB_MAX_DEPENDENCIES = 10 };  // two for each of up to five attachments
 
-// The subpass dependencies of a render pass with those targets, equal ones merged; returns how
-// many.
+// Writes the subpass dependencies of a render pass with these attachments, without duplicates.
+// Returns their number.
 uint32_t vkb_subpass_dependencies(const struct vkb_target_use *uses, uint32_t use_count,
                                   VkSubpassDependency *dependencies);
 

@@ -1,4 +1,4 @@
-// One command buffer, recorded and run anew each time.
+// One command buffer with its fence, recorded again for each submission.
 #ifndef VKB_COMMANDS_H
 #define VKB_COMMANDS_H
 
@@ -10,21 +10,21 @@ struct vkb_commands {
     VkFence fence;
 };
 
-// Destroying a zeroed or half-built object is fine.
+// Destroying a zeroed or half-created object is safe.
 bool vkb_commands_create(const struct vkb_device *device, struct vkb_commands *commands,
                          struct vkb_error *error);
 void vkb_commands_destroy(const struct vkb_device *device, struct vkb_commands *commands);
 
-// Begins an empty recording; whatever was recorded and not run is dropped.
+// Begins an empty recording. A recording that was not submitted is discarded.
 bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *commands,
                         struct vkb_error *error);
-// Ends the recording and hands it to the device, which runs it after all that it was handed before.
+// Ends the recording and submits it. The device runs submissions in order.
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
                          struct vkb_error *error);
-// Waits until the device has run what was submitted last, which has so many frames.
+// Waits for the last submission, which contains `frames` frames.
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
                        struct vkb_error *error);
-// Whether the device has run what was submitted last, without a wait.
+// Whether the last submission is complete; does not wait.
 bool vkb_commands_over(const struct vkb_device *device, const struct vkb_commands *commands);
 
 #endif

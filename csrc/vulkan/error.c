@@ -99,7 +99,7 @@ static bool fail_memory(struct vkb_error *error, size_t count, size_t size)
                     count, size);
 }
 
-// What a test build counts, and can refuse (faults.h).
+// Allocation in one place: test builds count it and can make it fail (faults.h).
 #ifdef VKBLOOM_FAULTS
 #define REFUSED()          vkb_fault("vkb_alloc")
 #define COUNT_BLOCKS(more) vkb_fault_blocks(more)
@@ -110,7 +110,7 @@ static bool fail_memory(struct vkb_error *error, size_t count, size_t size)
 
 void *vkb_alloc(struct vkb_error *error, size_t count, size_t size)
 {
-    // calloc(0) may answer NULL, which is no failure here.
+    // calloc(0) may return NULL, which is not a failure here.
     void *memory = REFUSED() ? NULL : calloc(count ? count : 1, size);
 
     if (!memory)
@@ -126,7 +126,7 @@ bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t nee
 
     size_t grown = *capacity ? *capacity : 8;
     void *before;
-    // Byte by byte, for the caller's pointer is none to void.
+    // memcpy, since the caller's pointer is not a void pointer.
     memcpy(&before, array, sizeof before);
     while (grown < needed)
         grown *= 2;

@@ -15,12 +15,12 @@ enum vkb_error_kind {
     VKB_ERROR_VALIDATION,
     VKB_ERROR_SHADER,
     VKB_ERROR_VALUE,
-    VKB_ERROR_INTERRUPTED,  // by whoever was asked during a wait, and who knows the reason
+    VKB_ERROR_INTERRUPTED,  // device->interrupted ended a wait
 };
 
 struct vkb_error {
     enum vkb_error_kind kind;
-    VkResult result;  // what Vulkan answered; VK_SUCCESS where no Vulkan call failed
+    VkResult result;  // of the Vulkan call; VK_SUCCESS if no Vulkan call failed
     char call[64];    // the Vulkan call that failed, or ""
     char message[2048];
 };
@@ -31,15 +31,15 @@ __attribute__((format(printf, 3, 4)))
 #endif
 bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...);
 
-// The function's name in a call's text: "vkCreateImage" of "device->vk.vkCreateImage(...)"; *length
-// is how long it is.
+// The function's name in the text of a call, for example "vkCreateImage" in
+// "device->vk.vkCreateImage(...)", and its length.
 const char *vkb_call_name(const char *call_text, size_t *length);
 
-// True where `result` is VK_SUCCESS; else fills `error` from the result and the call's source text.
+// True if `result` is VK_SUCCESS. Otherwise fills `error` from the result and the text of the call.
 bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text);
 
-// The only ways in which the core calls a Vulkan function that can fail; the second gives the
-// result to the caller.
+// The core calls every Vulkan function that can fail through one of these. The second one returns
+// the VkResult.
 #define VK(error, call) vkb_check((error), VK_RESULT(call), #call)
 #ifdef VKBLOOM_FAULTS
 #include "vulkan/faults.h"
@@ -48,11 +48,11 @@ bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text);
 #define VK_RESULT(call) (call)
 #endif
 
-// Zeroed host memory for count objects of `size` bytes; NULL and a filled error where there is
-// none.
+// Allocates zeroed host memory for `count` objects of `size` bytes; NULL and a filled error on
+// failure.
 void *vkb_alloc(struct vkb_error *error, size_t count, size_t size);
-// Grows an array to at least `needed` objects of `size` bytes; keeps it as it was on failure.
-// `array` is where the pointer to the first one lies, of whatever type.
+// Grows an array to at least `needed` objects of `size` bytes. On failure the array is unchanged.
+// `array` points to the pointer to the first object, of any type.
 bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t needed, size_t size);
 void vkb_free(void *memory);
 

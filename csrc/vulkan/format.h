@@ -6,15 +6,16 @@
 #include <vulkan/vulkan_core.h>
 
 enum vkb_format {
-    VKB_FORMAT_NONE,  // also: "choose for me"
+    VKB_FORMAT_NONE,  // also: the default of a setting
     VKB_FORMAT_RGBA8_UNORM,
     VKB_FORMAT_RGBA16_FLOAT,
     VKB_FORMAT_RGBA32_FLOAT,
+    VKB_FORMAT_RG11B10_UFLOAT,
     VKB_FORMAT_DEPTH32_FLOAT,
     VKB_FORMAT_COUNT,
 };
 
-// No side of an image is longer: so far the whole numbers of sampling.glsl keep to 32 bits.
+// The longest side of an image, for which the integers in sampling.glsl fit 32 bits.
 enum { VKB_MAX_SIDE = 32768 };
 
 struct vkb_format_info {
@@ -24,7 +25,7 @@ struct vkb_format_info {
     uint32_t channels;
     uint32_t channel_size;  // bytes
     VkImageAspectFlags aspect;
-    float limit;  // the largest value that it holds, or more
+    float limit;  // the largest value that it holds, or an upper bound
 };
 
 extern const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT];
@@ -34,7 +35,7 @@ static inline uint32_t vkb_pixel_size(enum vkb_format format)
     return vkb_formats[format].channels * vkb_formats[format].channel_size;
 }
 
-// The format of that name, VKB_FORMAT_NONE where there is none.
+// The format of that name; VKB_FORMAT_NONE if there is none.
 enum vkb_format vkb_format_by_name(const char *name);
 
 #endif

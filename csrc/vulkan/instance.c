@@ -1,5 +1,6 @@
 #include "vulkan/instance.h"
 
+#include "vulkan/driver.h"
 #include "vulkan/messages.h"
 #include "vulkan/process.h"
 
@@ -9,15 +10,18 @@
 #define VALIDATION_LAYER "VK_LAYER_KHRONOS_validation"
 
 const char vkb_install_hint[] =
-    "On Debian or Ubuntu: apt install libvulkan1 mesa-vulkan-drivers (lavapipe, runs on any CPU); "
-    "for a GPU, install its vendor's Vulkan driver. `vkbloom doctor` tells more.";
+    "For a driver that runs on any CPU, install the package vkbloom-lavapipe, or on Debian or "
+    "Ubuntu: apt install libvulkan1 mesa-vulkan-drivers; for a GPU, install its vendor's Vulkan "
+    "driver. `vkbloom doctor` tells more.";
 
-static struct vkb_lock lock;              // of what is below, and of volk's globals
-static struct vkb_instance instances[2];  // without and with validation
+enum { MAX_INSTANCES = 8 };
+
+static struct vkb_lock lock;  // protects the instances and volk's globals
+static struct vkb_instance instances[MAX_INSTANCES];
 static bool loader_open;
-// Whether this process was forked from one that had an instance. At exit Mesa (22.3.6) waits for
-// the threads of that one's drivers, which are not here, and so for any that got the memory of
-// their stacks since: none of the driver's own may be left then.
+// Whether this process was forked from one with an instance. At exit Mesa (22.3.6) waits for the
+// driver threads of the parent, which do not exist here. It mistakes threads of the child for them
+// if their stacks have the same addresses. So no driver thread of the child may be left at exit.
 static bool forked;
 
 static bool open_loader(struct vkb_error *error)
@@ -68,9 +72,19 @@ static void add_text(struct vkb_error *error, const char *text)
     snprintf(error->message + length, sizeof error->message - length, "%s", text);
 }
 
-// What the loader answers where no adapter can be had is not always what is wrong.
-static bool check_created(VkResult result, struct vkb_error *error)
+// The result of the loader does not always name the cause if there is no adapter.
+static bool check_created(VkResult result, bool direct, struct vkb_error *error)
 {
+    // Loaders open single drivers from 1.3.234 on; some that know the extension (1.3.239) do not
+    // list it, and refuse it.
+    if (direct
+        && (result == VK_ERROR_EXTENSION_NOT_PRESENT || result == VK_ERROR_INCOMPATIBLE_DRIVER))
+        return vkb_fail(
+            error, VKB_ERROR_GENERAL,
+            "validation of the bundled driver needs a Vulkan loader with "
+            "VK_LUNARG_direct_driver_loading, which the system's lacks or refuses for "
+            "this driver. Install a newer one, or set VKBLOOM_DRIVER=system to validate with "
+            "the system's driver");
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER) {
         vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
                  "no Vulkan adapter: the loader found no driver that works. %s", vkb_install_hint);
@@ -86,14 +100,50 @@ static bool check_created(VkResult result, struct vkb_error *error)
     return false;
 }
 
-// The messenger hears what the instance's own creation leads to as well.
-static bool create_handle(struct vkb_instance *instance,
+// Finds the functions that need no instance: those of the loader, or without validation those of
+// the driver itself.
+static bool open_source(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr *driver,
+                        struct vkb_error *error)
+{
+    *driver = NULL;
+    if (instance->driver[0] && !(*driver = vkb_driver_open(instance->driver, error)))
+        return false;
+    if (*driver && !instance->validation) {
+        instance->get = *driver;
+        return true;
+    }
+    if (*driver && !open_loader(error))
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "validation=True needs the system's Vulkan loader, also for the bundled "
+                        "driver, and the loader (libvulkan.so.1) is missing. On Debian or Ubuntu: "
+                        "apt install libvulkan1 vulkan-validationlayers");
+    if (!check_loader(instance->validation, error))
+        return false;
+    instance->get = vkGetInstanceProcAddr;
+    return true;
+}
+
+// The messenger also receives the messages of the instance's creation.
+static bool create_handle(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr driver,
                           const VkDebugUtilsMessengerCreateInfoEXT *messenger,
                           struct vkb_error *error)
 {
+    PFN_vkCreateInstance vkCreateInstance =
+        (PFN_vkCreateInstance)instance->get(VK_NULL_HANDLE, "vkCreateInstance");
+    const VkDirectDriverLoadingListLUNARG direct = {
+        .sType = VK_STRUCTURE_TYPE_DIRECT_DRIVER_LOADING_LIST_LUNARG,
+        .pNext = (void *)messenger,
+        .mode = VK_DIRECT_DRIVER_LOADING_MODE_EXCLUSIVE_LUNARG,
+        .driverCount = 1,
+        .pDrivers =
+            &(VkDirectDriverLoadingInfoLUNARG){
+                .sType = VK_STRUCTURE_TYPE_DIRECT_DRIVER_LOADING_INFO_LUNARG,
+                .pfnGetInstanceProcAddr = (PFN_vkGetInstanceProcAddrLUNARG)driver,
+            },
+    };
     const VkValidationFeaturesEXT features = {
         .sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT,
-        .pNext = messenger,
+        .pNext = driver ? (const void *)&direct : messenger,
         .enabledValidationFeatureCount = 1,
         .pEnabledValidationFeatures =
             (VkValidationFeatureEnableEXT[]){
@@ -113,16 +163,18 @@ static bool create_handle(struct vkb_instance *instance,
                     },
                 .enabledLayerCount = messenger ? 1 : 0,
                 .ppEnabledLayerNames = (const char *[]){VALIDATION_LAYER},
-                .enabledExtensionCount = messenger ? 1 : 0,
-                .ppEnabledExtensionNames = (const char *[]){VK_EXT_DEBUG_UTILS_EXTENSION_NAME},
+                .enabledExtensionCount = messenger ? (driver ? 2 : 1) : 0,
+                .ppEnabledExtensionNames =
+                    (const char *[]){VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
+                                     VK_LUNARG_DIRECT_DRIVER_LOADING_EXTENSION_NAME},
             },
             NULL, &instance->handle)),
-        error);
+        driver != NULL, error);
 }
 
 static void load_functions(struct vkb_instance *instance)
 {
-#define LOAD(name) instance->vk.name = (PFN_##name)vkGetInstanceProcAddr(instance->handle, #name);
+#define LOAD(name) instance->vk.name = (PFN_##name)instance->get(instance->handle, #name);
     VKB_INSTANCE_FUNCTIONS(LOAD)
 #undef LOAD
 }
@@ -136,8 +188,11 @@ static void destroy_instance(struct vkb_instance *instance)
     *instance = (struct vkb_instance){0};
 }
 
-static bool create_instance(struct vkb_instance *instance, bool validation, struct vkb_error *error)
+static bool create_instance(struct vkb_instance *instance, const char *driver, bool validation,
+                            struct vkb_error *error)
 {
+    PFN_vkGetInstanceProcAddr entry;
+
     const VkDebugUtilsMessengerCreateInfoEXT messenger = {
         .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
         .messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT
@@ -146,32 +201,58 @@ static bool create_instance(struct vkb_instance *instance, bool validation, stru
         .pfnUserCallback = vkb_messages_receive,
     };
 
-    *instance = (struct vkb_instance){.process = vkb_current_process()};
-    if (!check_loader(validation, error)
-        || !create_handle(instance, validation ? &messenger : NULL, error))
-        return false;
-    load_functions(instance);
-    if (!validation
-        || VK(error, instance->vk.vkCreateDebugUtilsMessengerEXT(instance->handle, &messenger, NULL,
-                                                                 &instance->messenger)))
-        return true;
+    *instance = (struct vkb_instance){
+        .validation = validation,
+        .process = vkb_current_process(),
+    };
+    if (strlen(driver) >= sizeof instance->driver)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "the driver's path is longer than %zu bytes",
+                        sizeof instance->driver - 1);
+    memcpy(instance->driver, driver, strlen(driver));
+    if (open_source(instance, &entry, error)
+        && create_handle(instance, entry, validation ? &messenger : NULL, error)) {
+        load_functions(instance);
+        if (!validation
+            || VK(error, instance->vk.vkCreateDebugUtilsMessengerEXT(instance->handle, &messenger,
+                                                                     NULL, &instance->messenger)))
+            return true;
+    }
     destroy_instance(instance);
     return false;
 }
 
-struct vkb_instance *vkb_instance_open(bool validation, struct vkb_error *error)
+// The instance of that kind, or a free place for it; NULL where all are taken.
+static struct vkb_instance *find_instance(const char *driver, bool validation)
 {
-    struct vkb_instance *instance = &instances[validation];
+    struct vkb_instance *free = NULL;
+
+    for (size_t i = 0; i < MAX_INSTANCES; ++i) {
+        struct vkb_instance *instance = &instances[i];
+        if (!instance->handle)
+            free = instance;
+        else if (instance->validation == validation && strcmp(instance->driver, driver) == 0)
+            return instance;
+    }
+    return free;
+}
+
+struct vkb_instance *vkb_instance_open(const char *driver, bool validation, struct vkb_error *error)
+{
     const long process = vkb_current_process();
 
     vkb_lock_acquire(&lock);
-    for (size_t i = 0; i < sizeof instances / sizeof instances[0]; ++i)
+    for (size_t i = 0; i < MAX_INSTANCES; ++i)
         if (instances[i].handle && instances[i].process != process) {
             instances[i] = (struct vkb_instance){0};
             forked = true;
         }
-    const bool done = instance->handle || create_instance(instance, validation, error);
-    instance->users += done;
+    struct vkb_instance *instance = find_instance(driver, validation);
+    const bool done = instance
+                        ? instance->handle || create_instance(instance, driver, validation, error)
+                        : vkb_fail(error, VKB_ERROR_GENERAL,
+                                   "%s: this process has opened too many drivers", driver);
+    if (done)
+        ++instance->users;
     vkb_lock_release(&lock);
     return done ? instance : NULL;
 }
@@ -198,7 +279,7 @@ void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice devi
                               struct VolkDeviceTable *table)
 {
     vkb_lock_acquire(&lock);
-    // volk asks the function that is in its global.
+    // volk loads the table through its global function pointer.
     vkGetDeviceProcAddr = instance->vk.vkGetDeviceProcAddr;
     volkLoadDeviceTable(table, device);
     vkb_lock_release(&lock);
@@ -208,7 +289,7 @@ void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice devi
 void vkb_fault_forget_instances(void)
 {
     vkb_lock_acquire(&lock);
-    for (size_t i = 0; i < sizeof instances / sizeof instances[0]; ++i)
+    for (size_t i = 0; i < MAX_INSTANCES; ++i)
         destroy_instance(&instances[i]);
     loader_open = false;
     vkb_lock_release(&lock);

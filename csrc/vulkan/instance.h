@@ -1,6 +1,7 @@
-// The Vulkan instances: one with the validation layer and one without, each made on first use and
-// kept for the life of the process. Some drivers allow a process few instances in a row (NVIDIA's
-// 580 about 30), and lavapipe loses memory with each.
+// The Vulkan instances: of the system's loader and of a driver that is opened without the loader,
+// each with and without the validation layer. Each is created at first use and kept for the life of
+// the process. Some drivers limit how many instances a process can create one after the other
+// (NVIDIA's 580: about 30), and lavapipe leaks memory with each.
 #ifndef VKB_INSTANCE_H
 #define VKB_INSTANCE_H
 
@@ -8,11 +9,11 @@
 
 #include <volk.h>
 
-// What to install where no adapter is found.
+// A hint for errors: what to install if no adapter is found.
 extern const char vkb_install_hint[];
 
-// The functions of an instance that the core calls. Each instance has its own, as each device has:
-// two of them need not be of the same loader.
+// The instance functions that the core calls. Each instance has its own table, as each device has,
+// since two instances may come from different loaders.
 #define VKB_INSTANCE_FUNCTIONS(NAME) \
     NAME(vkCreateDevice) \
     NAME(vkDestroyInstance) \
@@ -38,24 +39,30 @@ struct vkb_instance_table {
 
 struct vkb_instance {
     VkInstance handle;
+    char driver[4096];  // the path of its library; "": those that the system's loader finds
+    bool validation;
+    PFN_vkGetInstanceProcAddr get;  // of the loader, or of the driver
     struct vkb_instance_table vk;
     VkDebugUtilsMessengerEXT messenger;  // with validation: vkb_messages_receive
-    long process;                        // that made it
+    long process;                        // the process that created it
     size_t users;
 };
 
-// This process's instance, from any thread; NULL on failure, after which the next call tries again.
-// Opens the Vulkan loader at run time; ADAPTER_NOT_FOUND says what to install. A forked process
-// makes its own, where the driver can, and leaves its parent's as it is; that own one it does not
-// keep when the last user closes it.
-struct vkb_instance *vkb_instance_open(bool validation, struct vkb_error *error);
+// Returns this process's instance; any thread may call it. NULL on failure; the next call tries
+// again. With a `driver` other than "", the library at that path is opened without a loader; only
+// validation needs one, because a layer is inserted by the loader. Otherwise the Vulkan loader is
+// opened at run time. An ADAPTER_NOT_FOUND error says what to install. A forked process creates its
+// own instance, if the driver can, and does not touch its parent's. It destroys its own instance
+// when the last user closes it.
+struct vkb_instance *vkb_instance_open(const char *driver, bool validation,
+                                       struct vkb_error *error);
 void vkb_instance_close(struct vkb_instance *instance);
 
-// Adds to an error what may have led to it where this process was forked from one with an instance,
-// and what to do.
+// If this process was forked from one with an instance, adds the probable cause and the remedy to
+// an error.
 void vkb_instance_explain_fork(struct vkb_error *error);
 
-// The functions of a device of that instance.
+// Loads the functions of a device of this instance.
 void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice device,
                               struct VolkDeviceTable *table);
 

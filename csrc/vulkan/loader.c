@@ -1,3 +1,3 @@
-// volk's implementation, compiled once: it opens the Vulkan loader at run time.
+// The implementation of volk, which opens the Vulkan loader at run time.
 #define VOLK_IMPLEMENTATION
 #include <volk.h>

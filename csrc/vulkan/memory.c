@@ -1,13 +1,13 @@
 #include "vulkan/memory.h"
 
-// The flags that a memory type must have, then those that it had better have.
+// The required flags of a memory type, and the preferred ones.
 static const struct memory_wish {
     VkMemoryPropertyFlags needed, wanted;
 } wishes[] = {
     [VKB_MEMORY_DEVICE] = {0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT},
     [VKB_MEMORY_UPLOAD] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT,
                            VK_MEMORY_PROPERTY_HOST_COHERENT_BIT},
-    // Reading memory that the host does not cache is a hundred times slower.
+    // Reading uncached memory is a hundred times slower.
     [VKB_MEMORY_READBACK] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT,
                              VK_MEMORY_PROPERTY_HOST_CACHED_BIT},
     [VKB_MEMORY_SHARED] = {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT
@@ -15,7 +15,7 @@ static const struct memory_wish {
                            VK_MEMORY_PROPERTY_HOST_CACHED_BIT},
 };
 
-// The first fitting type with the wanted flags, else the first fitting one at all.
+// The first suitable type with the preferred flags, else the first suitable type.
 static uint32_t find_memory_type(const struct vkb_device *device, enum vkb_memory_kind kind,
                                  uint32_t allowed)
 {
@@ -79,7 +79,7 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
         vkb_buffer_destroy(device, buffer);
         return false;
     }
-    // Only one that is whole has a size: vkb_buffer_reserve goes by it.
+    // Only a complete buffer has a size; vkb_buffer_reserve relies on that.
     buffer->size = size;
     buffer->coherent = flags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     return true;
@@ -102,7 +102,7 @@ bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind ki
     return vkb_buffer_create(device, kind, usage, size, buffer, error);
 }
 
-// The first coherent type of the host memory's; UINT32_MAX where there is none.
+// The first coherent memory type for the host memory; UINT32_MAX if there is none.
 static uint32_t find_import_type(const struct vkb_device *device, void *memory, uint32_t allowed)
 {
     VkMemoryHostPointerPropertiesEXT properties = {
@@ -209,7 +209,7 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
         || VK(error, device->vk.vkInvalidateMappedMemoryRanges(device->handle, 1, &range));
 }
 
-// What the host writes to a new image before the device's first access stays there.
+// Preinitialized: the content that the host writes before the device's first access is kept.
 static VkImageLayout initial_layout(bool mapped)
 {
     return mapped ? VK_IMAGE_LAYOUT_PREINITIALIZED : VK_IMAGE_LAYOUT_UNDEFINED;

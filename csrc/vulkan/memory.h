@@ -1,4 +1,4 @@
-// Buffers and images with memory of their own.
+// Buffers and images, each with its own memory.
 #ifndef VKB_MEMORY_H
 #define VKB_MEMORY_H
 
@@ -26,9 +26,9 @@ struct vkb_image {
     VkImageView view;
     enum vkb_format format;
     uint32_t width, height, layers, levels;
-    enum vkb_access access;  // what was last recorded for it
-    void *mapped;            // its pixels, row by row; NULL: they are the device's alone
-    size_t row_pitch;        // bytes from row to row of what is mapped
+    enum vkb_access access;  // the last access recorded
+    void *mapped;            // its pixels, row by row; NULL: not host-visible
+    size_t row_pitch;        // of the mapped pixels, in bytes
 };
 
 // Six layers make a cubemap. A mapped image has one layer and one level.
@@ -39,24 +39,24 @@ struct vkb_image_spec {
     bool mapped;
 };
 
-// On failure nothing is left behind; destroying a zeroed or half-built object is fine.
+// On failure nothing leaks. Destroying a zeroed or half-created object is safe.
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
                        VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
                        struct vkb_error *error);
 void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer);
 
-// Makes the buffer at least `size` bytes large; what it held is lost where it grows.
+// Makes the buffer at least `size` bytes large. If it grows, its content is lost.
 bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind kind,
                         VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
                         struct vkb_error *error);
 
-// A buffer over host memory that the caller keeps: what the device writes is there after the fence,
-// without a copy. It starts at the multiple of device->import_alignment before `memory`; *offset is
-// where `memory` lies in it. False without an error where the device cannot have that memory.
+// Creates a buffer over host memory of the caller, which the device writes without a copy. The
+// buffer starts at the multiple of device->import_alignment at or before `memory`; *offset is the
+// offset of `memory` in it. False without an error if the device cannot import this memory.
 bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage, void *memory,
                        size_t size, struct vkb_buffer *buffer, VkDeviceSize *offset);
 
-// Around host access to mapped memory that is not coherent.
+// For mapped memory that is not coherent: after the host has written, and before it reads.
 bool vkb_buffer_flush(const struct vkb_device *device, const struct vkb_buffer *buffer,
                       struct vkb_error *error);
 bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buffer *buffer,
@@ -66,10 +66,10 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
 
-// The layout that the image is in for that access. A mapped one is in the general layout always.
+// The layout of the image for that access. A mapped image is always in the general layout.
 VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access);
 
-// Records what must stand between the image's last access and `access`.
+// Records the barrier between the image's last access and `access`.
 void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer commands,
                           struct vkb_image *image, enum vkb_access access);
 

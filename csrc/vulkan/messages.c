@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-static struct vkb_lock lock;           // of the list and of all that is in it
+static struct vkb_lock lock;           // protects the list and its elements
 static struct vkb_messages *all_open;  // with the lock
 static _Thread_local const struct vkb_messages *current;
 

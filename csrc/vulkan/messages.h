@@ -1,29 +1,29 @@
-// Validation messages, each for the device whose call caused it. The messenger belongs to the
-// instance, which all validated devices share, and tells of no device.
+// Validation messages, each for the device whose call caused it. All validated devices share one
+// instance, and its messenger does not report the device.
 #ifndef VKB_MESSAGES_H
 #define VKB_MESSAGES_H
 
 #include "vulkan/error.h"
 
-// A device's messages. It must not move in memory while it is open.
+// The messages of a device. An open one must not move in memory.
 struct vkb_messages {
     unsigned count;  // since the last vkb_messages_check
     char first[1024];
-    struct vkb_messages *next;  // open, too
+    struct vkb_messages *next;  // the next open one
 };
 
 void vkb_messages_open(struct vkb_messages *messages);
-// May be called on closed ones.
+// Closing twice is safe.
 void vkb_messages_close(struct vkb_messages *messages);
 
-// Around a thread's Vulkan calls for one device: what the layer says in this thread in between is
-// for `messages`. Returns what the thread's messages were for before, for vkb_messages_end; such
-// sections nest. A message from a thread without a section (one of the layer's own) goes to all
-// that are open: none is lost.
+// Enclose a thread's Vulkan calls for one device. In between, the messages in this thread go to
+// `messages`. Returns the previous receiver, for vkb_messages_end, so that sections can be nested.
+// A message from a thread outside of any section, such as a thread of the layer, goes to all open
+// receivers.
 const struct vkb_messages *vkb_messages_begin(const struct vkb_messages *messages);
 void vkb_messages_end(const struct vkb_messages *before);
 
-// False, with the first message since the last call, where there was one.
+// False if there was a message since the last call; `error` gets the first one.
 bool vkb_messages_check(struct vkb_messages *messages, struct vkb_error *error);
 
 // The messenger's callback.

@@ -4,7 +4,7 @@
 
 long vkb_current_process(void)
 {
-    return 1;  // nothing forks there
+    return 1;  // this platform has no fork
 }
 
 static void yield(void)

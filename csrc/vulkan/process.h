@@ -1,19 +1,19 @@
-// Which process this is, and locks that a fork does not leave held.
+// The process id, and locks that a fork does not leave held.
 #ifndef VKB_PROCESS_H
 #define VKB_PROCESS_H
 
 #include <stdatomic.h>
 
-// This process's number, whatever it was forked from; never 0.
+// The id of this process; never 0.
 long vkb_current_process(void);
 
-// Held for short times: who waits for it does not sleep. Zeroed: free.
+// A spinlock, for short times. Zeroed: free.
 struct vkb_lock {
     atomic_long holder;  // the process whose thread holds it; 0: none
 };
 
-// A lock that a thread of the parent held at the fork is free in the child, which has no such
-// thread.
+// A lock that a thread of the parent held during a fork is free in the child, where this thread
+// does not exist.
 void vkb_lock_acquire(struct vkb_lock *lock);
 void vkb_lock_release(struct vkb_lock *lock);
 

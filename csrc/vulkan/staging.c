@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-// Offsets of image copies must be multiples of the pixel size, 16 at the most.
+// Offsets of image copies must be multiples of the pixel size, which is at most 16.
 VkDeviceSize vkb_staging_size(size_t size)
 {
     return (size + 15) & ~(VkDeviceSize)15;

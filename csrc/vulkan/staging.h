@@ -1,4 +1,4 @@
-// Data on its way from the host to the device, through one mapped buffer.
+// Uploads from the host to the device, through one mapped buffer.
 #ifndef VKB_STAGING_H
 #define VKB_STAGING_H
 
@@ -6,8 +6,8 @@
 
 enum { VKB_MAX_MIP_LEVELS = 16 };
 
-// Mip levels of a picture, or of a cube's six, tightly packed in memory that the caller keeps
-// alive; no levels: no such picture.
+// The mip levels of a picture, or of the six faces of a cube, tightly packed. The caller keeps the
+// memory alive. No levels: there is no picture.
 struct vkb_picture_data {
     enum vkb_format format;
     uint32_t width, height, layers, level_count;
@@ -19,20 +19,20 @@ struct vkb_staging {
     VkDeviceSize used;
 };
 
-// The bytes that a piece takes in the buffer.
+// The bytes that a block of data needs in the buffer, with alignment.
 VkDeviceSize vkb_staging_size(size_t size);
 VkDeviceSize vkb_staging_picture_size(const struct vkb_picture_data *data);
 
-// Room for a piece in the buffer, which is large enough; *offset is where it lies.
+// Reserves space for a block in the buffer, which must be large enough; *offset is its offset.
 void *vkb_stage(struct vkb_staging *staging, size_t size, VkDeviceSize *offset);
 
-// A buffer on the device with the piece that lies at `offset`.
+// Creates a device buffer and records its copy from the block at `offset`.
 bool vkb_staging_load_buffer(const struct vkb_device *device, VkCommandBuffer commands,
                              const struct vkb_staging *staging, VkDeviceSize offset, size_t size,
                              VkBufferUsageFlags usage, struct vkb_buffer *buffer,
                              struct vkb_error *error);
 
-// An image on the device, to be sampled; `name` is what messages call it.
+// Creates a sampled device image and records its copy. `name` is its name in errors.
 bool vkb_staging_load_picture(const struct vkb_device *device, VkCommandBuffer commands,
                               struct vkb_staging *staging, const char *name,
                               const struct vkb_picture_data *data, struct vkb_image *image,

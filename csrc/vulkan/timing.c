@@ -37,7 +37,8 @@ void vkb_timer_reset(const struct vkb_device *device, VkCommandBuffer commands,
         device->vk.vkCmdResetQueryPool(commands, timer->queries, 0, 2 * timer->capacity);
 }
 
-// Both ends at the bottom of the pipe: from the end of all that went before to the span's own end.
+// Both timestamps are at the bottom of the pipe: from the end of all earlier work to the end of the
+// span.
 static void write_timestamp(const struct vkb_device *device, VkCommandBuffer commands,
                             const struct vkb_timer *timer, uint32_t query)
 {

@@ -31,6 +31,8 @@ from vkbloom._core import (
 from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
+from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
+from vkbloom.plans import Pass, Plan
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
@@ -70,16 +72,21 @@ __all__ = [
     "AdapterInfo",
     "AdapterNotFoundError",
     "BevyBloom",
+    "BlenderGlare",
     "Camera",
     "DeviceLostError",
     "DualKawase",
     "Error",
     "FilamentBloom",
     "Frames",
+    "GodotBloom",
     "GridReport",
     "HdrpBloom",
     "KinoBloom",
     "OutOfMemoryError",
+    "Pass",
+    "Plan",
+    "PygfxBloom",
     "Pyramid",
     "Renderer",
     "Scene",

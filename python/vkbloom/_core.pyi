@@ -9,7 +9,7 @@ CHOICES: dict[str, tuple[str, ...]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
 
-_Adapter = tuple[str, str, str, str, str, bytes]
+_Adapter = tuple[str, str, str, str, str, bytes, bool]
 _Array = NDArray[Any]
 _Camera = tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]
 _Texture = tuple[tuple[_Array, ...], str, str, str, str, str]
@@ -21,8 +21,8 @@ _Mesh = tuple[
     tuple[tuple[int, int, int], ...],
 ]
 _Scene = tuple[int, _Mesh, _Mesh | None, tuple[_Array, ...], tuple[_Texture, ...]]
-_Result = tuple[dict[str, _Array], dict[str, float], tuple[int, int]]
-_Allocate = Callable[[str, tuple[int, ...], str], _Array]
+_Pass = tuple[str, str, tuple[str, ...], tuple[str, ...], str, int]
+_Dependency = tuple[int, int, int, int, int, int, int]
 
 class Error(Exception):
     vk_call: str | None
@@ -34,15 +34,27 @@ class OutOfMemoryError(Error, MemoryError): ...
 class ValidationError(Error): ...
 class ShaderError(Error): ...
 
-def adapters() -> list[_Adapter]: ...
-def describe(
-    settings: object, size: tuple[int, int], has_sky: bool, shading: str, /
-) -> dict[str, Any]: ...
+def adapters(driver: str, /) -> list[_Adapter]: ...
+def image_source(array: _Array, /) -> Source: ...
+def scene_source(
+    scene: _Scene,
+    camera: _Camera,
+    size: tuple[int, int],
+    shading: str,
+    time: float,
+    glow_intensity: float,
+    /,
+) -> Source: ...
+def plan(
+    source: Source, settings: object, names: tuple[str, ...] | None, variants: str, /
+) -> Plan: ...
+def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[str]]: ...
 
 class Renderer:
     def __new__(
         cls,
         adapter: str,
+        driver: str,
         validation: bool,
         forms: str,
         frame_seconds: float,
@@ -58,30 +70,29 @@ class Renderer:
     @property
     def cached(self) -> tuple[int, int, int]: ...
     def close(self) -> None: ...
-    def new_array(
-        self,
-        empty: Callable[[tuple[int, ...], str], _Array],
-        shape: tuple[int, ...],
-        dtype: str,
-        /,
-    ) -> _Array: ...
     def pipeline_cache(self) -> bytes: ...
-    def render(
-        self,
-        scene: _Scene,
-        camera: _Camera,
-        size: tuple[int, int],
-        shading: str,
-        time: float,
-        glow_intensity: float,
-        names: tuple[str, ...] | None,
-        /,
-    ) -> Batch: ...
-    def apply(self, image: _Array, names: tuple[str, ...] | None, /) -> Batch: ...
+    def plan(self, source: Source, settings: object, names: tuple[str, ...] | None, /) -> Plan: ...
+    def run(
+        self, source: Source, plans: tuple[Plan, ...], arrays: tuple[tuple[_Array, ...], ...], /
+    ) -> Submission: ...
+    def pages(self, size: int, /) -> Pages: ...
 
-class Batch:
+class Source: ...
+
+class Plan:
+    @property
+    def outputs(self) -> tuple[tuple[str, tuple[int, ...], str], ...]: ...
+    @property
+    def passes(self) -> list[_Pass]: ...
+    @property
+    def dependencies(self) -> list[tuple[_Dependency, ...]]: ...
     @property
     def size(self) -> int: ...
-    def add(self, settings: object, allocate: _Allocate, /) -> bool: ...
-    def submit(self) -> None: ...
-    def collect(self) -> list[_Result]: ...
+    def shares_images(self, other: Plan, /) -> bool: ...
+
+class Submission:
+    def wait(self) -> tuple[list[dict[str, float]], tuple[int, int]]: ...
+
+class Pages:
+    def __len__(self) -> int: ...
+    def __buffer__(self, flags: int, /) -> memoryview: ...

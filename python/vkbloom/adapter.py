@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import importlib
+import json
+import os
+from pathlib import Path
 
 from vkbloom import _core
 
@@ -21,6 +26,9 @@ class AdapterInfo:
         Name and version of the driver, as the driver reports them; "" if it reports none.
     api_version : str
         The Vulkan version of the device.
+    bundled : bool
+        Whether the driver comes from the package ``vkbloom-lavapipe`` or from VKBLOOM_DRIVER;
+        otherwise the system's Vulkan loader found it.
     summary : str
         All of these on one line.
 
@@ -41,21 +49,61 @@ class AdapterInfo:
     driver: str
     driver_info: str
     api_version: str
+    bundled: bool = False
 
     @property
     def summary(self) -> str:
         """All attributes on one line."""
         driver = self.driver_info or self.driver or "unnamed driver"
-        return f"{self.name} ({self.type}, {driver}, Vulkan {self.api_version})"
+        kind = f"{self.type}, bundled" if self.bundled else self.type
+        return f"{self.name} ({kind}, {driver}, Vulkan {self.api_version})"
+
+
+def bundled_driver() -> str:
+    """Return the path of the driver that needs no Vulkan loader, "" where there is none.
+
+    The environment variable VKBLOOM_DRIVER names one: the path of a driver's library or of its
+    manifest (JSON), or "system" for none. Without it, the package ``vkbloom-lavapipe`` has one.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    OSError, ValueError
+        The manifest cannot be read; the message names it.
+    """
+    chosen = os.environ.get("VKBLOOM_DRIVER")
+    if chosen == "system":
+        return ""
+    if chosen:
+        return _library_of(Path(chosen)) if chosen.endswith(".json") else chosen
+    try:
+        package = importlib.import_module("vkbloom_lavapipe")
+    except ModuleNotFoundError:
+        return ""
+    return str(package.LIBRARY)
+
+
+def _library_of(manifest: Path) -> str:
+    """Return the library that a driver's manifest names; a relative path starts at its folder."""
+    try:
+        library: str = json.loads(manifest.read_text(encoding="utf-8"))["ICD"]["library_path"]
+        # A bare name is for the system's search.
+        return os.fspath(manifest.parent / library) if "/" in library else library
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"VKBLOOM_DRIVER: {manifest} is not a driver's manifest") from error
 
 
 def adapters() -> tuple[AdapterInfo, ...]:
-    """List the adapters that can run vkbloom, in the system's order.
+    """List the adapters that can run vkbloom: the system's in its order, then the bundled ones.
 
     Returns
     -------
     tuple of AdapterInfo
-        Empty if no driver works, or if the Vulkan loader is missing.
+        First those of the system's Vulkan loader, then those of the bundled driver. Empty if no
+        driver works.
 
     Raises
     ------
@@ -72,8 +120,14 @@ def adapters() -> tuple[AdapterInfo, ...]:
     >>> any(adapter.type == "cpu" for adapter in vkbloom.adapters())
     True
     """
-    try:
-        found = _core.adapters()
-    except _core.AdapterNotFoundError:
-        return ()
-    return tuple(AdapterInfo(*adapter[:5]) for adapter in found)
+    found: list[_core._Adapter] = []
+    for driver in dict.fromkeys(("", bundled_driver())):
+        with contextlib.suppress(_core.AdapterNotFoundError):
+            found += _core.adapters(driver)
+    return tuple(from_core(adapter) for adapter in found)
+
+
+def from_core(adapter: _core._Adapter) -> AdapterInfo:
+    """Make what the core tells about an adapter an AdapterInfo."""
+    name, kind, driver, driver_info, api_version, _, bundled = adapter
+    return AdapterInfo(name, kind, driver, driver_info, api_version, bundled)

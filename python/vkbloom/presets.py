@@ -8,6 +8,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.settings import DualKawase, Pyramid, Separable
 
@@ -43,6 +44,11 @@ if TYPE_CHECKING:
 #: - ``"threejs_unreal"``: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since
 #:   #31528 and #32517 (2025), with the defaults of its successor BloomNode: strength 1, radius
 #:   and threshold 0.
+#: - ``"godot_4_5"``, ``"godot_4_6"``: godotengine/godot, servers/rendering/renderer_rd/shaders/
+#:   effects: copy.glsl @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc, with the environment's defaults
+#:   up to 4.5 and from 4.6 on.
+#: - ``"blender_bloom"``: the Glare node of Blender 4.5, type Bloom, quality High, its defaults.
+#: - ``"pygfx"``: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
 presets: Mapping[str, Settings] = MappingProxyType(
     {
         "tutorial": Separable(),
@@ -64,5 +70,13 @@ presets: Mapping[str, Settings] = MappingProxyType(
         "unity_urp": UrpBloom(),
         "unity_hdrp": HdrpBloom(),
         "threejs_unreal": UnrealBloom(),
+        "godot_4_5": GodotBloom(
+            level_weights=(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0),
+            intensity=0.8,
+            composite="soft_light",
+        ),
+        "godot_4_6": GodotBloom(),
+        "blender_bloom": BlenderGlare(),
+        "pygfx": PygfxBloom(),
     }
 )

@@ -22,16 +22,7 @@ def _linear(encoded: float) -> float:
     return float(((encoded + 0.055) / 1.055) ** 2.4)
 
 
-def _check_composite(settings: Settings, *allowed: Composite) -> None:
-    """Raise ValueError unless the method has the composite."""
-    if settings.composite not in allowed:
-        raise ValueError(
-            f"composite: {settings.composite!r} is not one of {', '.join(allowed)}, "
-            f"which the method {settings.method} has"
-        )
-
-
-def _check_no_knee(settings: Settings) -> None:
+def check_no_knee(settings: Settings) -> None:
     """Raise ValueError where a knee is asked of a method whose threshold has none."""
     if settings.knee != 0:
         raise ValueError(
@@ -93,6 +84,7 @@ class BevyBloom(Settings):
     """
 
     method: ClassVar[str] = "bevy"
+    composites: ClassVar[tuple[Composite, ...]] = ("mix", "add")
 
     composite: Composite = "mix"
     intensity: float = number_field("intensity", default=0.15, range=(0, 1))
@@ -101,10 +93,6 @@ class BevyBloom(Settings):
     low_frequency_boost_curvature: float = number_field("low_frequency_boost_curvature")
     high_pass_frequency: float = number_field("high_pass_frequency")
     max_mip_dimension: int = number_field("max_mip_dimension", unit="pixel")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_composite(self, "mix", "add")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -149,6 +137,7 @@ class KinoBloom(Settings):
     """
 
     method: ClassVar[str] = "kino"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = _linear(0.8)
     knee: float = number_field("knee", default=0.5)
@@ -156,10 +145,6 @@ class KinoBloom(Settings):
     format: BloomFormat | None = "rgba16float"
     radius: float = number_field("radius", default=2.5, range=(1, 7))
     anti_flicker: bool = flag_field("anti_flicker")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_composite(self, "add")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -210,6 +195,7 @@ class FilamentBloom(Settings):
     """
 
     method: ClassVar[str] = "filament"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = 1.0
     intensity: float = number_field("intensity", default=0.1, range=(0, 1))
@@ -220,8 +206,7 @@ class FilamentBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "add")
-        _check_no_knee(self)
+        check_no_knee(self)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -273,6 +258,7 @@ class UrpBloom(Settings):
     """
 
     method: ClassVar[str] = "urp"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = _linear(0.9)
     knee: float = number_field("knee", default=0.5)
@@ -280,10 +266,6 @@ class UrpBloom(Settings):
     scatter: float = number_field("scatter")
     iterations: int = number_field("iterations")
     clamp_max: float = number_field("clamp_max")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_composite(self, "add")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -333,6 +315,7 @@ class HdrpBloom(Settings):
     """
 
     method: ClassVar[str] = "hdrp"
+    composites: ClassVar[tuple[Composite, ...]] = ("mix",)
 
     composite: Composite = "mix"
     intensity: float = number_field("intensity", default=2**0.2 - 1, range=(0, 1))
@@ -342,8 +325,7 @@ class HdrpBloom(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "mix")
-        _check_no_knee(self)
+        check_no_knee(self)
         if self.threshold is not None:
             raise ValueError(
                 f"threshold: {self.threshold!r} is out of range, None, for what HDRP does with a "
@@ -361,11 +343,13 @@ class UnrealBloom(Settings):
         0 to 1: from the factors 1, 0.8, 0.6, 0.4, 0.2 of the levels to 0.2, 0.4, 0.6, 0.8, 1.
     smooth_width : float
         Luminance over which the threshold fades in, 0.0001 to 65504.
+    node : bool
+        As three.js' BloomNode has it, the successor for WebGPU: the sizes are floored.
     threshold : float or None
         Luminance where that begins.
     composite : {"add"}
     intensity : float
-        Three times three.js' strength.
+        Three times three.js' strength; with `node` the strength itself, so ``intensity=1``.
     **settings
         The other fields of `Settings`; there is no knee.
 
@@ -383,6 +367,10 @@ class UnrealBloom(Settings):
     sigma = R / 3, not normalized. ``up_0`` is the sum of the levels, bilinear, times their
     factors, ``bloom`` one bilinear sample of it. In "rgba8unorm" up_0 is a third of that.
 
+    With `node` all halves are floored, never under 1, and the luminance has the weights of Rec. 709
+    with four digits. Newer versions of BloomNode merge neighbouring taps into one bilinear fetch,
+    which differs where a level is read at another size, and is left out.
+
     Source: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since pull requests
     #31528 (kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js
     @ 0255e15dd1d4; defaults of examples/jsm/tsl/display/BloomNode.js, as the pass has none for
@@ -395,14 +383,15 @@ class UnrealBloom(Settings):
     """
 
     method: ClassVar[str] = "unreal"
+    composites: ClassVar[tuple[Composite, ...]] = ("add",)
 
     threshold: float | None = 0.0
     intensity: float = number_field("intensity", default=3.0)
     format: BloomFormat | None = "rgba16float"
     radius: float = number_field("radius", default=0.0, range=(0, 1))
     smooth_width: float = number_field("smooth_width")
+    node: bool = flag_field("node")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_composite(self, "add")
-        _check_no_knee(self)
+        check_no_knee(self)

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom.adapter import AdapterInfo
-from vkbloom.checks import check_attachments, check_image, check_size, check_time
+from vkbloom.adapter import bundled_driver, from_core
+from vkbloom.checks import check_attachments, check_image, check_size
 from vkbloom.frames import Frames
-from vkbloom.settings import SHADINGS, Settings, Shading, check_settings
+from vkbloom.plans import Pass, Plan, framebuffers
+from vkbloom.settings import Settings, Shading, check_settings
+from vkbloom.sources import image_source, scene_source
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
@@ -24,8 +26,9 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
-    from vkbloom.scene import Mesh, Scene
-    from vkbloom.scene.textures import Texture
+    from vkbloom.scene import Scene
+
+_SCENE_SIZE = (1280, 720)
 
 
 def _frame_seconds() -> float:
@@ -40,43 +43,45 @@ def _frame_seconds() -> float:
     return seconds
 
 
-def _allocator(
-    core: _core.Renderer,
-    out: Mapping[str, NDArray[Any]] | None,
-) -> Callable[[str, tuple[int, ...], str], NDArray[Any]]:
-    """Return what gives the core its arrays: those of `out` where they fit, else new ones."""
-    if out is not None and not isinstance(out, abc.Mapping):
-        raise TypeError(f"out: a mapping of names to arrays is needed, not {type(out).__name__}")
-    given: dict[str, NDArray[Any]] = {}
+def _check_out(array: object, name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"out: {name} must be an array, not {type(array).__name__}")
+    if array.shape != shape or array.dtype != np.dtype(dtype):
+        raise ValueError(
+            f"out: {name} has shape {array.shape} and dtype {array.dtype}, "
+            f"it must have {shape} and {dtype}"
+        )
+    if not array.flags.c_contiguous or not array.flags.writeable:
+        raise ValueError(f"out: {name} must be C-contiguous and writeable")
+    return array
 
-    def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
-        if out is None or name not in out:
-            return core.new_array(np.empty, shape, dtype)
-        array = out[name]
-        if not isinstance(array, np.ndarray):
-            raise TypeError(f"out: {name} must be an array, not {type(array).__name__}")
-        if array.shape != shape or array.dtype != np.dtype(dtype):
-            raise ValueError(
-                f"out: {name} has shape {array.shape} and dtype {array.dtype}, "
-                f"it must have {shape} and {dtype}"
-            )
-        if not array.flags.c_contiguous or not array.flags.writeable:
-            raise ValueError(f"out: {name} must be C-contiguous and writeable")
+
+def _arrays_for(
+    core: _core.Renderer, plan: _core.Plan, out: Mapping[str, NDArray[Any]] | None
+) -> tuple[NDArray[Any], ...]:
+    """Return the arrays to fill: those of `out`, and new ones."""
+    if out is None:
+        return requests.new_arrays(core, plan)
+    if not isinstance(out, abc.Mapping):
+        raise TypeError(f"out: a mapping of names to arrays is needed, not {type(out).__name__}")
+    names = [name for name, _, _ in plan.outputs]
+    for name in out:
+        if name not in names:
+            raise ValueError(f"out: {name!r} is not among the framebuffers: {', '.join(names)}")
+    given: dict[str, NDArray[Any]] = {}
+    for name, shape, dtype in plan.outputs:
+        if name not in out:
+            continue
+        array = _check_out(out[name], name, shape, dtype)
         for other, taken in given.items():
             # Of contiguous arrays the bounds say it all.
             if np.may_share_memory(array, taken):
                 raise ValueError(f"out: {other} and {name} must not share memory")
         given[name] = array
-        return array
-
-    return allocate
-
-
-def _check_filled(out: Mapping[str, NDArray[Any]] | None, arrays: Mapping[str, object]) -> None:
-    """Raise ValueError where `out` names what was not among the framebuffers of the call."""
-    for name in out or ():
-        if name not in arrays:
-            raise ValueError(f"out: {name!r} is not among the framebuffers: {', '.join(arrays)}")
+    return tuple(
+        given[name] if name in given else requests.new_array(core, shape, dtype)
+        for name, shape, dtype in plan.outputs
+    )
 
 
 class Renderer:
@@ -87,7 +92,8 @@ class Renderer:
     adapter : str
         "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", or a
         part of an adapter's name, in any case. The environment variable VKBLOOM_ADAPTER replaces
-        "auto".
+        "auto". "software" is the driver of the package ``vkbloom-lavapipe`` where it is installed,
+        else the system's; VKBLOOM_DRIVER names another driver's library or manifest, or "system".
     validation : bool
         Turns the Khronos validation layer on, with synchronization validation; its first message
         raises `ValidationError` from the call that caused it.
@@ -150,10 +156,15 @@ class Renderer:
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(
-            adapter, bool(validation), forms, _frame_seconds(), pipeline_cache.read
+            adapter,
+            bundled_driver(),
+            bool(validation),
+            forms,
+            _frame_seconds(),
+            pipeline_cache.read,
         )
-        *fields, self._driver_uuid = self._core.info
-        self.info = AdapterInfo(*fields)
+        self._driver_uuid = self._core.info[5]
+        self.info = from_core(self._core.info)
         self._made_by = {
             "adapter": self.info.name,
             "driver": self.info.driver_info or self.info.driver,
@@ -203,7 +214,7 @@ class Renderer:
         self,
         scene: Scene,
         settings: Settings | None = None,
-        size: tuple[int, int] = (1280, 720),
+        size: tuple[int, int] = _SCENE_SIZE,
         *,
         shading: Shading = "forward",
         time: float = 0.0,
@@ -264,8 +275,8 @@ class Renderer:
         ``timings`` of the result names the passes that ran.
         """
         settings = check_settings(settings)
-        arguments = _render_arguments(scene, size, shading, time, attachments)
-        return self._run_one(self._core.render(*arguments), settings, out)
+        source = scene_source(scene, size, shading, time)
+        return self._run_one(source, settings, check_attachments(attachments), out)
 
     def apply(
         self,
@@ -313,8 +324,8 @@ class Renderer:
         when what they read or their settings changed.
         """
         settings = check_settings(settings)
-        batch = self._core.apply(check_image(image), check_attachments(attachments))
-        return self._run_one(batch, settings, out)
+        source = image_source(image)
+        return self._run_one(source, settings, check_attachments(attachments), out)
 
     def apply_many(
         self,
@@ -345,15 +356,14 @@ class Renderer:
         settings are taken from their iterable before the frames that come before theirs.
         What a wrong one of them raises is raised in its turn, after the frames before it.
         """
-        image = check_image(image)
         names = check_attachments(attachments)
-        return self._run_many(lambda: self._core.apply(image, names), settings_seq)
+        return self._run_many(image_source(image), settings_seq, names)
 
     def render_many(
         self,
         scene: Scene,
         settings_seq: Iterable[Settings],
-        size: tuple[int, int] = (1280, 720),
+        size: tuple[int, int] = _SCENE_SIZE,
         *,
         shading: Shading = "forward",
         time: float = 0.0,
@@ -377,8 +387,87 @@ class Renderer:
         -----
         As for `apply_many`.
         """
-        arguments = _render_arguments(scene, size, shading, time, attachments)
-        return self._run_many(lambda: self._core.render(*arguments), settings_seq)
+        names = check_attachments(attachments)
+        return self._run_many(scene_source(scene, size, shading, time), settings_seq, names)
+
+    def plan(
+        self,
+        source: Scene | NDArray[Any],
+        settings: Settings | None = None,
+        size: tuple[int, int] | None = None,
+        *,
+        shading: Shading = "forward",
+        attachments: Literal["all"] | str | Sequence[str] = "all",
+    ) -> Plan:
+        """Tell what a call would do, without rendering anything.
+
+        Parameters
+        ----------
+        source : Scene or ndarray
+            As for `render` and `apply`.
+        settings : Settings, optional
+            By default ``Separable()``.
+        size : (int, int), optional
+            Width and height of a scene's frame, by default (1280, 720). An image has its own.
+        shading : {"forward", "deferred"}
+            Of a scene.
+        attachments
+            As for `render`.
+
+        Returns
+        -------
+        Plan
+            The framebuffers that the call would give, with shapes and dtypes, and its passes in
+            the variants that this renderer's device would run.
+
+        Raises
+        ------
+        ValueError
+            An argument is out of range, or does not belong to the source; or the renderer is
+            closed.
+        TypeError
+            An argument has the wrong type.
+        Error
+            The device cannot do what the settings ask for.
+
+        See Also
+        --------
+        render, apply : Do it.
+
+        Notes
+        -----
+        The device is not asked, and other threads' calls are not waited for. What the pixels of an
+        image are, and a scene's time, changes no plan.
+
+        Examples
+        --------
+        >>> import vkbloom
+        >>> with vkbloom.Renderer() as renderer:
+        ...     plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Pyramid(levels=2), (640, 360))
+        >>> {name: shape for name, (shape, _) in plan.outputs.items() if name.startswith("down")}
+        {'down_0': (128, 128, 4), 'down_1': (64, 64, 4)}
+        """
+        settings = check_settings(settings)
+        names = check_attachments(attachments)
+        kind: str = shading
+        dtype = channels = None
+        if isinstance(source, np.ndarray):
+            for name, is_given in (("size", size is not None), ("shading", shading != "forward")):
+                if is_given:
+                    raise ValueError(f"{name}: only scenes have one, an image is given")
+            image = check_image(source)
+            kind, dtype = "image", image.dtype
+            height, width, channels = image.shape
+            planned = image_source(image)
+        else:
+            width, height = check_size("size", _SCENE_SIZE if size is None else size)
+            planned = scene_source(source, (width, height), shading, 0.0)
+        plan = self._core.plan(planned, settings, names)
+        outputs = framebuffers(plan)
+        passes = tuple(Pass(*row[:-1]) for row in plan.passes)
+        return Plan(
+            kind, (width, height), dtype, channels, settings, tuple(outputs), outputs, passes
+        )
 
     def grid(
         self,
@@ -459,39 +548,28 @@ class Renderer:
         )
         return in_memory(asked, self, progress)
 
-    def _survey_apply(
-        self, image: NDArray[Any], settings: Settings
-    ) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-        """Return shape and dtype of all framebuffers that `apply` would give, without rendering."""
-        return _surveyed(self._core.apply(image, None), settings)
-
-    def _survey_render(
-        self, scene: Scene, settings: Settings, size: tuple[int, int], shading: Shading
-    ) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-        """Return shape and dtype of all framebuffers that `render` would give, likewise."""
-        arguments = _render_arguments(scene, size, shading, 0.0, "all")
-        return _surveyed(self._core.render(*arguments), settings)
-
     def _run_one(
         self,
-        batch: _core.Batch,
+        source: _core.Source,
         settings: Settings,
+        names: tuple[str, ...] | None,
         out: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
-        batch.add(settings, _allocator(self._core, out))
-        batch.submit()
-        (result,) = batch.collect()
-        _check_filled(out, result[0])
-        return self._frames(settings, result)
+        plan = self._core.plan(source, settings, names)
+        arrays = _arrays_for(self._core, plan, out)
+        return self._frames(settings, requests.run_one(self._core, source, plan, arrays))
 
     def _run_many(
-        self, open_batch: Callable[[], _core.Batch], settings_seq: Iterable[Settings]
+        self,
+        source: _core.Source,
+        settings_seq: Iterable[Settings],
+        names: tuple[str, ...] | None,
     ) -> Iterator[Frames]:
         # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
         checked = map(check_settings, settings_seq)
-        results = requests.run(checked, open_batch, _allocator(self._core, None))
+        results = requests.run(checked, self._core, source, names)
         return (self._frames(settings, result) for settings, result in results)
 
     def _frames(self, settings: Settings, result: requests.Result) -> Frames:
@@ -511,81 +589,3 @@ class Renderer:
             with contextlib.suppress(_core.Error, ValueError):
                 pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
                 self._saved_pipelines = count
-
-
-def _surveyed(
-    batch: _core.Batch, settings: Settings
-) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-    """Return what a batch asks arrays for; it is not submitted, so that the device does nothing."""
-    found: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
-
-    def allocate(name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
-        found[name] = (shape, np.dtype(dtype))
-        # Memory that nobody touches costs nothing.
-        return np.empty(shape, dtype)
-
-    batch.add(settings, allocate)
-    return found
-
-
-def _render_arguments(
-    scene: Scene,
-    size: tuple[int, int],
-    shading: Shading,
-    time: float,
-    attachments: str | Sequence[str],
-) -> tuple[Any, ...]:
-    """Return what the core renders, checked."""
-    if shading not in SHADINGS:
-        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-    turns = check_time(time)
-    from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
-
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene: a Scene is needed, not {scene!r}")
-    camera = scene.camera
-    return (
-        _scene_arrays(scene),
-        (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
-        check_size("size", size),
-        shading,
-        # Whole turns change nothing; without them large times keep their precision.
-        math.fmod(turns, 1.0),
-        scene.glow_intensity,
-        check_attachments(attachments),
-    )
-
-
-def _scene_arrays(scene: Scene) -> Any:
-    """Return the scene as the core takes it."""
-    # Textures by what they are, not by what they hold: each goes to the device once.
-    numbers: dict[Texture, int] = {}
-    body = _mesh_arrays(scene.body, numbers)
-    glow = None if scene.glow is None else _mesh_arrays(scene.glow, numbers)
-    sky = () if scene.skybox is None else scene.skybox.levels
-    textures = tuple(
-        (
-            texture.levels,
-            *texture.address_mode,
-            texture.mag_filter,
-            texture.min_filter,
-            texture.mipmap_filter,
-        )
-        for texture in numbers
-    )
-    return scene.contents_serial, body, glow, sky, textures
-
-
-def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:
-    """Return a mesh as the core takes it; textures get the next numbers."""
-    surfaces = tuple(
-        (
-            surface.index_count,
-            *(
-                numbers.setdefault(texture, len(numbers))
-                for texture in (surface.base, surface.emission)
-            ),
-        )
-        for surface in mesh.surfaces
-    )
-    return mesh.vertices, mesh.indices, mesh.emission, mesh.texcoords, surfaces

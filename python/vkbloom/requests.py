@@ -2,41 +2,122 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from vkbloom import _core
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
     from vkbloom.settings import Settings
 
-    Allocate = Callable[[str, tuple[int, ...], str], NDArray[Any]]
-    Result = tuple[dict[str, NDArray[Any]], dict[str, float], tuple[int, int]]
+__all__ = ["Result", "new_array", "new_arrays", "run", "run_one"]
 
-#: Settings in one batch at most.
-POINTS = 32
-#: Bytes of the framebuffers of one batch at most, one frame at the least.
+#: Requests in one submission at most.
+REQUESTS = 32
+#: Bytes of the framebuffers of one submission at most, one request at the least.
 BYTES = 64 << 20
-#: What one batch may take, one setting at the least: a device cannot be stopped, so that whoever is
-#: interrupted and closes the renderer waits for what the device has.
+#: What one submission may take, one request at the least: a device cannot be stopped, so that
+#: whoever is interrupted and closes the renderer waits for what the device has.
 SECONDS = 0.25
-#: Batches that the device has while the frames of another are taken.
+#: Submissions that the device has while the frames of another are taken.
 AHEAD = 2
+
+#: Arrays of so many bytes and more are in a renderer's pages, where the device writes them itself.
+#: NumPy keeps some of the memory of smaller ones for the next.
+LARGE_BYTES = 1 << 20
+
+
+class Result(NamedTuple):
+    """What a request gave.
+
+    Attributes
+    ----------
+    arrays : dict of str to ndarray
+    timings : dict of str to float
+    counts : (int, int)
+        How many NaN and infinities the input held.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    timings: dict[str, float]
+    counts: tuple[int, int]
+
+
+def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+    """Return an array for a framebuffer; it holds anything.
+
+    A large one is in pages that its `base` owns, and that are used again when it is gone.
+
+    Raises
+    ------
+    OutOfMemoryError
+        There is no memory for it.
+    """
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < LARGE_BYTES:
+        return np.empty(shape, dtype)
+    # NumPy's types know the standard library's buffers only.
+    return np.ndarray(shape, dtype, buffer=core.pages(size))  # type: ignore[arg-type]
+
+
+def new_arrays(core: _core.Renderer, plan: _core.Plan) -> tuple[NDArray[Any], ...]:
+    """Return an array for each of a plan's outputs."""
+    return tuple(new_array(core, shape, dtype) for _, shape, dtype in plan.outputs)
+
+
+def run_one(
+    core: _core.Renderer,
+    source: _core.Source,
+    plan: _core.Plan,
+    arrays: tuple[NDArray[Any], ...],
+) -> Result:
+    """Run a plan and wait for it.
+
+    Parameters
+    ----------
+    core : Renderer of the core
+    source : Source of the core
+    plan : Plan of the core
+        Made for both.
+    arrays : tuple of ndarray
+        To be filled, one for each of the plan's outputs.
+    """
+    (timings,), counts = core.run(source, (plan,), (arrays,)).wait()
+    return Result(_named(plan, arrays), timings, counts)
+
+
+def _named(plan: _core.Plan, arrays: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:
+    return {name: array for (name, _, _), array in zip(plan.outputs, arrays, strict=True)}
+
+
+class _Request(NamedTuple):
+    settings: Settings
+    plan: _core.Plan
+    arrays: tuple[NDArray[Any], ...]
+
+
+def _taken(
+    request: _Request, timings: dict[str, float], counts: tuple[int, int]
+) -> tuple[Settings, Result]:
+    return request.settings, Result(_named(request.plan, request.arrays), timings, counts)
 
 
 class _Submitted(NamedTuple):
-    batch: _core.Batch
-    settings: list[Settings]
+    submission: _core.Submission
+    requests: list[_Request]
     since: float
 
 
-class _Points:
-    """A sequence of settings, put into batches in its order.
+class _Requests:
+    """A sequence of settings, put into submissions in its order.
 
     Attributes
     ----------
@@ -47,66 +128,71 @@ class _Points:
     def __init__(
         self,
         settings_seq: Iterable[Settings],
-        open_batch: Callable[[], _core.Batch],
-        allocate: Allocate,
+        core: _core.Renderer,
+        source: _core.Source,
+        names: tuple[str, ...] | None,
     ) -> None:
         self._sequence = iter(settings_seq)
-        self._open_batch = open_batch
-        self._allocate = allocate
+        self._core = core
+        self._source = source
+        self._names = names
         self._waiting: deque[Settings] = deque()  # taken from the sequence, and not submitted
         self._alone = 0  # how many of those go one by one
         self._limit = 1
-        self._most = POINTS  # in SECONDS, as far as is known
+        self._most = REQUESTS  # in SECONDS, as far as is known
         self._ended = False
         self.failure: Exception | None = None
 
     def submit(self) -> _Submitted | None:
         """Hand the next settings to the device; None: there are none, or the next one failed."""
-        while True:
-            batch, settings = None, []
+        while requests := self._take():
+            plans = tuple(request.plan for request in requests)
             try:
-                batch = self._open_batch()
-                settings = self._fill(batch)
-                if not settings:
-                    return None
-                batch.submit()
+                submission = self._core.run(
+                    self._source, plans, tuple(request.arrays for request in requests)
+                )
             except Exception as error:
-                if not self._blames_one(error, settings):
+                if not self._blames_one(error, requests):
                     self._fail(error)
                     return None
                 # Those before it still come, and the error in its turn.
-                self._waiting.extendleft(reversed(settings))
-                self._alone = len(settings)
+                self._waiting.extendleft(request.settings for request in reversed(requests))
+                self._alone = len(requests)
             else:
                 self._alone = max(0, self._alone - 1)
                 # The first frame waits for no other, and whoever uses a few has a few made in vain:
                 # twice as many as these, which may be fewer than the limit was.
-                self._limit = min(2 * len(settings), POINTS)
-                return _Submitted(batch, settings, time.perf_counter())
+                self._limit = min(2 * len(requests), REQUESTS)
+                return _Submitted(submission, requests, time.perf_counter())
+        return None
 
     def took(self, seconds: float, count: int) -> None:
-        """Learn from a batch of so many settings, which took no longer than that."""
-        self._most = max(1, int(SECONDS * count / max(seconds, SECONDS / POINTS)))
+        """Learn from a submission of so many settings, which took no longer than that."""
+        self._most = max(1, int(SECONDS * count / max(seconds, SECONDS / REQUESTS)))
 
-    def _fill(self, batch: _core.Batch) -> list[Settings]:
-        settings: list[Settings] = []
+    def _take(self) -> list[_Request]:
+        """Return the requests of the next submission."""
+        requests: list[_Request] = []
+        size = 0
         limit = 1 if self._alone else min(self._limit, self._most)
-        while len(settings) < limit:
-            if settings and batch.size + batch.size // len(settings) > BYTES:
+        while len(requests) < limit:
+            if requests and size + size // len(requests) > BYTES:
                 break
-            point = self._next()
-            if point is None:
+            settings = self._next()
+            if settings is None:
                 break
             try:
-                fits = batch.add(point, self._allocate)
+                plan = self._core.plan(self._source, settings, self._names)
+                # Those with other images need another submission.
+                if requests and not plan.shares_images(requests[0].plan):
+                    self._waiting.appendleft(settings)
+                    break
+                requests.append(_Request(settings, plan, new_arrays(self._core, plan)))
             except Exception as error:
                 self._fail(error)
                 break
-            if not fits:
-                self._waiting.appendleft(point)
-                break
-            settings.append(point)
-        return settings
+            size += plan.size
+        return requests
 
     def _next(self) -> Settings | None:
         if self._waiting:
@@ -127,66 +213,68 @@ class _Points:
         self._waiting.clear()
 
     @staticmethod
-    def _blames_one(error: Exception, settings: list[Settings]) -> bool:
+    def _blames_one(error: Exception, requests: list[_Request]) -> bool:
         """Whether one of several settings is to blame, so that the others may do alone."""
         general = _core.ValidationError, _core.DeviceLostError
         return (
-            len(settings) > 1 and isinstance(error, _core.Error) and not isinstance(error, general)
+            len(requests) > 1 and isinstance(error, _core.Error) and not isinstance(error, general)
         )
 
 
 def run(
     settings_seq: Iterable[Settings],
-    open_batch: Callable[[], _core.Batch],
-    allocate: Allocate,
+    core: _core.Renderer,
+    source: _core.Source,
+    names: tuple[str, ...] | None,
 ) -> Iterator[tuple[Settings, Result]]:
     """Yield the result of each of the settings, in their order.
 
     Settings are taken ahead of the results, so that the device has work while results are used:
-    none ahead of the first result, then as many as make `AHEAD` batches.
+    none ahead of the first result, then as many as make `AHEAD` submissions.
 
     Parameters
     ----------
     settings_seq : iterable of Settings
-    open_batch : callable
-        Gives an empty batch of the source.
-    allocate : callable
-        Gives the array of a framebuffer from its name, shape and dtype.
+    core : Renderer of the core
+    source : Source of the core
+    names : tuple of str or None
+        The framebuffers wanted; None: all.
 
     Raises
     ------
     Exception
-        What a point or the sequence raises, after the results before it.
+        What a request or the sequence raises, after the results before it.
     """
-    points = _Points(settings_seq, open_batch, allocate)
+    waiting = _Requests(settings_seq, core, source, names)
     submitted: deque[_Submitted] = deque()
     ahead = 1
-    before = 0.0  # when the last batch was collected
+    before = 0.0  # when the last submission was over
     try:
         while True:
-            while len(submitted) < ahead and (added := points.submit()) is not None:
+            while len(submitted) < ahead and (added := waiting.submit()) is not None:
                 submitted.append(added)
             if not submitted:
                 break
-            batch, settings, since = submitted.popleft()
-            results = batch.collect()
-            del batch
+            submission, requests, since = submitted.popleft()
+            timings, counts = submission.wait()
+            del submission
             # The device began with it when it had it and was done with the one before.
             end = time.perf_counter()
-            points.took(end - max(since, before), len(settings))
+            waiting.took(end - max(since, before), len(requests))
             before = end
-            # A result is the taker's alone: none is kept until its batch is through.
-            results.reverse()
-            for point in settings:
-                yield point, results.pop()
+            # A result is the taker's alone: none is kept until its submission is through.
+            requests.reverse()
+            timings.reverse()
+            while requests:
+                yield _taken(requests.pop(), timings.pop(), counts)
             ahead = AHEAD
     finally:
         # Whatever nobody takes is waited for here, not when the collector comes round.
         submitted.clear()
-    failure, points.failure = points.failure, None
+    failure, waiting.failure = waiting.failure, None
     if failure is not None:
         try:
             raise failure
         finally:
-            # Its traceback holds this frame, and so the batch, until the collector comes round.
+            # Its traceback holds this frame, and so the arrays, until the collector comes round.
             del failure

@@ -9,20 +9,21 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
+from collections.abc import Sequence
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from vkbloom import _core
 from vkbloom.checks import as_float, check_floats, check_number, check_size
 
 Shading = Literal["forward", "deferred"]
-Composite = Literal["add", "mix", "screen"]
+Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 Encoding = Literal["none", "gamma22", "srgb"]
 Texel = Literal["own", "x"]
-BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float"]
+BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"]
 
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
-BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float")
+BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat")
 
 #: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
@@ -33,14 +34,17 @@ def number_field(
     default: float | None = None,
     unit: str = "1",
     range: tuple[float, float] | None = None,
+    option: str | None = None,
 ) -> Any:
     """Declare a field that is a number in the core's table, which gives its default and range.
 
-    A method whose source has a narrower range gives that one.
+    A method whose source has a narrower range gives that one. `option` is the field's name on the
+    command line, where that is another one.
     """
     initial, _, _ = _core.VALUES[name]
     return dataclasses.field(
-        default=initial if default is None else default, metadata={"unit": unit, "range": range}
+        default=initial if default is None else default,
+        metadata={"unit": unit, "range": range, "option": option or name},
     )
 
 
@@ -82,7 +86,8 @@ class Settings:
         q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
         max(q, b - threshold) / max(b, 1e-5).
     composite : {"add", "mix", "screen"}
-        s + i b; s + (b - s) i; 1 - (1 - s)(1 - i b) with both clamped to 0..1.
+        s + i b; s + (b - s) i; 1 - (1 - s)(1 - i b) with both clamped to 0..1. `GodotBloom` has two
+        more.
     intensity : float
         The i of the composite, 0 to 65504.
     tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
@@ -105,9 +110,13 @@ class Settings:
     bloom_scale : float
         The same as a fraction of the frame, 0.001 to 4, where `bloom_size` is None; sides are
         floored, never under 1. A forward scene with neither (a scale of 1) has 256 x 256.
-    format : {"rgba8unorm", "rgba16float", "rgba32float"} or None
+    format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"} or None
         Of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images,
-        "rgba16float" for deferred scenes, the image's own for float images.
+        "rgba16float" for deferred scenes, the image's own for float images. "rg11b10ufloat" has 6
+        bits of mantissa, 5 for blue, and no negative values: what is stored is rounded to the
+        nearest value, negative and NaN become 0, and larger values than 65024, for blue 64512,
+        become these. Its arrays are float32. Published methods keep only the levels so: ``glow``
+        and ``bloom``, in an engine the frame before and after, are not rounded.
 
     Raises
     ------
@@ -134,6 +143,8 @@ class Settings:
     """
 
     method: ClassVar[str]
+    #: The composites that the method has.
+    composites: ClassVar[tuple[Composite, ...]] = ("add", "mix", "screen")
 
     bloom: bool = flag_field("bloom")
     threshold: float | None = None
@@ -159,6 +170,7 @@ class Settings:
                 self._check_value(field, value)
             elif field.name in _core.CHOICES:
                 self._check_name(field.name, _core.CHOICES[field.name])
+        self._check_name("composite", self.composites, f", which the method {self.method} has")
         if self.format is not None:
             self._check_name("format", BLOOM_FORMATS)
         if self.bloom_size is not None:
@@ -175,12 +187,12 @@ class Settings:
             number = type(field.default)(integer)
         object.__setattr__(self, field.name, number)
 
-    def _check_name(self, field: str, names: tuple[str, ...]) -> None:
+    def _check_name(self, field: str, names: tuple[str, ...], of: str = "") -> None:
         """Check a name and store it as a plain str, of whatever class it is."""
         value = getattr(self, field)
         # An array compares with a name element by element.
         if not isinstance(value, str) or value not in names:
-            raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}")
+            raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}{of}")
         # Not by str(), which gives an enum's own name.
         object.__setattr__(self, field, names[names.index(value)])
 
@@ -326,6 +338,16 @@ class Separable(Settings):
         object.__setattr__(self, "layers", layers)
 
 
+def check_level_weights(weights: Sequence[float], count: int) -> tuple[float, ...]:
+    """Return the weights as floats, else raise TypeError, or ValueError: so many finite numbers."""
+    numbers = check_floats("level_weights", weights)
+    if len(numbers) != count:
+        raise ValueError(
+            f"level_weights: {len(numbers)} weights are out of range, {count}, one for each level"
+        )
+    return numbers
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Pyramid(Settings):
     """A mip chain: 13 taps down, a 3 x 3 tent up, the levels added on the way.
@@ -341,6 +363,9 @@ class Pyramid(Settings):
     firefly_filter : bool
         In the first downsample the five 2 x 2 groups are weighted by 1 / (1 + luminance of the
         group's mean) and renormalized.
+    level_weights : sequence of float or None
+        As many finite numbers w_0, w_1, ... as `levels`, negative ones too; if the chain ends
+        early, the first ones count. None: the mean of the levels.
     **settings
         The fields of `Settings`.
 
@@ -357,6 +382,10 @@ class Pyramid(Settings):
     the number of levels, so that a flat image keeps its value. In "rgba8unorm", which ends at 1,
     the images on the way up hold the mean of the levels that went into them instead of their sum;
     the bloom is the same.
+
+    With weights up_k = w_k down_k + tent(up_k+1), where the smallest level is w_N-1 down_N-1, and
+    ``bloom`` = tent(up_0) is not divided: a flat image becomes the sum of the weights. In
+    "rgba8unorm" up_k is divided by the sum of the weights' sizes, |w_k| + ... + |w_N-1|.
 
     Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
     SIGGRAPH 2014.
@@ -378,6 +407,13 @@ class Pyramid(Settings):
     levels: int = number_field("levels")
     radius: float = number_field("radius", unit="texel")
     firefly_filter: bool = flag_field("firefly_filter")
+    level_weights: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.level_weights is not None:
+            weights = check_level_weights(self.level_weights, self.levels)
+            object.__setattr__(self, "level_weights", weights)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-// Expands the rows of params.h into a uniform block, and into specialization and named constants.
+// Expands the rows of params.h into a uniform block, specialization constants and named constants.
 #include "params.h"
 
 #define MEMBER_READS(block, name) float name;

@@ -1,4 +1,4 @@
-// Reads an image by the cubic B-spline with its texels as control points.
+// Samples an image with a cubic B-spline whose control points are the texels.
 
 vec4 cubic_weights(float part)
 {
@@ -18,4 +18,21 @@ vec3 sample_cubic(sampler2D image, Place place)
             sum += across[x] * down[y] * fetch_clamped(image, texel).rgb;
         }
     return sum;
+}
+
+// The same as two bilinear taps along each axis, none of them further from the place's texel than
+// `furthest` (Sigg and Hadwiger, "Fast Third-Order Texture Filtering", GPU Gems 2, chapter 20).
+vec3 sample_cubic_within(sampler2D image, Place place, vec2 furthest, int sampling)
+{
+    vec4 across = cubic_weights(place.part.x);
+    vec4 down = cubic_weights(place.part.y);
+    vec2 left = vec2(across.x + across.y, down.x + down.y);
+    vec2 right = vec2(across.z + across.w, down.z + down.w);
+    vec2 near = min(vec2(across.y, down.y) / left - 1.0, furthest);
+    vec2 far = min(vec2(across.w, down.w) / right + 1.0, furthest);
+    Place texel = Place(place.texel, vec2(0.0));
+    return left.y * (left.x * sample_at(image, texel, near, sampling).rgb
+                     + right.x * sample_at(image, texel, vec2(far.x, near.y), sampling).rgb)
+         + right.y * (left.x * sample_at(image, texel, vec2(near.x, far.y), sampling).rgb
+                      + right.x * sample_at(image, texel, far, sampling).rgb);
 }

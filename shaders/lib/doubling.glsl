@@ -1,5 +1,6 @@
-// To exactly twice the size: a side, each pixel is a sum of four texels whose weights (`taps`) are
-// mirrored from one pixel to the next. All variants of such a pass add the rows up first.
+// Upsampling to exactly twice the size. Along each axis a pixel is a weighted sum of four texels; the
+// weights (`taps`) alternate between a vector and its reverse. All variants of such a pass sum rows
+// first.
 
 vec3 four(vec3 a, vec3 b, vec3 c, vec3 d, bool odd)
 {

@@ -1,11 +1,11 @@
-// NaN and infinity by their bits: compilers may assume that isnan() and isinf() are false.
+// Tests the bits, since compilers may assume that isnan() and isinf() are false.
 
 bvec3 is_finite(vec3 value)
 {
     return notEqual(floatBitsToUint(value) & 0x7f800000u, uvec3(0x7f800000u));
 }
 
-// NaN and infinity as 0, channel by channel.
+// Replaces NaN and infinity by 0 in each channel.
 vec3 finite_or_zero(vec3 value)
 {
     return mix(vec3(0.0), value, is_finite(value));

@@ -1,6 +1,6 @@
-// A pass over every pixel of one target, in two forms: a fragment shader, or (with DISPATCH) a
-// compute shader of one invocation a pixel. A shader that includes this gives PIXEL's colour as
-// shade(); TARGET_BINDING is the binding after its images.
+// A pass over every pixel of one target, in two variants: a fragment shader or, with DISPATCH, a
+// compute shader with one invocation for each pixel. The including shader defines shade(), which
+// returns the colour of PIXEL, and TARGET_BINDING, the binding after its images.
 
 vec4 shade();
 

@@ -1,5 +1,5 @@
 #version 450
-// One triangle that covers the target, made from the vertex index.
+// One triangle that covers the target, computed from the vertex index.
 
 void main()
 {

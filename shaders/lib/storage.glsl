@@ -1,29 +1,28 @@
-// What a shader writes to a target: kept inside the range of its format, for a value that overflowed
-// to infinity would spread over the picture in the passes after it; and for half floats rounded to
-// the nearest one, for some adapters (llvmpipe among them) cut the bits off, which makes a picture
-// darker pass by pass. Likewise for 8 bits: conversions of some GPUs round values near the middle of
-// two levels down.
+// Values that a shader writes to a target. They are clamped to the range of its format, since later
+// passes would spread an infinity over the picture. They are rounded to the nearest half float, since
+// some adapters (llvmpipe among them) truncate, which darkens the picture with every pass. They are
+// rounded to the nearest 8-bit level, since some GPUs round values near the middle of two levels down.
 
-// The nearest half float, ties to even, also below the smallest normal one: the sum with a float
-// whose last bit is the half's, but for the exponent of the value, leaves no other bits.
+// The nearest half float, ties to even, including subnormal ones. The last bit of `magic` has the
+// weight of the half float's last bit, so that the addition rounds at this bit.
 vec3 nearest_half(vec3 value)
 {
     uvec3 bits = floatBitsToUint(value);
     uvec3 exponent = max(bits & 0x7f800000u, 0x38800000u);
     vec3 magic = uintBitsToFloat(exponent + ((13u << 23) + 0x400000u));
-    // A zero keeps its sign.
+    // Keep the sign of zero.
     return uintBitsToFloat(floatBitsToUint((value + magic) - magic) | (bits & 0x80000000u));
 }
 
-// The nearest of the 256 levels, ties to even: 0 to 255.
+// The nearest of the 256 levels, 0 to 255, ties to even.
 vec3 nearest_level(vec3 value)
 {
     return roundEven(255.0 * clamp(value, 0.0, 1.0));
 }
 
-// The level as a value, as a texel of an image of 8 bits has it. GPUs divide by 255, and round to the
-// nearest float: here without a division, of which a compiler may make a product that is one bit off.
-// The first product is exact. llvmpipe multiplies by the float that is nearest to 1 / 255.
+// The value of a level, as a texel of an 8-bit image returns it. GPUs return the float nearest to
+// level / 255. This is computed without a division, which a compiler may replace by a product with an
+// error of one bit. The first product is exact. llvmpipe multiplies by the float nearest to 1 / 255.
 vec3 from_level(vec3 level, int format)
 {
     const float SHARE = 1.0 / 255.0;
@@ -32,21 +31,41 @@ vec3 from_level(vec3 level, int format)
     return level * (257.0 / 65536.0) + level * (SHARE / 65536.0);
 }
 
+// The nearest floats with 5 bits of exponent and 6 of mantissa (of blue 5), ties to even: what images
+// of R11G11B10 hold. Negative values and NaN become 0, what is larger than the largest becomes that.
+vec3 nearest_ufloat(vec3 value)
+{
+    const uvec3 dropped = uvec3(17, 17, 18);
+    // The least normal one, 2^-14; below it the steps stay the same.
+    const float LEAST = 6.103515625e-5;
+    const vec3 steps = vec3(1048576.0, 1048576.0, 524288.0);
+    vec3 kept = mix(vec3(0.0), min(value, vec3(UFLOAT11_LIMIT, UFLOAT11_LIMIT, UFLOAT10_LIMIT)),
+                    greaterThan(value, vec3(0.0)));
+    uvec3 bits = floatBitsToUint(kept);
+    bits += (uvec3(1) << (dropped - 1u)) - 1u + ((bits >> dropped) & 1u);
+    vec3 normal = uintBitsToFloat((bits >> dropped) << dropped);
+    return mix(normal, roundEven(kept * steps) / steps, lessThan(kept, vec3(LEAST)));
+}
+
 vec3 storable(vec3 value)
 {
+    if (params.limit == UFLOAT11_LIMIT)
+        return nearest_ufloat(value);
     vec3 kept = clamp(value, -params.limit, params.limit);
     if (params.limit == UNORM_LIMIT)
         return from_level(nearest_level(kept), STORED_UNORM8);
     return params.limit == HALF_LIMIT ? nearest_half(kept) : kept;
 }
 
-// What an image of that format would give back of a value: for passes that stand for several, so
-// that their picture is that of the passes they spare.
+// The value that an image of that format returns after a store. Fused passes use it, so that their
+// result equals that of the passes that they replace.
 vec3 as_stored(vec3 value, int format)
 {
     if (format == STORED_UNORM8 || format == STORED_UNORM8_SCALED)
         return from_level(nearest_level(value), format);
     if (format == STORED_HALF)
         return nearest_half(clamp(value, -HALF_LIMIT, HALF_LIMIT));
+    if (format == STORED_UFLOAT)
+        return nearest_ufloat(value);
     return clamp(value, -SINGLE_LIMIT, SINGLE_LIMIT);
 }

@@ -1,6 +1,6 @@
-// The 13 taps of a downsample as five 2 x 2 groups, the middle one half of the weight (Jimenez,
-// "Next Generation Post Processing in Call of Duty: Advanced Warfare", SIGGRAPH 2014). A shader
-// that includes this has `source` and SAMPLING.
+// The 13 taps of a downsample as five 2 x 2 groups; the middle one has half of the weight (Jimenez,
+// "Next Generation Post Processing in Call of Duty: Advanced Warfare", SIGGRAPH 2014). The including
+// shader defines `source` and SAMPLING.
 
 const float GROUP_SHARES[5] = float[](0.5, 0.125, 0.125, 0.125, 0.125);
 
@@ -11,7 +11,7 @@ vec3 tap(Place place, float x, float y)
 
 vec3[5] group_means(Place place)
 {
-    // Rows of taps at -2, 0, 2, left to right; then the four inner ones.
+    // Rows of taps at -2, 0, 2, left to right. Then the four inner taps.
     vec3 a = tap(place, -2.0, -2.0), b = tap(place, 0.0, -2.0), c = tap(place, 2.0, -2.0);
     vec3 d = tap(place, -2.0, 0.0), e = tap(place, 0.0, 0.0), f = tap(place, 2.0, 0.0);
     vec3 g = tap(place, -2.0, 2.0), h = tap(place, 0.0, 2.0), i = tap(place, 2.0, 2.0);

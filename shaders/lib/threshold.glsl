@@ -1,13 +1,13 @@
-// What of a colour goes into the bloom, by brightness.
+// The part of a colour that goes into the bloom, by its brightness.
 
-// Hard: the colour where its Rec. 709 luminance is above the threshold, else black.
+// Hard: the colour if its Rec. 709 luminance is above the threshold, else black.
 vec3 threshold_hard(vec3 colour, float threshold)
 {
     return dot(colour, vec3(0.2126, 0.7152, 0.0722)) > threshold ? colour : vec3(0.0);
 }
 
-// Soft: a quadratic of half-width `width` around the threshold; sources differ in the divisor,
-// about 4 * width, and in the least brightness that they divide by.
+// Soft: a quadratic of half-width `width` around the threshold. Sources differ in the divisor, which
+// is about 4 * width, and in the lower bound of the brightness that they divide by.
 vec3 soft_threshold(vec3 colour, float threshold, float width, float divisor, float least)
 {
     float brightness = max(colour.r, max(colour.g, colour.b));
@@ -16,7 +16,7 @@ vec3 soft_threshold(vec3 colour, float threshold, float width, float divisor, fl
     return colour * (max(soft, brightness - threshold) / max(brightness, least));
 }
 
-// The soft threshold of the settings (api: `knee`).
+// The soft threshold of the setting `knee`.
 vec3 threshold_knee(vec3 colour, float threshold, float knee)
 {
     float width = threshold * knee;

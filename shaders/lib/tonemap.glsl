@@ -6,17 +6,17 @@ vec3 tonemap_reinhard(vec3 c)
     return c / (c + 1.0);
 }
 
-// The fit to the ACES reference curve by Narkowicz, 2015.
+// The fit of Narkowicz (2015) to the ACES reference curve.
 vec3 tonemap_aces(vec3 c)
 {
-    // Beyond this the curve is past 1 at both ends, and its squares would overflow.
+    // Outside of this range the curve exceeds 1 on both sides, and the squares would overflow.
     c = clamp(c, -65504.0, 65504.0);
     return clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0);
 }
 
 vec3 tonemap_exponential(vec3 c)
 {
-    // Near 0 the first terms of the series: in the difference of two ones dark values are lost.
+    // Near 0, the first terms of the series: a difference of values near 1 loses precision.
     vec3 dark = c * (1.0 - c * (1.0 / 2.0 - c * (1.0 / 6.0 - c * (1.0 / 24.0))));
     return mix(1.0 - exp(-c), dark, lessThan(abs(c), vec3(1.0 / 32.0)));
 }
@@ -27,7 +27,7 @@ vec3 tonemap_khronos_neutral(vec3 c)
     const float F90 = 0.04;
     const float COMPRESSION_START = 0.8 - F90;
     const float DESATURATION = 0.15;
-    // Below this the result is 1 for long, and the square would overflow.
+    // Lower values give the same result, 1, and their square would overflow.
     float low = max(min(c.r, min(c.g, c.b)), -1e15);
     float offset = low < 2.0 * F90 ? low - low * low / (4.0 * F90) : F90;
     c -= offset;
@@ -41,8 +41,8 @@ vec3 tonemap_khronos_neutral(vec3 c)
     return mix(c, vec3(compressed), white);
 }
 
-// AgX (Sobotka), as three.js publishes it (r160, tonemapping_pars_fragment): Rec. 2020 inset,
-// log2 range, sixth-order sigmoid fit, outset; the result is linear.
+// AgX (Sobotka) in the variant of three.js (r160, tonemapping_pars_fragment): Rec. 2020 inset, log2
+// range, sixth-order fit of the sigmoid, outset. The result is linear.
 vec3 tonemap_agx(vec3 c)
 {
     const mat3 REC709_TO_REC2020 = mat3(0.6274, 0.0691, 0.0164,
@@ -74,7 +74,7 @@ vec3 apply_tonemap(vec3 c, int tonemap)
 {
     if (tonemap == TONEMAP_NONE)
         return c;
-    // An exposure may have made infinity of it, and huge divisors are not exact on every device.
+    // The exposure may have made it infinite, and huge divisors are not exact on every device.
     c = clamp(c, -1e30, 1e30);
     if (tonemap == TONEMAP_REINHARD)
         return tonemap_reinhard(c);

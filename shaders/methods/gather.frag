@@ -1,8 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Levels of several sizes into one image, each enlarged bilinearly on its own, with its weight.
+// Levels of several sizes into one image, each enlarged on its own, with its weight.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
+#include "lib/cubic.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
 #include "lib/storage.glsl"
@@ -12,19 +13,26 @@ layout(set = 0, binding = 2) uniform sampler2D level_1;
 layout(set = 0, binding = 3) uniform sampler2D level_2;
 layout(set = 0, binding = 4) uniform sampler2D level_3;
 layout(set = 0, binding = 5) uniform sampler2D level_4;
+layout(set = 0, binding = 6) uniform sampler2D level_5;
+layout(set = 0, binding = 7) uniform sampler2D level_6;
 
-#define TARGET_BINDING 6
+#define TARGET_BINDING 8
 #include "lib/fullscreen.glsl"
 
-vec3 share(sampler2D image, float weight)
+vec3 share(sampler2D image, int level)
 {
-    return weight * sample_at(image, PLACE_IN(image), vec2(0.0), SAMPLING).rgb;
+    if (level >= LEVELS)
+        return vec3(0.0);
+    float weight = params.shares[level >> 2][level & 3];
+    Place place = PLACE_IN(image);
+    if (UPSAMPLE == UPSAMPLE_CUBIC)
+        return weight * sample_cubic(image, place);
+    return weight * sample_at(image, place, vec2(0.0), SAMPLING).rgb;
 }
 
 vec4 shade()
 {
-    vec3 sum = share(level_0, params.shares[0].x) + share(level_1, params.shares[0].y)
-             + share(level_2, params.shares[0].z) + share(level_3, params.shares[0].w)
-             + share(level_4, params.shares[1].x);
+    vec3 sum = share(level_0, 0) + share(level_1, 1) + share(level_2, 2) + share(level_3, 3)
+             + share(level_4, 4) + share(level_5, 5) + share(level_6, 6);
     return vec4(storable(sum), 1.0);
 }

@@ -28,6 +28,20 @@ vec3 tent(Place place)
     return sum;
 }
 
+// HDRP's border: no place beyond the middle of the last two texels, no tap of the cubic filter beyond
+// 1 - 1 / size of the target.
+vec3 upsample_inset(Place place)
+{
+    ivec2 size = textureSize(smaller, 0);
+    bvec2 beyond = greaterThan(vec2(place.texel - size + 2) + place.part, vec2(0.5));
+    Place kept = Place(mix(place.texel, size - 2, beyond), mix(place.part, vec2(0.5), beyond));
+    if (UPSAMPLE == UPSAMPLE_INSET_LINEAR)
+        return sample_at(smaller, kept, vec2(0.0), SAMPLING).rgb;
+    vec2 ratio = vec2(size) / vec2(params.target_width, params.target_height);
+    vec2 furthest = vec2(size - 1 - kept.texel) + 0.5 - ratio;
+    return sample_cubic_within(smaller, kept, furthest, SAMPLING);
+}
+
 // The same, or one bilinear tap, where the level is exactly twice as large as the smaller one.
 vec3 doubled()
 {
@@ -50,6 +64,8 @@ vec3 upsample(Place place)
         return sample_at(smaller, place, vec2(0.0), SAMPLING).rgb;
     if (UPSAMPLE == UPSAMPLE_CUBIC)
         return sample_cubic(smaller, place);
+    if (UPSAMPLE == UPSAMPLE_INSET_LINEAR || UPSAMPLE == UPSAMPLE_INSET_CUBIC)
+        return upsample_inset(place);
     return tent(place);
 }
 

@@ -17,7 +17,10 @@ vec4 shade()
 {
     vec3 value = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING).rgb;
     if (THRESHOLDED != 0) {
-        float luminance = dot(value, vec3(0.2126729, 0.7151522, 0.0721750));
+        // BloomNode's luminance is that of three.js' colour management.
+        const vec3 weights = NODE != 0 ? vec3(0.2126, 0.7152, 0.0722)
+                                       : vec3(0.2126729, 0.7151522, 0.0721750);
+        float luminance = dot(value, weights);
         value *= smoothstep(params.threshold, params.threshold + params.smooth_width, luminance);
     }
     return vec4(storable(value), 1.0);

@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Adds the glow mesh's light to the brightness. Blended: all else gets 0 added, which keeps it.
+// Adds the glow mesh's light to the brightness by blending. Adding 0 keeps the other attachments.
 #include "lib/block.glsl"
 #include "scene/gbuffer.glsl"
 
@@ -11,5 +11,5 @@ void main()
     albedo = vec4(0.0);
     normal = vec4(0.0);
     position = vec4(0.0);
-    brightness = vec4(in_its_part(texelFetch(glow, ivec2(gl_FragCoord.xy), 0).rgb), 0.0);
+    brightness = vec4(clamp_to_part(texelFetch(glow, ivec2(gl_FragCoord.xy), 0).rgb), 0.0);
 }

@@ -1,4 +1,4 @@
-// The mesh that is lit later, in view space, with the radiance that its material emits.
+// The mesh that is lit later, in view space, with the emission of its material.
 #include "lib/block.glsl"
 #include "scene/gbuffer.glsl"
 
@@ -15,5 +15,5 @@ void main()
     albedo = vec4(storable(surface_colour()), 1.0);
     normal = vec4(storable(size > 0.0 ? view_normal / size : vec3(0.0)), 1.0);
     position = vec4(storable(view_position), 1.0);
-    brightness = vec4(storable(in_its_part(surface_emission())), 1.0);
+    brightness = vec4(storable(clamp_to_part(surface_emission())), 1.0);
 }

@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The sky behind what is lit; it neither takes light nor glows.
+// The sky in the background. It is unlit and does not glow.
 #include "lib/block.glsl"
 #include "scene/gbuffer.glsl"
 

@@ -1,4 +1,4 @@
-// The glow mesh: its plain colour at its intensity, past the threshold if there is one.
+// The glow mesh: its unlit colour times the intensity, after the threshold if there is one.
 #include "lib/block.glsl"
 #include "scene/surface.glsl"
 #include "lib/threshold.glsl"

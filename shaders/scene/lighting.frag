@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The scene from the G-buffer: the forward system's Phong light, and what is emitted.
+// Lights the G-buffer with the forward system's Phong model, and adds the emission.
 #include "lib/block.glsl"
 #include "scene/phong.glsl"
 

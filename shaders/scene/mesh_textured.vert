@@ -4,10 +4,10 @@
 #include "scene/mesh.glsl"
 
 layout(location = 4) in vec4 texcoords;
-layout(location = 4) out vec4 places;
+layout(location = 4) out vec4 surface_texcoords;
 
 void main()
 {
     write_vertex();
-    places = texcoords;
+    surface_texcoords = texcoords;
 }

@@ -1,10 +1,10 @@
-// One light fixed in view space (figures: the forward system's Phong pass). All in view space, the
-// normal of length 1.
+// One light at a fixed position in view space; the values are those of the forward system's Phong
+// pass. All vectors are in view space, and the normal has length 1.
 
 const vec3 LIGHT_POSITION = vec3(-5.0, -5.0, 0.0);
-// Colours with a channel this bright count as lamps and get ambient light.
+// A colour with a channel of at least this value is a lamp, and gets ambient light.
 const float LAMP = 0.9;
-// The same as a half float holds it.
+// The same, rounded to a half float.
 const float LAMP_IN_HALF = 0.89990234375;
 
 vec3 phong(vec3 colour, float lamp, vec3 n, vec3 position)

@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The sky, looked up by the position on the cube.
+// The sky, sampled in the direction of a point on the cube.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(MESH_BLOCK);

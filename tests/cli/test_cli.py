@@ -174,7 +174,8 @@ def settings_from(*arguments: str) -> Any:
 @pytest.mark.parametrize("kind", METHODS.values(), ids=list(METHODS))
 def test_every_field_of_every_method_is_an_option(kind: type[vkbloom.Settings]) -> None:
     names = {option for parameter in chosen.params for option in parameter.opts}
-    assert names >= {f"--{field.name.replace('_', '-')}" for field in dataclasses.fields(kind)}
+    options = (field.metadata.get("option", field.name) for field in dataclasses.fields(kind))
+    assert names >= {f"--{option.replace('_', '-')}" for option in options}
 
 
 def test_every_method_is_there() -> None:
@@ -444,11 +445,12 @@ def test_render_passes_validation(tmp_path: Path) -> None:
     assert (result.exit_code, result.stderr) == (0, "")
 
 
-def test_validation_is_handed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
-    result = vkb("render", "-o", tmp_path / "out.exr", *SMALL, "--validation")
-    assert result.exit_code == 1
-    assert "validation" in one_line(result.stderr)
+def test_validation_is_handed_on(tmp_path: Path) -> None:
+    # In a process without an instance: one that is there keeps its layers.
+    words = ("render", "-o", str(tmp_path / "out.exr"), *SMALL, "--validation")
+    ended = python("-m", "vkbloom.cli", *words, VK_LAYER_PATH=str(tmp_path))
+    assert ended.returncode == 1
+    assert "validation" in one_line(ended.stderr)
 
 
 @pytest.mark.parametrize(
@@ -508,13 +510,14 @@ def test_no_adapter_is_a_failure(
 # As a process
 
 
-def test_the_process_ends_with_the_status() -> None:
+def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
     done = python("-m", "vkbloom.cli", "adapters", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert len(json.loads(done.stdout)) == len(vkbloom.adapters())
-    failed = python("-m", "vkbloom.cli", "render", "-o", "x.png", "--scene", "/no.gltf")
+    absent = str(tmp_path / "absent.gltf")
+    failed = python("-m", "vkbloom.cli", "render", "-o", "x.png", "--scene", absent)
     assert (failed.returncode, failed.stdout) == (1, "")
-    assert one_line(failed.stderr) == "/no.gltf: No such file or directory\n"
+    assert one_line(failed.stderr) == f"{absent}: No such file or directory\n"
     misused = python("-m", "vkbloom.cli", "render")
     assert (misused.returncode, misused.stdout) == (2, "")
     assert "Missing option" in one_line(misused.stderr)

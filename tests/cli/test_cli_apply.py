@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.cli.processes import python
 from vkbloom.cli.program import program
 from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
@@ -442,12 +443,13 @@ class TestErrors:
         result = run(path, tmp_path / "b.exr", "--validation", "--attachments", "all")
         assert (result.exit_code, result.stderr) == (0, "")
 
-    def test_validation_is_handed_on(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
+    def test_validation_is_handed_on(self, tmp_path: Path) -> None:
+        # In a process without an instance: one that is there keeps its layers.
         path = stored(tmp_path / "a.exr", light(20, 30, 3))
-        result = run(path, tmp_path / "b.exr", "--validation")
-        assert result.exit_code == 1
-        assert "validation" in result.stderr
+        words = ("apply", str(path), str(tmp_path / "b.exr"), "--validation")
+        ended = python("-m", "vkbloom.cli", *words, VK_LAYER_PATH=str(tmp_path))
+        assert ended.returncode == 1
+        assert "validation" in ended.stderr
 
 
 def test_the_help_tells_of_colours() -> None:

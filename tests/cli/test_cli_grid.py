@@ -165,9 +165,13 @@ class TestStores:
         found, expected = (xr.open_zarr(tmp_path / name) for name in ("a.zarr", "b.zarr"))
         np.testing.assert_array_equal(found["final"].values, expected["final"].values)
 
-    def test_an_interrupt_of_all_processes(self, tmp_path: Path, image_file: Path) -> None:
+    def test_an_interrupt_of_all_processes(self, tmp_path: Path) -> None:
         """Ctrl-C on a terminal, which the workers get as well."""
         out = tmp_path / "a.zarr"
+        # 15 GB of pixels: no machine is through when the signal comes.
+        image_file = tmp_path / "a.exr"
+        values = np.random.default_rng(5).random((512, 512, 3), dtype=np.float32)
+        save(Picture.of_values(values, "float"), image_file)
         words = [image_file, "-o", out, "--axis", "exposure=0:1:5000", "--workers", "2"]
         running = subprocess.Popen(
             [sys.executable, "-m", "vkbloom.cli", "grid", *map(str, words)],

@@ -93,21 +93,23 @@ def test_the_table_has_a_line_for_each_finding() -> None:
 
 @linux_only
 @pytest.mark.parametrize("variable", ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"])
-def test_no_driver(without_variables: None, variable: str) -> None:
-    status, answer, findings = examined(**{variable: "/nonexistent"})
+def test_no_driver(without_variables: None, variable: str, tmp_path: Path) -> None:
+    absent = tmp_path / "absent.json"
+    status, answer, findings = examined(**{variable: str(absent)})
     assert (status, answer["can_render"]) == (1, False)
     assert by_topic(findings, "Vulkan loader").status == "ok"
-    manifest = by_topic(findings, "driver nonexistent")
+    manifest = by_topic(findings, "driver absent.json")
     assert manifest.status == "problem"
-    assert f"/nonexistent, from {variable}, cannot be read: No such file" in manifest.found
+    assert f"{absent}, from {variable}, cannot be read: No such file" in manifest.found
     assert by_topic(findings, "adapters").status == "problem"
-    assert f"{variable}=/nonexistent" in by_topic(findings, "environment").found
+    assert f"{variable}={absent}" in by_topic(findings, "environment").found
     assert "test render" not in {finding.topic for finding in findings}
 
 
 @linux_only
-def test_no_driver_in_words(without_variables: None) -> None:
-    ended = python("-m", "vkbloom.cli", "doctor", VK_DRIVER_FILES="/nonexistent")
+def test_no_driver_in_words(without_variables: None, tmp_path: Path) -> None:
+    absent = str(tmp_path / "absent.json")
+    ended = python("-m", "vkbloom.cli", "doctor", VK_DRIVER_FILES=absent)
     assert (ended.returncode, ended.stderr) == (1, "")
     assert ended.stdout.endswith("\nThis machine cannot render. Problems found: 2.\n")
 
@@ -135,9 +137,8 @@ def test_a_broken_driver_beside_one_that_works(
     without_variables: None, tmp_path: Path, lavapipe: Path
 ) -> None:
     missing = tmp_path / "missing.json"
-    missing.write_text(
-        json.dumps({"file_format_version": "1.0.0", "ICD": {"library_path": "/none.so"}})
-    )
+    library = {"library_path": str(tmp_path / "none.so")}
+    missing.write_text(json.dumps({"file_format_version": "1.0.0", "ICD": library}))
     status, answer, findings = examined(VK_DRIVER_FILES=f"{missing}:{lavapipe}")
     assert (status, answer["can_render"]) == (0, True)
     assert by_topic(findings, "driver missing.json").status == "problem"
@@ -205,6 +206,7 @@ def test_no_validation_layer(tmp_path: Path) -> None:
 
 @linux_only
 def test_a_validation_layer_that_does_not_open(tmp_path: Path) -> None:
+    absent = tmp_path / "absent.so"
     (tmp_path / "layer.json").write_text(
         json.dumps(
             {
@@ -212,7 +214,7 @@ def test_a_validation_layer_that_does_not_open(tmp_path: Path) -> None:
                 "layer": {
                     "name": "VK_LAYER_KHRONOS_validation",
                     "type": "GLOBAL",
-                    "library_path": "/none.so",
+                    "library_path": str(absent),
                     "api_version": "1.3.0",
                     "implementation_version": "1",
                     "description": "none",
@@ -268,7 +270,7 @@ def test_wrong_pictures_are_no_rendering(monkeypatch: pytest.MonkeyPatch) -> Non
         (b'{"ICD": {}}', 'its "ICD" has no "library_path"'),
         (b'{"ICD": {"library_path": 5}}', 'its "ICD" has no "library_path"'),
         (b'{"ICD": {"library_path": "a\\u0000b"}}', 'its "ICD" has no "library_path"'),
-        (b'{"ICD": {"library_path": "/none.so"}}', "/none.so: cannot open"),
+        (b'{"ICD": {"library_path": "TMP/none.so"}}', "{tmp}/none.so: cannot open"),
         (b'{"ICD": {"library_path": "./none.so"}}', "{tmp}/none.so: cannot open"),
         (b'{"ICD": {"library_path": "libnone.so"}}', "libnone.so: cannot open"),
         (b'{"ICD": {"library_path": "./driver.json"}}', "{tmp}/driver.json: "),
@@ -279,7 +281,7 @@ def test_a_manifest_that_does_not_work(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, content: bytes, reason: str
 ) -> None:
     manifest = tmp_path / "driver.json"
-    manifest.write_bytes(content)
+    manifest.write_bytes(content.replace(b"TMP", bytes(tmp_path)))
     monkeypatch.setenv("VK_DRIVER_FILES", str(manifest))
     finding = by_topic(drivers.examine(None), "driver driver.json")
     assert finding.status == "problem"
@@ -293,9 +295,8 @@ def test_a_manifest_of_another_architecture(
 ) -> None:
     manifest = tmp_path / "driver.json"
     bits = 32 if sys.maxsize > 2**32 else 64
-    manifest.write_text(
-        json.dumps({"ICD": {"library_path": "/none.so", "library_arch": str(bits)}})
-    )
+    library = {"library_path": str(tmp_path / "none.so"), "library_arch": str(bits)}
+    manifest.write_text(json.dumps({"ICD": library}))
     monkeypatch.setenv("VK_DRIVER_FILES", str(manifest))
     finding = by_topic(drivers.examine(None), "driver driver.json")
     assert finding.status == "note"
@@ -331,16 +332,19 @@ def test_the_search_follows_the_loaders_order(
     ours = [topic for topic in topics if topic.startswith(("driver XDG", "driver added"))]
     assert ours == ["driver added.json", *(f"driver {name}.json" for name in names)]
 
-    monkeypatch.setenv("VK_DRIVER_FILES", "/nonexistent")
-    assert [finding.topic for finding in drivers.examine(None)] == ["drivers", "driver nonexistent"]
+    monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "absent.json"))
+    assert [finding.topic for finding in drivers.examine(None)] == ["drivers", "driver absent.json"]
 
 
 @linux_only
-def test_nowhere_a_manifest(monkeypatch: pytest.MonkeyPatch, without_variables: None) -> None:
-    monkeypatch.setattr(drivers, "_standard_folders", lambda: [Path("/nonexistent/icd.d")])
+def test_nowhere_a_manifest(
+    monkeypatch: pytest.MonkeyPatch, without_variables: None, tmp_path: Path
+) -> None:
+    folder = tmp_path / "icd.d"
+    monkeypatch.setattr(drivers, "_standard_folders", lambda: [folder])
     (finding,) = drivers.examine(None)
     assert finding.status == "problem"
-    assert "/nonexistent/icd.d" in finding.found
+    assert str(folder) in finding.found
     assert "apt install mesa-vulkan-drivers" in finding.advice
 
 
@@ -359,11 +363,12 @@ def test_an_empty_variable_hides_every_driver(monkeypatch: pytest.MonkeyPatch) -
 def test_an_old_loader_knows_the_old_variable_only(
     monkeypatch: pytest.MonkeyPatch,
     without_variables: None,
+    tmp_path: Path,
     version: tuple[int, ...],
     knows: bool,
 ) -> None:
-    monkeypatch.setenv("VK_DRIVER_FILES", "/new.json")
-    monkeypatch.setenv("VK_ICD_FILENAMES", "/old.json")
+    monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "new.json"))
+    monkeypatch.setenv("VK_ICD_FILENAMES", str(tmp_path / "old.json"))
     findings = drivers.examine(version)
     topics = {finding.topic for finding in findings}
     assert ("driver new.json" in topics, "driver old.json" in topics) == (knows, not knows)
@@ -394,18 +399,18 @@ def test_a_driver_that_never_returns_is_reported(monkeypatch: pytest.MonkeyPatch
     ("executable", "failure"),
     [
         ("", "sys.executable is empty"),
-        ("/nonexistent", "/nonexistent does not start: No such file"),
+        ("{tmp}/absent", "{tmp}/absent does not start: No such file"),
         ("/bin/true", "ended without an answer"),
         ("/bin/false", "exit 1"),
     ],
 )
 def test_a_process_that_gives_no_answer(
-    monkeypatch: pytest.MonkeyPatch, executable: str, failure: str
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, executable: str, failure: str
 ) -> None:
-    monkeypatch.setattr(sys, "executable", executable)
+    monkeypatch.setattr(sys, "executable", executable.format(tmp=tmp_path))
     answer = child.ask("loader")
     assert answer.value is None
-    assert failure in answer.failure
+    assert failure.format(tmp=tmp_path) in answer.failure
 
 
 def test_a_question_that_fails_is_answered() -> None:

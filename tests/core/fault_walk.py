@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.core.descriptors import open_descriptors
 from tests.images import picture
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
@@ -140,7 +141,7 @@ def state() -> dict[str, int]:
     _, _, blocks, messages = core.fault_state()
     count = {"blocks": blocks, "messages": messages}
     if Path("/proc/self/fd").is_dir():
-        count["descriptors"] = len(os.listdir("/proc/self/fd"))
+        count["descriptors"] = open_descriptors()
     return count
 
 

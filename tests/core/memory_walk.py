@@ -2,9 +2,9 @@
 
 A small frame, and one whose array is in pages of the renderer's.
 
-CPython's tests can tell its allocators to fail from the n-th request on. The batch of a frame is
-filled, submitted and collected with one request refused: it raises MemoryError or does without, no
-block of the core is left, and the next frame is exact. Runs over a core built with VKBLOOM_FAULTS.
+CPython's tests can tell its allocators to fail from the n-th request on. A frame is planned, run
+and waited for with one request refused: it raises MemoryError or does without, no block of the core
+is left, and the next frame is exact. Runs over a core built with VKBLOOM_FAULTS.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ import _testcapi  # type: ignore[import-not-found]
 from typing import Any
 
 import numpy as np
-from numpy._core.multiarray import get_handler_name
 from numpy.typing import NDArray
 
 from tests.core.fault_walk import SIZE, core, open_renderer
 from tests.images import picture
 from vkbloom import Renderer, Separable
-from vkbloom.renderer import _allocator
+from vkbloom.requests import new_arrays, run_one
 
 BEYOND = 40  # a frame that does without one refused block may stop at the next
 
@@ -28,16 +27,16 @@ def collected(
     renderer: Renderer, image: NDArray[Any], n: int
 ) -> tuple[bool, dict[str, Any] | None]:
     """Return whether request n was refused (0: none is), and the frame, or None after an error."""
-    settings, allocate = Separable(), _allocator(renderer._core, None)
+    settings = Separable()
     result = None
     failed = False
     if n:
         _testcapi.set_nomemory(n - 1, n)
     try:
-        batch = renderer._core.apply(image, ("glow", "final"))
-        batch.add(settings, allocate)
-        batch.submit()
-        result = batch.collect()[0][0]
+        source = core.image_source(image)
+        plan = renderer._core.plan(source, settings, ("glow", "final"))
+        arrays = new_arrays(renderer._core, plan)
+        result = run_one(renderer._core, source, plan, arrays).arrays
     except MemoryError:
         failed = True
     finally:
@@ -59,7 +58,6 @@ def walk(image: NDArray[Any]) -> tuple[int, int]:
         while beyond < BEYOND:
             n += 1
             failed, result = collected(renderer, image, n)
-            assert get_handler_name() == "default_allocator"
             refused += failed
             beyond = 0 if failed else beyond + 1
             for frame in (result, collected(renderer, image, 0)[1]):

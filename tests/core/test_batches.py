@@ -24,7 +24,8 @@ from vkbloom import (
     _core,
     requests,
 )
-from vkbloom.renderer import _scene_arrays
+from vkbloom.requests import new_arrays
+from vkbloom.sources import scene_arguments
 
 SIZE = (64, 36)
 
@@ -82,50 +83,51 @@ def test_scenes_one_by_one_and_many(
         assert list(got.timings) == list(right.timings)
 
 
-@pytest.mark.parametrize("points", [1, 2, 5])
-def test_frames_that_fill_a_batch_alone(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, points: int
+class CountingCore:
+    """A renderer's core that notes how many plans it is given at once, and their bytes."""
+
+    def __init__(self, core: _core.Renderer) -> None:
+        self.core = core
+        self.counts: list[int] = []
+        self.sizes: list[int] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.core, name)
+
+    def run(self, source: Any, plans: Any, arrays: Any) -> _core.Submission:
+        self.counts.append(len(plans))
+        self.sizes.append(sum(plan.size for plan in plans))
+        return self.core.run(source, plans, arrays)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 5])
+def test_frames_that_fill_a_submission_alone(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, frames: int
 ) -> None:
     image = picture(33, 21, 4, seed=2)
-    monkeypatch.setattr(requests, "BYTES", points * image.nbytes)
+    monkeypatch.setattr(requests, "BYTES", frames * image.nbytes)
     monkeypatch.setattr(requests, "SECONDS", 1e6)
-    sizes = []
-
-    def open_batch() -> Any:
-        batch = renderer._core.apply(image, ("final",))
-        sizes.append(batch)
-        return batch
-
+    counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=exposure / 8) for exposure in range(20)]
-    results = list(requests.run(settings, open_batch, lambda _, *array: np.empty(*array)))
+    results = list(requests.run(settings, counting, _core.image_source(image), ("final",)))
     assert len(results) == 20
-    assert max(batch.size for batch in sizes) == points * image.nbytes
-    for point, (arrays, _, _) in results:
-        np.testing.assert_array_equal(arrays["final"], renderer.apply(image, point)["final"])
+    assert max(counting.sizes) == frames * image.nbytes
+    for one, (arrays, _, _) in results:
+        np.testing.assert_array_equal(arrays["final"], renderer.apply(image, one)["final"])
 
 
-@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, requests.POINTS)])
-def test_a_batch_is_as_long_as_a_wait_may_be(
+@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, requests.REQUESTS)])
+def test_a_submission_is_as_long_as_a_wait_may_be(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
 ) -> None:
     image = picture(33, 21, 4, seed=2)
     monkeypatch.setattr(requests, "SECONDS", seconds)
-    counts: list[int] = []
-
-    def open_batch() -> Any:
-        counts.append(0)
-        return renderer._core.apply(image, ("final",))
-
-    def allocate(_: str, *array: Any) -> Any:
-        counts[-1] += 1
-        return np.empty(*array)
-
+    counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=step / 8) for step in range(100)]
-    results = list(requests.run(settings, open_batch, allocate))
-    assert [point for point, _ in results] == settings
-    # The first one goes alone, whatever it takes.
-    assert max(counts) == most
-    assert sum(counts) == len(settings)
+    results = list(requests.run(settings, counting, _core.image_source(image), ("final",)))
+    assert [one for one, _ in results] == settings
+    assert max(counting.counts) == most
+    assert sum(counting.counts) == len(settings)
 
 
 def test_arrays_are_the_takers(renderer: Renderer) -> None:
@@ -134,7 +136,6 @@ def test_arrays_are_the_takers(renderer: Renderer) -> None:
     kept = frames[0]["final"].copy()
     for one in frames:
         for array in one.values():
-            assert array.flags.owndata
             assert array.flags.writeable
     for one in frames[1:]:
         one["final"][:] = 0
@@ -167,15 +168,15 @@ def test_settings_are_taken_a_bounded_way_ahead(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, slow: int
 ) -> None:
     taken = collected = 0
-    took = requests._Points.took
+    took = requests._Requests.took
 
-    def took_long(points: Any, seconds: float, count: int) -> None:
+    def took_long(waiting: Any, seconds: float, count: int) -> None:
         # The first batches, on whose time the next ones' size depends.
         nonlocal collected
         collected += 1
-        took(points, 1e6 if collected <= slow else seconds, count)
+        took(waiting, 1e6 if collected <= slow else seconds, count)
 
-    monkeypatch.setattr(requests._Points, "took", took_long)
+    monkeypatch.setattr(requests._Requests, "took", took_long)
 
     def endless() -> Iterator[Settings]:
         nonlocal taken
@@ -187,7 +188,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
     assert taken == 0
     next(frames)
     assert taken == 1
-    limit = (requests.AHEAD + 1) * requests.POINTS
+    limit = (requests.AHEAD + 1) * requests.REQUESTS
     for given in range(2, 300):
         next(frames)
         assert given <= taken <= given + limit
@@ -376,40 +377,51 @@ def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) 
 # The core's errors: from a device that fails where it is told to
 
 
-class FailingBatch:
-    """A batch whose submission fails where it holds one of the settings given."""
+class Planned:
+    """A plan without framebuffers."""
+
+    outputs = ()
+    size = 0
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+
+    def shares_images(self, other: Planned) -> bool:
+        return True
+
+
+class Submitted:
+    def __init__(self, plans: tuple[Planned, ...]) -> None:
+        self.plans = plans
+
+    def wait(self) -> Any:
+        return [{str(plan.settings.exposure): 0.0} for plan in self.plans], (0, 0)
+
+
+class FailingCore:
+    """A core whose submission fails where it holds one of the settings given."""
 
     def __init__(self, failing: dict[Settings, Exception]) -> None:
         self.failing = failing
-        self.settings: list[Settings] = []
-        self.size = 0
 
-    def add(self, settings: Settings, _: object) -> bool:
-        self.settings.append(settings)
-        return True
+    def plan(self, _: object, settings: Settings, __: object) -> Planned:
+        return Planned(settings)
 
-    def submit(self) -> None:
-        for settings in self.settings:
-            if settings in self.failing:
-                raise self.failing[settings]
-
-    def collect(self) -> list[Any]:
-        return [(settings, {}, (0, 0)) for settings in self.settings]
+    def run(self, _: object, plans: tuple[Planned, ...], __: object) -> Submitted:
+        for plan in plans:
+            if plan.settings in self.failing:
+                raise self.failing[plan.settings]
+        return Submitted(plans)
 
 
 def run_failing(
     settings: list[Settings], failing: dict[Settings, Exception]
 ) -> tuple[list[Any], Exception | None]:
     results: list[Any] = []
-
-    def open_batch() -> Any:
-        return FailingBatch(failing)
-
-    def allocate(*_: object) -> Any:
-        raise AssertionError
-
+    core: Any = FailingCore(failing)
+    nothing: Any = None
     try:
-        for result in requests.run(settings, open_batch, allocate):
+        for result in requests.run(settings, core, nothing, None):
             results.append(result)
     except Exception as error:
         return results, error
@@ -423,7 +435,8 @@ def test_a_setting_that_the_device_cannot_run(place: int) -> None:
     results, error = run_failing(settings, {settings[place]: blame})
     assert error is blame
     assert [point for point, _ in results] == settings[:place]
-    assert [arrays for _, (arrays, _, _) in results] == settings[:place]
+    timed = [list(timings) for _, (_, timings, _) in results]
+    assert timed == [[str(one.exposure)] for one in settings[:place]]
 
 
 @pytest.mark.parametrize("kind", [_core.ValidationError, _core.DeviceLostError, ValueError])
@@ -455,63 +468,63 @@ def test_nothing_fails() -> None:
     assert [point for point, _ in results] == settings
 
 
-# The core's own type
+# The core's own types
 
 
-def test_a_batch_is_submitted_and_collected_once(renderer: Renderer) -> None:
-    def allocate(_: str, shape: tuple[int, ...], dtype: str) -> Any:
-        return np.empty(shape, dtype)
+def submitted(
+    renderer: Renderer, source: _core.Source, settings: Sequence[Settings]
+) -> tuple[_core.Submission, tuple[Any, ...]]:
+    core = renderer._core
+    plans = tuple(core.plan(source, one, None) for one in settings)
+    arrays = tuple(new_arrays(core, plan) for plan in plans)
+    return core.run(source, plans, arrays), arrays
 
-    batch = renderer._core.apply(picture(8, 8, 4, seed=20), None)
-    with pytest.raises(RuntimeError):
-        batch.submit()
-    assert batch.add(Separable(), allocate)
-    assert batch.add(Separable(blur_strength=1.0), allocate)
-    # Other images: they are made when nothing uses the old ones.
-    assert not batch.add(Separable(bloom_size=(3, 3)), allocate)
-    with pytest.raises(RuntimeError):
-        batch.collect()
-    batch.submit()
-    with pytest.raises(RuntimeError):
-        batch.submit()
-    with pytest.raises(RuntimeError):
-        batch.add(Separable(), allocate)
-    assert len(batch.collect()) == 2
-    for again in (batch.collect, batch.submit):
-        with pytest.raises(RuntimeError):
-            again()
-    with pytest.raises(TypeError):
-        type(batch)()
+
+def test_a_submission_is_waited_for_once(renderer: Renderer) -> None:
+    source = _core.image_source(picture(8, 8, 4, seed=20))
+    both = [Separable(), Separable(blur_strength=1.0)]
+    submission, _ = submitted(renderer, source, both)
+    assert len(submission.wait()[0]) == 2
+    with pytest.raises(RuntimeError, match="waited for once"):
+        submission.wait()
+
+
+def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
+    image = picture(8, 8, 4, seed=22)
+    source, core = _core.image_source(image), renderer._core
+    plan = core.plan(source, Separable(), ("final",))
+    first, second = new_arrays(core, plan), new_arrays(core, plan)
+    (ran, again), _ = core.run(source, (plan, plan), (first, second)).wait()
+    assert "final" in ran
+    assert again == {}
+    for (array,) in (first, second):
+        np.testing.assert_array_equal(array, renderer.apply(image)["final"])
 
 
 def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
     # Scenes cannot have them; the device must never.
-    serial, (vertices, indices, *mesh), *others = _scene_arrays(scene)
+    arrays, *others = scene_arguments(scene, SIZE, "forward", 0.0)
+    serial, (vertices, indices, *mesh), *rest = arrays
     wrong = indices.copy()
     wrong[-1] = len(vertices)
-    camera = ((0.0, 0.0, -10.0), (0.0, 0.0, 0.0), 45.0, 0.1, 256.0)
-    arguments = (camera, SIZE, "forward", 0.0, 1.0, None)
     right = renderer.render(scene, None, SIZE)
-    batch = renderer._core.render((2**63, (vertices, wrong, *mesh), *others), *arguments)
-    batch.add(Separable(), lambda _, shape, dtype: np.empty(shape, dtype))
+    source = _core.scene_source((2**63, (vertices, wrong, *mesh), *rest), *others)
     with pytest.raises(ValueError, match=f"index {len(vertices)} is beyond the mesh's"):
-        batch.submit()
+        submitted(renderer, source, [Separable()])
     assert_same(renderer.render(scene, None, SIZE), right)
     assert serial != 2**63
 
 
-def test_a_batch_of_a_closed_renderer() -> None:
-    def allocate(_: str, shape: tuple[int, ...], dtype: str) -> Any:
-        return np.empty(shape, dtype)
-
+def test_a_submission_of_a_closed_renderer() -> None:
     renderer = vkbloom.Renderer(validation=True)
-    waiting, flying = (renderer._core.apply(picture(8, 8, 4, seed=21), None) for _ in range(2))
-    for batch in (waiting, flying):
-        batch.add(Separable(), allocate)
-    flying.submit()
+    core, source = renderer._core, _core.image_source(picture(8, 8, 4, seed=21))
+    plan = core.plan(source, Separable(), None)
+    arrays = new_arrays(core, plan)
+    submission, _ = submitted(renderer, source, [Separable()])
     renderer.close()
-    for call in (waiting.submit, flying.collect):
-        with pytest.raises(ValueError, match="closed"):
-            call()
     with pytest.raises(ValueError, match="closed"):
-        renderer._core.apply(picture(8, 8, 4, seed=21), None).add(Separable(), allocate)
+        submission.wait()
+    with pytest.raises(ValueError, match="closed"):
+        core.run(source, (plan,), (arrays,))
+    with pytest.raises(ValueError, match="closed"):
+        core.plan(source, Separable(), None)

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.planned import scene_plan, scene_source
 from vkbloom import Renderer, Scene, Separable, _core
-from vkbloom.renderer import _render_arguments
+from vkbloom.sources import scene_arguments
 
 METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "unreal")
 
@@ -63,7 +64,7 @@ def settings_with(**fields: Any) -> object:
 )
 def test_settings(fields: dict[str, Any], message: str) -> None:
     with pytest.raises((TypeError, ValueError), match=message):
-        _core.describe(settings_with(**fields), (16, 16), True, "forward")
+        scene_plan(settings_with(**fields), (16, 16))
 
 
 @pytest.mark.parametrize("name", sorted(_core.VALUES))
@@ -71,7 +72,7 @@ def test_every_number_has_a_range(name: str) -> None:
     _, low, high = _core.VALUES[name]
     for wrong in (low - 1, high + 1, np.nextafter(low, -np.inf), np.inf, -np.inf, np.nan, 1e300):
         with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
-            _core.describe(settings_with(**{name: float(wrong)}), (16, 16), True, "forward")
+            scene_plan(settings_with(**{name: float(wrong)}), (16, 16))
 
 
 @pytest.mark.parametrize("method", ["pyramid", "dual_kawase", *METHODS])
@@ -83,7 +84,7 @@ def test_the_ends_of_all_ranges_together(method: str, side: int) -> None:
         settings = settings_with(method=method, **{**fields, "bloom": 1})
         for size in ((side, side), (side, 1), (1, side)):
             try:
-                _core.describe(settings, size, True, "deferred")
+                scene_plan(settings, size, shading="deferred")
             except ValueError as error:
                 assert "out of this adapter's range" in str(error)  # noqa: PT017
 
@@ -93,21 +94,21 @@ def test_a_separable_blur_has_weights_and_layers(missing: str) -> None:
     settings = settings_with()
     delattr(settings, missing)
     with pytest.raises(ValueError, match=f"{missing}: a separable blur needs them"):
-        _core.describe(settings, (16, 16), True, "forward")
+        scene_plan(settings, (16, 16))
 
 
 def test_objects_of_one_type_may_differ_in_attributes() -> None:
     """Once the first object of a type settled which attributes were read of all others."""
-    _core.describe(settings_with(), (16, 16), True, "forward")
+    scene_plan(settings_with(), (16, 16))
     with pytest.raises(ValueError, match="loops: 17 is out of range"):
-        _core.describe(settings_with(loops=17), (16, 16), True, "forward")
+        scene_plan(settings_with(loops=17), (16, 16))
 
 
 def test_types_of_settings_are_not_kept() -> None:
     class Passing(Given):
         method = "pyramid"
 
-    _core.describe(Passing(), (16, 16), True, "forward")
+    scene_plan(Passing(), (16, 16))
     kept = weakref.ref(Passing)
     del Passing
     gc.collect()
@@ -123,7 +124,7 @@ def test_an_error_in_a_property_is_not_hidden() -> None:
             return self.nowhere  # type: ignore[attr-defined,no-any-return]
 
     with pytest.raises(AttributeError, match="nowhere"):
-        _core.describe(Failing(), (16, 16), True, "forward")
+        scene_plan(Failing(), (16, 16))
 
 
 def test_settings_that_raise() -> None:
@@ -135,51 +136,49 @@ def test_settings_that_raise() -> None:
             raise OSError("no disk")
 
     with pytest.raises(OSError, match="no disk"):
-        _core.describe(Given(), (16, 16), True, "forward")
+        scene_plan(Given(), (16, 16))
     with pytest.raises(AttributeError, match="method"):
-        _core.describe(object(), (16, 16), True, "forward")
+        scene_plan(object(), (16, 16))
 
 
 BEYOND_32_BITS = [2**32, 2**32 + 16, 2**64 + 16, 2**128, -1, -(2**32) + 16]
 
 
 @pytest.mark.parametrize("side", BEYOND_32_BITS)
-def test_sizes_are_not_taken_modulo_2_to_the_32(
-    renderer: Renderer, scene: Scene, side: int
-) -> None:
+def test_sizes_are_not_taken_modulo_2_to_the_32(scene: Scene, side: int) -> None:
     """Once 2**32 + 16 was a side of 16."""
-    arrays, camera, _, *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+    arrays, camera, _, *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     for size in ((side, 16), (16, side)):
         with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
-            _core.describe(Separable(), size, True, "forward")
+            scene_plan(Separable(), size)
         with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
-            _core.describe(settings_with(bloom_size=size), (16, 16), True, "forward")
+            scene_plan(settings_with(bloom_size=size), (16, 16))
         with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
-            renderer._core.render(arrays, camera, size, *rest)
+            _core.scene_source(arrays, camera, size, *rest)
     serial, body, *others = arrays
     for surface in ((side, 0, 0), (0, side, 0), (0, 0, side)):
         wrong = (serial, (*body[:4], (surface,)), *others)
         with pytest.raises(ValueError, match="is out of range, 0 to 4294967295"):
-            renderer._core.render(wrong, camera, (8, 8), *rest)
+            _core.scene_source(wrong, camera, (8, 8), *rest)
 
 
 def test_sides_that_are_no_whole_numbers() -> None:
     with pytest.raises(TypeError, match="is not a whole number"):
-        _core.describe(Separable(), (16.5, 16), True, "forward")  # type: ignore[arg-type]
+        scene_plan(Separable(), (16.5, 16))
 
 
 @pytest.mark.parametrize("serial", [0, -1, 2**64, 2**64 + 1])
-def test_serials_have_64_bits(renderer: Renderer, scene: Scene, serial: int) -> None:
-    (_, *others), *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+def test_serials_have_64_bits(scene: Scene, serial: int) -> None:
+    (_, *others), *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     with pytest.raises((ValueError, OverflowError)):
-        renderer._core.render((serial, *others), *rest)
+        _core.scene_source((serial, *others), *rest)
 
 
 def test_shadings_and_sizes() -> None:
     with pytest.raises(ValueError, match="shading: there is no toon"):
-        _core.describe(Separable(), (16, 16), True, "toon")
+        scene_plan(Separable(), (16, 16), shading="toon")
     with pytest.raises(TypeError):
-        _core.describe(Separable(), 16, True, "forward")  # type: ignore[arg-type]
+        scene_plan(Separable(), 16)
 
 
 @pytest.mark.parametrize(
@@ -194,85 +193,151 @@ def test_shadings_and_sizes() -> None:
     ],
     ids=str,
 )
-def test_images(renderer: Renderer, array: Any) -> None:
+def test_images(array: Any) -> None:
     with pytest.raises((TypeError, ValueError)):
-        renderer._core.apply(array, None)
+        _core.image_source(array)
 
 
-def test_arrays_of_the_wrong_size(renderer: Renderer) -> None:
-    batch = renderer._core.apply(np.zeros((4, 4, 3), np.uint8), None)
+IMAGE = np.zeros((4, 4, 3), np.uint8)
+
+
+def planned(renderer: Renderer, *settings: object) -> tuple[_core.Source, tuple[_core.Plan, ...]]:
+    source = _core.image_source(IMAGE)
+    return source, tuple(renderer._core.plan(source, one, None) for one in settings)
+
+
+def arrays_for(*plans: _core.Plan) -> tuple[tuple[np.ndarray[Any, Any], ...], ...]:
+    return tuple(
+        tuple(np.empty(shape, dtype) for _, shape, dtype in plan.outputs) for plan in plans
+    )
+
+
+def test_arrays_of_the_wrong_size_or_number(renderer: Renderer) -> None:
+    source, plans = planned(renderer, Separable())
+    (right,) = arrays_for(*plans)
     with pytest.raises(ValueError, match="glow: the array has the wrong size"):
-        batch.add(Separable(), lambda name, shape, dtype: np.zeros(3, dtype))
-    with pytest.raises(RuntimeError, match="without points"):
-        batch.submit()
-    with pytest.raises(RuntimeError, match="collected once"):
-        batch.collect()
+        renderer._core.run(source, plans, ((np.zeros(3, np.uint8), *right[1:]),))
+    for wrong in (right[1:], (*right, right[0])):
+        with pytest.raises(ValueError, match=f"arrays: {len(wrong)} for 4 framebuffers"):
+            renderer._core.run(source, plans, (wrong,))
+    for arrays in ((), (right, right)):
+        with pytest.raises(ValueError, match="one is needed for each"):
+            renderer._core.run(source, plans, arrays)
+    with pytest.raises(ValueError, match="one is needed for each"):
+        renderer._core.run(source, (), ())
+    with pytest.raises(TypeError, match="arrays: a tuple is needed"):
+        renderer._core.run(source, plans, (list(right),))  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="a tuple of Plans"):
+        renderer._core.run(source, (Separable(),), (right,))  # type: ignore[arg-type]
+    read_only = np.empty_like(right[0])
+    read_only.flags.writeable = False
+    with pytest.raises(ValueError, match="read-only"):
+        renderer._core.run(source, plans, ((read_only, *right[1:]),))
 
 
-def _filled(name: str, shape: tuple[int, ...], dtype: str) -> np.ndarray[Any, Any]:
-    return np.empty(shape, dtype)
+def test_plans_of_another_source_or_renderer(renderer: Renderer, scene: Scene) -> None:
+    """Whatever the graph is for must be there when it runs."""
+    source, plans = planned(renderer, Separable())
+    arrays = arrays_for(*plans)
+    of_scene = _core.scene_source(*scene_arguments(scene, (4, 4), "forward", 0.0))
+    for other in (of_scene, _core.image_source(np.zeros((4, 5, 3), np.uint8))):
+        with pytest.raises(ValueError, match="made for another source"):
+            renderer._core.run(other, plans, arrays)
+    without_sky = scene_source((4, 4), has_sky=False)
+    plan = renderer._core.plan(of_scene, Separable(), None)
+    with pytest.raises(ValueError, match="made for another source"):
+        renderer._core.run(without_sky, (plan,), arrays_for(plan))
+    with Renderer() as other_renderer, pytest.raises(ValueError, match="another renderer"):
+        other_renderer._core.run(source, plans, arrays)
+    looked_at = _core.plan(source, Separable(), None, "fragment")
+    with pytest.raises(ValueError, match="another renderer"):
+        renderer._core.run(source, (looked_at,), arrays_for(looked_at))
+
+
+def test_plans_with_other_images(renderer: Renderer) -> None:
+    source, plans = planned(renderer, Separable(), Separable(bloom_size=(3, 3)))
+    assert not plans[0].shares_images(plans[1])
+    with pytest.raises(ValueError, match="not all have the same images"):
+        renderer._core.run(source, plans, arrays_for(*plans))
+    with pytest.raises(TypeError, match="a Plan is needed"):
+        plans[0].shares_images(source)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("names", [["final"], "final", 5], ids=str)
 def test_names_that_are_no_tuple(renderer: Renderer, names: Any) -> None:
     with pytest.raises(TypeError, match="attachments: a tuple is needed"):
-        renderer._core.apply(np.zeros((4, 4, 3), np.uint8), names)
+        renderer._core.plan(_core.image_source(IMAGE), Separable(), names)
 
 
-@pytest.mark.parametrize("points", [0, 1, 8])
-def test_a_batch_is_not_filled_from_its_own_allocations(renderer: Renderer, points: int) -> None:
-    """Once the points were written past the end of their memory."""
-    batch = renderer._core.apply(np.zeros((4, 4, 3), np.uint8), None)
+def test_settings_that_close_the_renderer() -> None:
+    renderer = Renderer()
 
-    def allocate(name: str, shape: tuple[int, ...], dtype: str) -> np.ndarray[Any, Any]:
-        with pytest.raises(RuntimeError, match="a point is being added"):
-            batch.add(Separable(bloom=False), _filled)
-        with pytest.raises(RuntimeError, match="a point is being added"):
-            batch.submit()
-        return np.empty(shape, dtype)
-
-    for exposure in range(points):
-        batch.add(Separable(exposure=exposure), _filled)
-    batch.add(Separable(), allocate)
-    batch.submit()
-    assert len(batch.collect()) == points + 1
-
-
-def test_settings_that_submit_the_batch(renderer: Renderer) -> None:
-    batch = renderer._core.apply(np.zeros((4, 4, 3), np.uint8), None)
-    batch.add(Separable(), _filled)
-
-    class Given:
+    class Closing(Given):
         method = "pyramid"
 
         @property
         def exposure(self) -> float:
-            batch.submit()
+            renderer.close()
             return 0.0
 
-    with pytest.raises(RuntimeError, match="submitted before"):
-        batch.add(Given(), _filled)
-    assert len(batch.collect()) == 1
+    with pytest.raises(ValueError, match="closed"):
+        renderer._core.plan(_core.image_source(IMAGE), Closing(), None)
 
 
-def test_a_batch_is_collected_by_one_thread(renderer: Renderer) -> None:
+def test_variants_that_are_none() -> None:
+    with pytest.raises(ValueError, match="quick is not one of auto, fragment, cpu, gpu"):
+        _core.plan(_core.image_source(IMAGE), Separable(), None, "quick")
+
+
+@pytest.mark.parametrize("size", [0, -1, 2**62])
+def test_pages_of_no_size(renderer: Renderer, size: int) -> None:
+    with pytest.raises((ValueError, MemoryError)):
+        renderer._core.pages(size)
+
+
+def test_types_that_only_the_core_makes(renderer: Renderer) -> None:
+    source, plans = planned(renderer, Separable())
+    submission = renderer._core.run(source, plans, arrays_for(*plans))
+    for made in (source, *plans, submission, renderer._core.pages(5)):
+        with pytest.raises(TypeError, match="cannot create"):
+            type(made)()
+    submission.wait()
+
+
+def test_the_collector_sees_what_is_held(renderer: Renderer) -> None:
+    """Each type tells the collector what it refers to."""
+    source, plans = planned(renderer, Separable())
+    arrays = arrays_for(*plans)
+    submission = renderer._core.run(source, plans, arrays)
+    assert any(held is IMAGE for held in gc.get_referents(source))
+    assert plans[0].outputs in gc.get_referents(plans[0])
+    held = gc.get_referents(submission)
+    assert renderer._core in held
+    assert plans in held
+    assert sum(any(array is one for one in held) for array in arrays[0]) == 4
+    for made in (renderer._core, source, *plans, submission):
+        assert gc.is_tracked(made)
+    submission.wait()
+
+
+def test_a_submission_is_waited_for_by_one_thread(renderer: Renderer) -> None:
     image = np.random.default_rng(3).random((80, 80, 4), np.float32)
     # So that all threads wait for the renderer at once: 65 x 65 taps a pixel take a while.
     slow = Separable(weights=(1 / 65,) * 33, direct=True, blur_scale=0.5)
 
-    def collect(batch: _core.Batch, counts: list[int]) -> None:
+    def wait(submission: _core.Submission, counts: list[int]) -> None:
         try:
-            counts.append(len(batch.collect()))
+            counts.append(len(submission.wait()[0]))
         except RuntimeError:
             counts.append(0)
 
+    source = _core.image_source(image)
     for exposure in range(2):
-        batch = renderer._core.apply(image, None)
-        batch.add(Separable(exposure=exposure), _filled)
-        batch.submit()
+        plan = renderer._core.plan(source, Separable(exposure=exposure), None)
+        submission = renderer._core.run(source, (plan,), arrays_for(plan))
         counts: list[int] = []
         threads = [threading.Thread(target=renderer.apply, args=(image + exposure, slow))]
-        threads += [threading.Thread(target=collect, args=(batch, counts)) for _ in range(3)]
+        threads += [threading.Thread(target=wait, args=(submission, counts)) for _ in range(3)]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -280,8 +345,8 @@ def test_a_batch_is_collected_by_one_thread(renderer: Renderer) -> None:
         assert sorted(counts) == [0, 0, 1]
 
 
-def test_scenes(renderer: Renderer, scene: Scene) -> None:
-    arrays, *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+def test_scenes(scene: Scene) -> None:
+    arrays, *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     serial, body, glow, sky, textures = arrays
     wrong = [
         (serial, (body[0].astype(np.float64), *body[1:]), glow, sky, textures),
@@ -301,16 +366,16 @@ def test_scenes(renderer: Renderer, scene: Scene) -> None:
     ]
     for given in wrong:
         with pytest.raises((TypeError, ValueError)):
-            renderer._core.render(given, *rest)
+            _core.scene_source(given, *rest)
 
 
-def test_more_indices_than_32_bits_count(renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
-    arrays, *rest = _render_arguments(scene, (8, 8), "forward", 0.0, "all")
+def test_more_indices_than_32_bits_count(scene: Scene, tmp_path: Path) -> None:
+    arrays, *rest = scene_arguments(scene, (8, 8), "forward", 0.0)
     serial, body, glow, sky, textures = arrays
     # A file of a hole takes no room. In 32 bits there would be three indices.
     indices = np.memmap(tmp_path / "indices", np.uint32, "w+", shape=(2**32 + 3,))
     with pytest.raises(ValueError, match="scene: 4294967299 indices are out of range"):
-        renderer._core.render((serial, (body[0], indices, *body[2:]), glow, sky, textures), *rest)
+        _core.scene_source((serial, (body[0], indices, *body[2:]), glow, sky, textures), *rest)
 
 
 def test_a_renderer_takes_no_keywords() -> None:
@@ -319,11 +384,11 @@ def test_a_renderer_takes_no_keywords() -> None:
         make("auto", validation=True)
     for seconds in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match="frame_seconds: a number above 0 is needed"):
-            _core.Renderer("auto", True, "auto", seconds, _no_cache)
+            _core.Renderer("auto", "", True, "auto", seconds, _no_cache)
     with pytest.raises(OSError, match="no cache"):
-        _core.Renderer("auto", True, "auto", 1.0, _no_cache)
+        _core.Renderer("auto", "", True, "auto", 1.0, _no_cache)
     with pytest.raises(TypeError):
-        _core.Renderer("auto", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
+        _core.Renderer("auto", "", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
 
 
 def _no_cache(uuid: bytes) -> bytes | None:

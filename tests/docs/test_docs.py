@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from vkbloom import Renderer, Scene, Separable
 from vkbloom.cli.program import program
 from vkbloom.io.image_writing import save
 from vkbloom.io.images import Picture
@@ -109,3 +110,11 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if not target.startswith(("http:", "https:", "#")):
             assert (page.parent / target.partition("#")[0]).exists(), target
+
+
+def test_the_flowchart_is_the_plan_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    """tools/docs_pictures.py writes it."""
+    monkeypatch.setenv("VKBLOOM_FORM", "fragment")
+    with Renderer() as renderer:
+        plan = renderer.plan(Scene.ufo(), Separable(), (640, 360))
+    assert blocks(ROOT / "docs" / "plans.md", "mermaid") == [plan.to_mermaid() + "\n"]

@@ -60,8 +60,12 @@ class TestControls:
             defaults = METHODS[name]().as_dict()
             without = set(defaults) - set(fields)
             refused = {
+                "blender": {"knee"},
                 "filament": {"knee"},
+                "godot": {"knee", "level_weights"},
                 "hdrp": {"knee", "threshold"},
+                "pygfx": {"knee", "threshold"},
+                "pyramid": {"level_weights"},
                 "separable": {"weights", "layers"},
                 "unreal": {"knee"},
             }

@@ -16,6 +16,7 @@ from vkbloom import (
     FilamentBloom,
     HdrpBloom,
     KinoBloom,
+    PygfxBloom,
     Pyramid,
     Renderer,
     Scene,
@@ -52,7 +53,7 @@ def tolerance(name: str, expected: Array, format: str, settings: Settings, downs
         # in flat areas, each of ten times in the same direction.
         levels = 3.0 if isinstance(settings, UnrealBloom) else 2.0
         # A bloom that is a sum multiplies the error of the means it is made from.
-        sums: dict[type[Settings], int] = {KinoBloom: downs, UnrealBloom: 3}
+        sums: dict[type[Settings], int] = {KinoBloom: downs, PygfxBloom: downs, UnrealBloom: 3}
         if name in ("bloom", "final"):
             levels *= sums.get(type(settings), 1)
         if name == "final":

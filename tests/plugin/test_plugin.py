@@ -11,10 +11,6 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-# Here, as an inner run forgets what it imported, and these cannot be imported twice.
-import skimage.metrics  # noqa: F401
-
-import vkbloom.testing.report  # noqa: F401
 from vkbloom.testing import read_frame
 from vkbloom.testing.references import cpu_vendor
 from vkbloom.testing.regression import name_of_test

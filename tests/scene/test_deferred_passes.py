@@ -15,6 +15,7 @@ from tests.core.dependencies import (
     READ_BEFORE_WRITE,
     WRITE_BEFORE_READ,
 )
+from tests.planned import dependencies, rows, scene_plan
 from tests.scene.deferred_frames import BLURRED, GBUFFER, LIT, SIZE, deferred, rgb
 from vkbloom import Renderer, Scene, Separable, Settings, _core, presets
 
@@ -82,38 +83,35 @@ def test_shadings_take_turns(renderer: Renderer, scene: Scene) -> None:
 # The graph
 
 
-def describe(settings: Settings) -> dict[str, Any]:
-    return _core.describe(settings, (1280, 720), True, "deferred")
+def describe(settings: Settings) -> _core.Plan:
+    return scene_plan(settings, shading="deferred")
 
 
 def test_the_passes() -> None:
-    passes = describe(Separable())["passes"]
-    assert [(row["name"], row["reads"], row["targets"]) for row in passes] == [
-        ("glow", [], ["glow", "glow_depth"]),
-        ("skybox", [], GBUFFER),
-        ("gbuffer", [], GBUFFER),
-        ("glow_light", ["glow"], GBUFFER),
-        ("blur_vertical", ["brightness"], ["blur_vertical"]),
-        ("bloom", ["blur_vertical"], ["bloom"]),
-        ("scene", GBUFFER[:4], ["scene"]),
-        ("final", ["scene", "bloom"], ["final"]),
+    passes = rows(describe(Separable()))
+    # A render pass is timed under the name of the first image that it writes.
+    assert [row[:4] for row in passes] == [
+        ("glow", "glow_frag", (), ("glow", "glow_depth")),
+        ("albedo", "gbuffer_sky_frag", (), tuple(GBUFFER)),
+        ("albedo", "gbuffer_body_frag", (), tuple(GBUFFER)),
+        ("albedo", "gbuffer_glow_frag", ("glow",), tuple(GBUFFER)),
+        ("blur_vertical", "blur_frag", ("brightness",), ("blur_vertical",)),
+        ("bloom", "blur_frag", ("blur_vertical",), ("bloom",)),
+        ("scene", "lighting_frag", tuple(GBUFFER[:4]), ("scene",)),
+        ("final", "composite_frag", ("scene", "bloom"), ("final",)),
     ]
     # One render pass for all of the G-buffer.
-    assert [row["render_pass"] for row in passes] == [0, 1, 1, 1, 2, 3, 4, 5]
+    assert [row.render_pass for row in passes] == [0, 1, 1, 1, 2, 3, 4, 5]
 
 
 def test_the_last_pass_waits_for_the_second_blur() -> None:
-    graph = describe(presets["deferred"])
-    by_name = {row["name"]: row["render_pass"] for row in graph["passes"]}
-    assert [tuple(row) for row in graph["dependencies"][by_name["bloom"]]] == [
+    assert dependencies(describe(presets["deferred"]), "bloom") == [
         READ_BEFORE_WRITE,
         WRITE_BEFORE_READ,
     ]
 
 
 def test_the_blurs_and_the_light_wait_for_the_gbuffer() -> None:
-    graph = describe(Separable())
-    (number,) = {row["render_pass"] for row in graph["passes"] if row["name"] == "gbuffer"}
-    after = [row for row in graph["dependencies"][number] if row[0] == 0]
+    after = [row for row in dependencies(describe(Separable()), "albedo") if row[0] == 0]
     assert len(after) == 1
     assert after[0][2:4] == (COLOR_OUTPUT, FRAGMENT_SHADER)

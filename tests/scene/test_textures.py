@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from tests.scene.deferred_frames import rgb
 from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
-from vkbloom import Frames, Renderer, Scene, Separable, reference
+from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
+from vkbloom.requests import new_arrays
 from vkbloom.scene import Mesh
 from vkbloom.scene.textures import WHITE, Surface, Texture, mip_levels
 
@@ -412,17 +413,16 @@ def test_surfaces_that_are_refused(count: int) -> None:
 
 def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
     """Give a mesh and textures to the core past the checks of `Mesh` and `Texture`."""
-    batch = renderer._core.render(
+    source = _core.scene_source(
         (serial, mesh, None, (), textures),
         ((0, 0, -9), (0, 0, 0), 45, 0.1, 99),
         (4, 4),
         "forward",
         0.0,
         1.0,
-        None,
     )
-    batch.add(Separable(), lambda name, shape, dtype: np.empty(shape, dtype))
-    batch.submit()
+    plan = renderer._core.plan(source, Separable(), None)
+    renderer._core.run(source, (plan,), (new_arrays(renderer._core, plan),))
 
 
 BODY = panel((4, 4))

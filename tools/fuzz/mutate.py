@@ -1,21 +1,21 @@
-"""Changed copies of whole files, the same for the same seed; for where atheris is missing."""
+"""Mutated copies of valid files, deterministic for a seed; used without atheris."""
 
 from __future__ import annotations
 
 import random
 from collections.abc import Iterator
 
-#: What lengths, counts and offsets go wrong with.
+#: Values that break lengths, counts and offsets.
 NUMBERS = (0, 1, 3, 127, 255, 256, 32767, 65535, 2**24, 2**31 - 1, 2**31, 2**32 - 1)
 WORDS = (
     *(b"-1", b"1e400", b"null", b"[]", b"{}", b'"../x"', b"true", b"99999999999", b"NaN", b""),
-    # More than a reader that calls itself can take.
+    # Deeper than a recursive reader can handle.
     b"[" * 5000,
 )
 
 
 def mutated(data: bytes, dice: random.Random) -> bytes:
-    """Return the bytes with a few changes."""
+    """Return the bytes with a few mutations."""
     changed = bytearray(data)
     for _ in range(dice.choice((1, 1, 2, 4))):
         place = dice.randrange(len(changed) + 1)
@@ -37,7 +37,7 @@ def mutated(data: bytes, dice: random.Random) -> bytes:
                     dice.randrange(256) for _ in range(dice.randrange(1, 9))
                 )
             case 5:
-                # A number or word of a text.
+                # A number or word in a text.
                 end = place
                 while end < len(changed) and chr(changed[end]).isalnum():
                     end += 1
@@ -49,7 +49,7 @@ def mutated(data: bytes, dice: random.Random) -> bytes:
 
 
 def inputs(seeds: list[bytes], number: int) -> Iterator[bytes]:
-    """Yield changed copies of the seeds and of those copies, without an end."""
+    """Yield mutated copies of the seeds, and of these copies, without end."""
     dice = random.Random(number)
     pool = list(seeds)
     while True:

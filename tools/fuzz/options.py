@@ -1,6 +1,6 @@
-"""Files of options, through the command that reads them, up to where it would render.
+"""Files of options, read by the command up to the point where it would render.
 
-Image files and meshes that they name are other targets' part: of those only one image is there.
+Other targets test the images and meshes that such files name; here only one image exists.
 """
 
 from __future__ import annotations
@@ -97,14 +97,14 @@ class Options:
         self._ufo = vkbloom.Scene.ufo()
 
     def seeds(self) -> list[bytes]:
-        """Return whole files, all of which get to where the command would render."""
+        """Return valid files, with which the command would render."""
         seeds = [TOML, SCENE] if self._path.suffix == ".toml" else [YAML]
         for seed in seeds:
             assert self._gets_through(seed), seed
         return seeds
 
     def run(self, data: bytes) -> None:
-        """Give a file to the command."""
+        """Run the command with a file."""
         with contextlib.suppress(click.ClickException, vkbloom.Error):
             self._gets_through(data)
 
@@ -127,5 +127,5 @@ class Options:
                 command.command.main(words, "grid", standalone_mode=False)
             except click.Abort:
                 return True
-        # Where only the help is asked for.
+        # With --help only.
         return False

@@ -1,12 +1,12 @@
 """Fuzz a reader: ``python tools/fuzz/run.py TARGET [--seconds N] [--corpus FOLDER]``.
 
-The run starts from the target's whole files and from ``corpus/TARGET.zip``, inputs that reached
-something new in earlier runs; what this one adds to them stays in FOLDER, if one is given.
+The run starts from the target's valid files and from ``corpus/TARGET.zip``, the inputs that earlier
+runs saved. New inputs of this run are saved in FOLDER, if it is given.
 
-With atheris the inputs are guided by the coverage of the package's Python code; without it (or with
---plain) they are mutations of whole files. What a reader does not promise to raise ends the run, as
-does an input for which the process would need more than MIB over what it had at the start; the
-input lies in the folder then, as ``finding-TARGET``.
+With atheris the inputs are guided by the coverage of the package's Python code. Without it, or with
+--plain, they are mutations of valid files. The run ends with a finding: an exception that the
+reader does not document, or more than MIB of additional memory. The input is then written to the
+folder as ``finding-TARGET``.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from pathlib import Path
 
 
 def limit_memory(more: int) -> None:
-    """Let the address space grow by so many bytes at most."""
+    """Limit the growth of the address space to this many bytes."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = pages * resource.getpagesize() + more
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
 def kept(target: str) -> list[bytes]:
-    """Return the inputs that earlier runs found worth keeping."""
+    """Return the inputs that earlier runs saved."""
     path = Path(__file__).parent / "corpus" / f"{target}.zip"
     if not path.exists():
         return []
@@ -36,7 +36,7 @@ def kept(target: str) -> list[bytes]:
 
 
 def main() -> int:
-    """Run one target; 1 where something was found."""
+    """Run one target; return 1 if there is a finding."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("target")
     parser.add_argument("--seconds", type=float, default=10.0)
@@ -70,7 +70,7 @@ def main() -> int:
             Path(f"finding-{options.target}").write_bytes(data)
             raise
 
-    # Readers load libraries with the first file.
+    # Readers load libraries when they read the first file.
     for seed in seeds:
         one(seed)
     limit_memory(options.memory << 20)

@@ -1,8 +1,8 @@
-"""A grid's Zarr store that something has changed, looked through and gone on with.
+"""Damaged Zarr stores of a grid, which are checked and continued.
 
-An input is a byte of flags and then records: the number of a key, what is done with it, the length
-of what follows (two bytes), and that many bytes. They change a whole store, on which the call that
-made it is repeated. Only the device is left out: points are filled with numbers.
+An input has a byte of flags and then records: the number of a key, the operation, the length of
+the data (two bytes), and the data. The records change a valid store, and the call that wrote it is
+repeated. Only the device is replaced: points are filled with numbers.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _laid_out(grid: Grid) -> Layout:
 
 
 def _rendered(grid: Grid, prepared: Callable[[Layout], GridStore], **_: object) -> Tally:
-    """Do what `vkbloom.grid.rendering.render_grid` does, without a device."""
+    """Replace `vkbloom.grid.rendering.render_grid`, without a device."""
     layout = _laid_out(grid)
     kept = prepared(layout)
     for block in list(kept.missing()):
@@ -127,7 +127,7 @@ def _asked() -> Grid:
 
 @contextlib.contextmanager
 def _quick() -> Iterator[None]:
-    """Leave out what costs time and decides nothing: threads, waits for the disk, what is known."""
+    """Turn off what only costs time: threads, waits for the disk, checks of known data."""
     with (
         mock.patch.object(asyncio, "to_thread", _at_once),
         mock.patch.object(keys, "_flush"),
@@ -137,28 +137,28 @@ def _quick() -> Iterator[None]:
 
 
 class Stores:
-    """A whole store, and what is done with changed ones.
+    """A valid store, and tests of changed copies.
 
     Parameters
     ----------
     folder : Path
-        In which they lie.
+        The folder of the stores.
     """
 
     def __init__(self, folder: Path) -> None:
         self._changed = folder / "changed.zarr"
-        whole = folder / "whole.zarr"
-        _made(whole, chunks=CHUNKS)
-        self._whole = _contents(whole)
-        self._keys = [*self._whole, *FOREIGN]
+        complete = folder / "complete.zarr"
+        _made(complete, chunks=CHUNKS)
+        self._complete = _contents(complete)
+        self._keys = [*self._complete, *FOREIGN]
 
     def seeds(self) -> list[bytes]:
-        """Return inputs that change something each."""
+        """Return inputs with one change each."""
         found = [bytes([flags]) for flags in range(5)]
         for number, key in enumerate(self._keys):
-            content = self._whole.get(key, b"{}")
+            content = self._complete.get(key, b"{}")
             if "/c." in key:
-                # With their checksum they are changed and still whole.
+                # With a correct checksum, they are changed but not damaged.
                 found.append(b"\1" + _record(number, 1, content[:-4]))
             else:
                 found.append(b"\1" + _record(number, 0, content))
@@ -166,12 +166,12 @@ class Stores:
             number = self._keys.index(key)
             found += [b"\1" + _record(number, kind, b"") for kind in (0, 2, 3)]
         wanted = ["attributes", "vkbloom_grid", "chunk", "grid", "axes", "variables"]
-        for place, (inner, key) in enumerate(_places(json.loads(self._whole[ROOT]))):
+        for place, (inner, key) in enumerate(_places(json.loads(self._complete[ROOT]))):
             if key in wanted:
                 wanted.remove(key)
                 text = struct.pack("<H", place) + json.dumps(inner[key]).encode()
                 found.append(b"\1" + _record(self._keys.index(ROOT), 4, text))
-        # A frame that promises 8 GiB, and one that holds 4 MiB.
+        # A frame that declares 8 GiB, and one that contains 4 MiB.
         frame = b"\x28\xb5\x2f\xfd\xe0" + struct.pack("<Q", 1 << 33) + b"\x01\x00\x00"
         zeros = bytes(1 << 22)
         for key in ("done/c.0.0", "mean/c.0.0", "final/c.0.0.0.0.0"):
@@ -187,10 +187,10 @@ class Stores:
         return [*found, *(bytes([LOOK]) + one[1:] for one in found[5:])]
 
     def _decoded(self, key: str) -> bytes:
-        return bytes(Zstd().decode(self._whole[key][:-4]))
+        return bytes(Zstd().decode(self._complete[key][:-4]))
 
     def run(self, data: bytes) -> None:
-        """Look through a changed store, or go on with it."""
+        """Check a changed store, or continue it."""
         self._change(data[1:])
         with _quick():
             self._gone_on((data[:1] or b"\0")[0])
@@ -215,8 +215,8 @@ class Stores:
             assert report.points == 6, str(report)
 
     def _change(self, data: bytes) -> None:
-        """Write the store that the records make of the whole one."""
-        contents: dict[str, bytes | None] = dict(self._whole)
+        """Write the valid store with the changes of the records."""
+        contents: dict[str, bytes | None] = dict(self._complete)
         for number, kind, payload in _records(data):
             key = self._keys[number % len(self._keys)]
             match kind % KINDS:
@@ -227,7 +227,7 @@ class Stores:
                 case 2:
                     contents.pop(key, None)
                 case 3:
-                    # A folder.
+                    # The key is a folder.
                     contents[key] = None
                 case 4:
                     contents[key] = _with_other_text(contents.get(key) or b"{}", payload)
@@ -237,7 +237,7 @@ class Stores:
                     contents[key] = _summed(bytes(Zstd(level=1).encode(payload or b"\0")))
                 case _:
                     source = self._keys[(payload or b"\0")[0] % len(self._keys)]
-                    contents[key] = self._whole.get(source, b"")
+                    contents[key] = self._complete.get(source, b"")
         shutil.rmtree(self._changed, ignore_errors=True)
         self._changed.mkdir()
         for key, content in contents.items():
@@ -270,12 +270,12 @@ def _written(value: Any) -> bytes:
     try:
         return json.dumps(value).encode()
     except RecursionError:
-        # More lists in lists than any reader takes.
+        # Deeper nested lists than any reader accepts.
         return b"[" * 5000
 
 
 def _with_other_values(metadata: bytes, payload: bytes) -> bytes:
-    """Return metadata with others of `VALUES`, by two bytes of a place's number and one of its."""
+    """Return metadata with replaced values: two bytes select a place, one an item of `VALUES`."""
     found = _read(metadata)
     for place, value in struct.iter_unpack("<HB", payload[: min(len(payload) // 3, 8) * 3]):
         places = list(_places(found))
@@ -290,7 +290,7 @@ def _with_other_values(metadata: bytes, payload: bytes) -> bytes:
 
 
 def _with_other_text(metadata: bytes, payload: bytes) -> bytes:
-    """Return metadata with other text in one place, whose number is in two bytes before it."""
+    """Return metadata with other text in one place, which the first two bytes select."""
     found = _read(metadata)
     places = list(_places(found))
     if not places:
@@ -321,7 +321,7 @@ class Folders:
     Parameters
     ----------
     folder : Path
-        In which it lies.
+        The parent folder.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -332,11 +332,11 @@ class Folders:
         self._index = self._folder / "grid.json"
 
     def seeds(self) -> list[bytes]:
-        """Return what the file holds."""
+        """Return the content of the file."""
         return [self._index.read_bytes()]
 
     def run(self, data: bytes) -> None:
-        """Go on with the folder."""
+        """Continue the folder."""
         self._index.write_bytes(data)
         try:
             self._files.prepare(resume=True)

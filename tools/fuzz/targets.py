@@ -1,7 +1,7 @@
-"""What the package reads from outside, as functions of bytes; each may raise what it promises.
+"""The readers of the package, as functions of bytes; each may raise only documented exceptions.
 
-A target writes the bytes where its reader looks for them and calls it. OSError and ValueError are
-what the contract has for files that do not load; anything else is a finding.
+A target writes the bytes to the file of its reader and calls it. Files that do not load may raise
+OSError and ValueError; any other exception is a finding.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DRIVER = bytes(range(16))
 
 
 class Target(NamedTuple):
-    """A reader: what is done with bytes, and whole files to start from."""
+    """A reader: a function of bytes, and valid files to start from."""
 
     run: Callable[[bytes], None]
     seeds: Callable[[], list[bytes]]
@@ -163,7 +163,7 @@ def _pipelines(data: bytes) -> None:
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(data)
     found = pipeline_cache.unwrap(path.read_bytes(), DRIVER)
-    # Only what was written as a whole is taken for what the driver wrote.
+    # Only a completely written file counts as the driver's data.
     header = pipeline_cache.MAGIC + pipeline_cache.digest(DRIVER, found or b"")
     assert found is None or data == header + found
 
@@ -202,6 +202,6 @@ TARGETS = {
 
 
 def run(target: Target, data: bytes) -> None:
-    """Give the bytes to the reader; what it does not promise to raise comes out."""
+    """Give the bytes to the reader; undocumented exceptions are not caught."""
     with contextlib.suppress(PROMISED):
         target.run(data)

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Threads over the core without Python, under ThreadSanitizer: run.sh [SECONDS] (60).
+# Runs threads.c, the core without Python, under ThreadSanitizer: run.sh [SECONDS] (60).
 # PYTHON: an interpreter with setuptools.
 set -eu
 
@@ -7,7 +7,7 @@ cd "$(dirname "$0")/../.."
 PYTHON=${PYTHON:-python3}
 folder=$PWD/build/threads
 mkdir -p "$folder"
-# The shaders as C, and where volk is.
+# Write the shaders as C, and find volk.
 volk=$("$PYTHON" - <<'END'
 import setuptools
 setuptools.setup = lambda **_: None

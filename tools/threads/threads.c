@@ -98,7 +98,7 @@ static struct renderer *open_renderer(void)
     struct renderer *renderer = vkb_alloc(&error, 1, sizeof *renderer);
 
     if (!renderer || !(renderer->memory = vkb_alloc(&error, 1, sizeof *renderer->memory))
-        || !vkb_device_create(&renderer->device, "software", false, &error)
+        || !vkb_device_create(&renderer->device, "software", "", false, &error)
         || !vkb_frame_create(&renderer->device, NULL, 0, &renderer->frame, &error)
         || !vkb_forms_by_name("auto", &renderer->device, &renderer->forms, &error))
         die("open", &error);

@@ -25,10 +25,15 @@ def command(as_json: bool) -> None:
     if as_json:
         return
     table = Table(box=box.SIMPLE_HEAD)
-    for title in ("name", "type", "driver", "version", "Vulkan"):
+    for title in ("name", "type", "driver", "version", "Vulkan", "bundled"):
         table.add_column(title)
     for adapter in found:
         table.add_row(
-            adapter.name, adapter.type, adapter.driver, adapter.driver_info, adapter.api_version
+            adapter.name,
+            adapter.type,
+            adapter.driver,
+            adapter.driver_info,
+            adapter.api_version,
+            "yes" if adapter.bundled else "no",
         )
     show(table)

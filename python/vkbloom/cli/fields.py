@@ -115,8 +115,9 @@ class _Dataclass(Protocol):
 class _Field:
     """A field for which an option is made: its annotation and help texts."""
 
-    annotation: object
+    annotation: Any
     helps: list[str]
+    option: str
 
 
 def _collect(
@@ -132,9 +133,14 @@ def _collect(
             name = declaration.name
             if name in inherited:
                 continue
-            field = found.setdefault(name, _Field(annotations[name], []))
-            if field.annotation != annotations[name]:
-                raise TypeError(f"{name} is {field.annotation} as well as {annotations[name]}")
+            annotation = annotations[name]
+            option = declaration.metadata.get("option", name)
+            field = found.setdefault(name, _Field(annotation, [], option))
+            # None is taken by the option where one of the kinds takes it.
+            wider = field.annotation | annotation
+            if wider not in (field.annotation, annotation):
+                raise TypeError(f"{name} is {field.annotation} as well as {annotation}")
+            field.annotation = wider
             default = f"{label and label + ', '}default {_spelled(declaration.default)}"
             field.helps.append(f"{texts.get(name, '')} [{default}]".strip())
     return found
@@ -168,7 +174,9 @@ def options(
         A field's annotation has no option type, or fields of the same name differ in type.
     """
     fields = _collect(kinds, base)
-    parameters = {name: f"{prefix}{name}".replace("-", "_") for name in fields}
+    parameters = {
+        name: f"{prefix}{field.option}".replace("-", "_") for name, field in fields.items()
+    }
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(command)
@@ -178,7 +186,7 @@ def options(
             return command(**values, **{into: chosen})
 
         for name, field in reversed(fields.items()):
-            option = f"{prefix}{name}".replace("_", "-")
+            option = f"{prefix}{field.option}".replace("_", "-")
             is_flag = field.annotation is bool
             run = click.option(
                 f"--{option}/--no-{option}" if is_flag else f"--{option}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, Final
@@ -62,7 +63,9 @@ def _settings(preset: str | None, method: str | None, changes: dict[str, Any]) -
         )
     foreign = [name for name in changes if name not in begun.as_dict()]
     if foreign:
-        names = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
+        declared = {one.name: one for kind in METHODS.values() for one in dataclasses.fields(kind)}
+        options = (declared[name].metadata.get("option", name) for name in foreign)
+        names = ", ".join(f"--{option.replace('_', '-')}" for option in options)
         raise click.UsageError(f"the method {begun.method} has no {names}")
     with as_wrong_use():
         return begun.replace(**changes)

@@ -7,12 +7,13 @@ too.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from vkbloom.doctor import child, drivers, installation
 from vkbloom.doctor.finding import Finding, Status
@@ -65,7 +66,7 @@ def examine() -> Report:
     loader = child.ask("loader")
     version, layers = _facts(loader)
     listed = child.ask("adapters", environment={"VK_LOADER_DEBUG": "error,warn"})
-    adapters: list[Mapping[str, str]] = [] if listed.value is None else listed.value["adapters"]
+    adapters: list[Mapping[str, Any]] = [] if listed.value is None else listed.value["adapters"]
 
     chosen = child.ask("render", "auto", "plain")
     renders = {} if chosen.value is None else {chosen.value["name"]: chosen}
@@ -74,6 +75,12 @@ def examine() -> Report:
             renders[adapter["name"]] = child.ask("render", adapter["name"], "plain")
     working = [name for name, answer in renders.items() if answer.value is not None]
     foundation = [_loader(loader), *drivers.examine(version)]
+    if any(adapter["bundled"] for adapter in adapters):
+        # The bundled driver needs neither loader nor manifest.
+        foundation = [
+            dataclasses.replace(finding, status="note") if finding.status == "problem" else finding
+            for finding in foundation
+        ]
     has_problem = any(finding.status == "problem" for finding in foundation)
     findings = [
         installation.package(),
@@ -118,7 +125,10 @@ def _loader(loader: child.Answer) -> Finding:
 def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
     """Judge the list of adapters; `has_problem`: the loader or a driver has a problem."""
     if listed.value and listed.value["adapters"]:
-        names = [f"{entry['name']} ({entry['type']})" for entry in listed.value["adapters"]]
+        names = [
+            f"{entry['name']} ({entry['type']}{', bundled' if entry['bundled'] else ''})"
+            for entry in listed.value["adapters"]
+        ]
         return Finding("adapters", "ok", ", ".join(names))
     reason = listed.failure or "no driver has a device with Vulkan 1.1"
     said = (
@@ -132,15 +142,18 @@ def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
     )
 
 
-def _software(adapters: list[Mapping[str, str]]) -> Finding:
+def _software(adapters: list[Mapping[str, Any]]) -> Finding:
     topic = "lavapipe"
     found = [adapter for adapter in adapters if adapter["type"] == "cpu"]
+    # As the choice of "software" has it.
+    found.sort(key=lambda adapter: not adapter["bundled"])
     if not found:
         return Finding(
             topic,
             "note",
             'no software adapter was found; adapter="software" fails',
-            "To use it: apt install mesa-vulkan-drivers (Debian, Ubuntu).",
+            "To use it: install the package vkbloom-lavapipe, or apt install "
+            "mesa-vulkan-drivers (Debian, Ubuntu).",
         )
     described = found[0]["driver_info"] or "no version"
     tested = " and ".join(TESTED_MESA)

@@ -18,9 +18,9 @@ from vkbloom.doctor import child
 from vkbloom.doctor.finding import Finding
 
 INSTALL_DRIVER: Final = (
-    "Install lavapipe, which runs on any CPU (Debian, Ubuntu: apt install mesa-vulkan-drivers; "
-    "Fedora: dnf install mesa-vulkan-drivers; Arch: pacman -S vulkan-swrast), or the Vulkan driver "
-    "of the GPU's vendor."
+    "Install lavapipe, which runs on any CPU (the package vkbloom-lavapipe, or Debian, Ubuntu: apt "
+    "install mesa-vulkan-drivers; Fedora: dnf install mesa-vulkan-drivers; Arch: pacman -S "
+    "vulkan-swrast), or the Vulkan driver of the GPU's vendor."
 )
 # First loader version that reads VK_DRIVER_FILES; earlier ones read VK_ICD_FILENAMES only.
 _FIRST_WITH_DRIVER_FILES: Final = (1, 3, 207)

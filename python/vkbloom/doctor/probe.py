@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import vkbloom
 from vkbloom import _core
+from vkbloom.adapter import bundled_driver
 from vkbloom.doctor import trial
 from vkbloom.doctor.child import ANSWER_MARK
 
@@ -101,13 +102,28 @@ def loader() -> dict[str, Any]:
 
 
 def adapters() -> dict[str, Any]:
-    """Return the adapters that vkbloom can use."""
-    return {
-        "adapters": [
-            {"name": name, "type": kind, "driver_info": driver_info, "driver_uuid": uuid.hex()}
-            for name, kind, _, driver_info, _, uuid in _core.adapters()
+    """Return the adapters of the system's loader and of the bundled driver."""
+    found: list[dict[str, Any]] = []
+    reasons: list[str] = []
+    for driver in dict.fromkeys(("", bundled_driver())):
+        try:
+            listed = _core.adapters(driver)
+        except vkbloom.AdapterNotFoundError as error:
+            reasons.append(_one_line(error))
+            continue
+        found += [
+            {
+                "name": name,
+                "type": kind,
+                "driver_info": driver_info,
+                "driver_uuid": uuid.hex(),
+                "bundled": bundled,
+            }
+            for name, kind, _, driver_info, _, uuid, bundled in listed
         ]
-    }
+    if not found and reasons:
+        return {"failure": "; ".join(reasons)}
+    return {"adapters": found}
 
 
 def render(adapter: str, validation: str) -> dict[str, Any]:

@@ -207,10 +207,11 @@ class Viewer:
         """Return one framebuffer, the one of that name or else `final`, and the names of all."""
         if self._scene is None:
             image = self._image_of(size)
-            names = list(self.renderer._survey_apply(image, settings))
+            names = list(self.renderer.plan(image, settings).outputs)
             chosen = str(name) if name in names else "final"
             return self.renderer.apply(image, settings, attachments=[chosen]), names
-        names = list(self.renderer._survey_render(self._scene, settings, size, self._shading))
+        plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
+        names = list(plan.outputs)
         chosen = str(name) if name in names else "final"
         frames = self.renderer.render(
             self._scene,

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Block", "Index", "blocks", "default_chunk", "points"]
+__all__ = ["Block", "Index", "blocks", "default_chunk", "points", "ranking_of", "walk"]
 
 Index = tuple[int, ...]
 
@@ -143,3 +143,39 @@ def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
         if chunk[axis] < shape[axis]:
             break
     return tuple(chunk)
+
+
+def walk(shape: Index, *, backwards: bool) -> Iterator[tuple[int | None, Index]]:
+    """Yield a corner of a grid, then a step along each axis in turn.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of values by axis.
+    backwards : bool
+        From the last values on, else from the first.
+
+    Yields
+    ------
+    (int or None, tuple of int)
+        The axis of the step, None for the corner; and the place along each axis.
+    """
+    index = [count - 1 if backwards else 0 for count in shape]
+    yield None, tuple(index)
+    for axis, count in enumerate(shape):
+        if count > 1:
+            index[axis] += -1 if backwards else 1
+            yield axis, tuple(index)
+
+
+def ranking_of(costs: Sequence[int], later: Sequence[bool]) -> tuple[int, ...]:
+    """Return the axes from the one with the highest costs a step to the one with the lowest.
+
+    Parameters
+    ----------
+    costs : sequence of int
+        By axis.
+    later : sequence of bool
+        Of axes that cost the same, these come after the others.
+    """
+    return tuple(sorted(range(len(costs)), key=lambda axis: (-costs[axis], later[axis])))

@@ -12,20 +12,24 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom import _core
 from vkbloom.checks import check_attachments
 from vkbloom.framebuffers import dimensions, leading
 from vkbloom.frames import Frames
-from vkbloom.grid import passes
 from vkbloom.grid.axes import Axis, image_axis, read_axes
-from vkbloom.grid.order import Index
+from vkbloom.grid.order import Index, ranking_of, walk
 from vkbloom.grid.reductions import Comparing, Reduction
-from vkbloom.grid.sources import Framebuffers, FrameRenderer, Point, Source, read_source, visit
+from vkbloom.grid.sources import FrameRenderer, Point, Source, read_source, visit
+from vkbloom.plans import Framebuffer
 from vkbloom.settings import Settings, check_settings
 from vkbloom.version import installed_version
 
 __all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out"]
 
 Reduce = Mapping[str, Callable[[Frames], Any]]
+
+#: The variants in which each pass runs by itself.
+UNFUSED: Final = "fragment"
 
 _CHANNELS: Final = ("r", "g", "b", "a")
 
@@ -70,7 +74,14 @@ class Grid:
 
     def point(self, index: Index) -> Point:
         """Return the point at an index."""
-        return passes.point_at(self.source, self.settings, self.axes, index)
+        place = self.source.place
+        changes = {}
+        for axis, number in zip(self.axes, index, strict=True):
+            if axis.kind == "settings":
+                changes[axis.name] = axis.values[number]
+            else:
+                place = number if axis.kind == "image" else axis.values[number]
+        return Point(index, self.settings.replace(**changes) if changes else self.settings, place)
 
     def named(self, index: Index) -> str:
         """Return a point's axis values as text for messages."""
@@ -234,7 +245,7 @@ def lay_out(grid: Grid, renderer: FrameRenderer) -> Layout:
             if name in grid.references() and isinstance(reduction, Reduction):
                 reference_size += sample[reduction.attachment].nbytes
     return Layout(
-        ranking=passes.ranking(renderer, grid.source, grid.settings, grid.axes),
+        ranking=ranking(grid),
         variables=variables,
         coordinates=coordinates,
         reference_size=reference_size,
@@ -243,6 +254,46 @@ def lay_out(grid: Grid, renderer: FrameRenderer) -> Layout:
         adapter=renderer.info.name,
         driver=renderer.info.driver_info or renderer.info.driver,
         version=installed_version(),
+    )
+
+
+def ranking(grid: Grid) -> tuple[int, ...]:
+    """Return the axes from the one whose steps run the most passes to the one with the fewest.
+
+    Visiting one step at a time, the sum of all passes is least when the axis with the more passes
+    a step is always the slower one, whatever the numbers of values: of two neighbours a, b with
+    n_a, n_b values and c_a, c_b passes a step, a outside costs c_a (n_a - 1) + n_a c_b (n_b - 1),
+    and that is less than the other way round just where c_a > c_b.
+
+    Parameters
+    ----------
+    grid : Grid
+
+    Returns
+    -------
+    tuple of int
+        Of axes that cost the same, images and times come first, then the order given.
+    """
+    costs = [0] * len(grid.axes)
+    if sum(len(axis) > 1 for axis in grid.axes) > 1:
+        # From both corners: from one of them an axis may be without effect, such as a blur's while
+        # the bloom is off.
+        for backwards in (False, True):
+            steps = list(walk(grid.shape, backwards=backwards))
+            names = _core.dry_run(_planned(grid, [index for _, index in steps]))
+            for (stepped, _), ran in zip(steps, names, strict=True):
+                if stepped is not None:
+                    costs[stepped] += len(ran)
+    return ranking_of(costs, [axis.kind == "settings" for axis in grid.axes])
+
+
+def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
+    """Return the points of a path with plans for all framebuffers, so that no pass is fused."""
+    points = [grid.point(index) for index in path]
+    sources = {place: grid.source.for_core(place) for place in {point.place for point in points}}
+    return tuple(
+        (sources[point.place], _core.plan(sources[point.place], point.settings, None, UNFUSED))
+        for point in points
     )
 
 
@@ -263,23 +314,32 @@ class PassCounter:
         self._known: dict[Index, int] = {}
 
     def alone(self, index: Index) -> int:
-        """Return the passes of a point that nothing was rendered before."""
+        """Return the passes of a point that nothing was rendered before.
+
+        As `Frames.timings` counts them where no fused pass stands for several.
+        """
         key = tuple(index[number] for number in self._structural)
         if key not in self._known:
             self._known[key] = _graph_of(self._grid, self._renderer, index)[1]
         return self._known[key]
 
 
-def _graph_of(grid: Grid, renderer: FrameRenderer, index: Index) -> tuple[Framebuffers, int]:
+def _graph_of(
+    grid: Grid, renderer: FrameRenderer, index: Index
+) -> tuple[Mapping[str, Framebuffer], int]:
     """Return the framebuffers of a point, and its passes alone."""
     point = grid.point(index)
-    found = grid.source.survey(renderer, point.settings, point.place)
-    size = (found["glow"][0][1], found["glow"][0][0]) if "glow" in found else None
-    count = passes.passes_alone(grid.source, point.settings, point.place, size, grid.wanted)
-    return found, count
+    found = grid.source.plan(renderer, point.settings, point.place).outputs
+    wanted = grid.wanted
+    names = None if wanted == "all" else tuple(name for name in wanted if name in found)
+    source = grid.source.for_core(point.place)
+    alone = _core.plan(source, point.settings, names, UNFUSED)
+    return found, len({name for name, *_ in alone.passes})
 
 
-def _survey(grid: Grid, renderer: FrameRenderer) -> tuple[Framebuffers, tuple[int, ...]]:
+def _survey(
+    grid: Grid, renderer: FrameRenderer
+) -> tuple[Mapping[str, Framebuffer], tuple[int, ...]]:
     """Return the framebuffers to keep, and the axes that change what there is.
 
     Every value of every axis is looked at from the first and from the last corner of the grid, and
@@ -332,7 +392,7 @@ def _refuse(
 
 
 def _frame_variables(
-    framebuffers: Framebuffers,
+    framebuffers: Mapping[str, Framebuffer],
 ) -> dict[str, Variable]:
     if not framebuffers:
         return {}

@@ -12,26 +12,25 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vkbloom import _core
 from vkbloom.checks import check_image, check_size, check_time
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
 from vkbloom.settings import SHADINGS, Settings
+from vkbloom.sources import image_source, scene_source
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from vkbloom.adapter import AdapterInfo
+    from vkbloom.plans import Plan
     from vkbloom.scene import Scene
     from vkbloom.settings import Shading
 
 __all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
 
-#: Name to shape and dtype.
-Framebuffers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
-
 _SCENE_SIZE = (1280, 720)
-# Pixels of a side; enough for every pass to have a target.
-_SMALL = 24
 
 
 @dataclass(frozen=True)
@@ -74,13 +73,15 @@ class FrameRenderer(Protocol):
     ) -> Iterator[Frames]:
         """Render a scene with one settings after the other."""
 
-    def _survey_apply(self, image: NDArray[Any], settings: Settings) -> Framebuffers:
-        """Return shape and dtype of all framebuffers that `apply` would give."""
-
-    def _survey_render(
-        self, scene: Scene, settings: Settings, size: tuple[int, int], shading: Shading
-    ) -> Framebuffers:
-        """Return shape and dtype of all framebuffers that `render` would give."""
+    def plan(
+        self,
+        source: Scene | NDArray[Any],
+        settings: Settings,
+        size: tuple[int, int] | None = None,
+        *,
+        shading: Shading = "forward",
+    ) -> Plan:
+        """Tell what a call would do, without rendering anything."""
 
 
 def visit(
@@ -121,7 +122,6 @@ class ImageSource:
     """One image or several of one shape."""
 
     has_time = False
-    shading = "image"
     #: Of points where no axis gives another.
     place = 0.0
 
@@ -139,24 +139,13 @@ class ImageSource:
         """Yield the frames of some settings on one image."""
         return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
 
-    def survey(self, renderer: FrameRenderer, settings: Settings, place: float) -> Framebuffers:
-        """Tell the shapes and dtypes of all framebuffers, without rendering."""
-        return renderer._survey_apply(self.images[int(place)], settings)
+    def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
+        """Tell what would be made of an image, without rendering."""
+        return renderer.plan(self.images[int(place)], settings)
 
-    def small(self) -> ImageSource:
-        """Return the images with few pixels."""
-        height, width = self.images[0].shape[:2]
-        rows, columns = -(-height // _SMALL), -(-width // _SMALL)
-        thinned = [np.ascontiguousarray(image[::rows, ::columns]) for image in self.images[:2]]
-        # Two images must differ for a change of the image to be one.
-        thinned[-1] = thinned[-1].copy()
-        thinned[-1][0, 0, 0] = 0 if len(thinned) == 1 or thinned[0][0, 0, 0] != 0 else 1
-        return ImageSource((thinned * len(self.images))[: len(self.images)], self.labels)
-
-    def size_at(self, place: float) -> tuple[int, int]:
-        """Return (width, height) of an image."""
-        height, width = self.images[int(place)].shape[:2]
-        return width, height
+    def for_core(self, place: float) -> _core.Source:
+        """Return an image as the core takes it."""
+        return image_source(self.images[int(place)])
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
@@ -201,17 +190,13 @@ class SceneSource:
             attachments=attachments,
         )
 
-    def survey(self, renderer: FrameRenderer, settings: Settings, place: float) -> Framebuffers:
-        """Tell the shapes and dtypes of all framebuffers, without rendering."""
-        return renderer._survey_render(self.scene, settings, self.size, self.shading)
+    def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
+        """Tell what would be made of the scene, without rendering."""
+        return renderer.plan(self.scene, settings, self.size, shading=self.shading)
 
-    def small(self) -> SceneSource:
-        """Return the scene in few pixels."""
-        return SceneSource(self.scene, (_SMALL, _SMALL), self.shading, self.place)
-
-    def size_at(self, place: float) -> tuple[int, int]:
-        """Return (width, height) of the frame."""
-        return self.size
+    def for_core(self, place: float) -> _core.Source:
+        """Return the scene at a time as the core takes it."""
+        return scene_source(self.scene, self.size, self.shading, place)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:

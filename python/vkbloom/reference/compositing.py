@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,8 +16,10 @@ __all__ = ["check_settings", "composite"]
 
 
 class CompositeSettings(Protocol):
-    """What the last pass reads of any settings."""
+    """What the last pass reads of any settings; of Godot's also `white`."""
 
+    @property
+    def method(self) -> str: ...
     @property
     def bloom(self) -> bool: ...
     @property
@@ -51,8 +54,9 @@ def composite(
 
     With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" s + (b - s) i
     and "screen" 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies
-    by 2^e. Dither rounds uint8 to floor(255 c + n) / 255 with c clamped to 0..1 and n a noise
-    of 0..1, and leaves other types alone. All of it works on rgb; alpha is the scene's.
+    by 2^e. `vkbloom.GodotBloom` has composites of its own, with the exposure before. Dither rounds
+    uint8 to floor(255 c + n) / 255 with c clamped to 0..1 and n a noise of 0..1, and leaves other
+    types alone. All of it works on rgb; alpha is the scene's.
 
     A component of the scene that is NaN or infinite stays so. To the tone maps that mix the
     channels it counts as 0.
@@ -97,17 +101,24 @@ def composite(
     stored = np.asarray(scene).dtype if dtype is None else np.dtype(dtype)
     original = image[..., :3]
     rgb = np.where(np.isfinite(original), original, 0.0)
-    if settings.bloom:
-        if bloom is None:
-            raise TypeError("bloom must be an array where settings.bloom is True, not None")
+    scale, curve = 2.0**settings.exposure, TONE_MAPS[settings.tonemap]
+    if not settings.bloom:
+        rgb = curve(rgb * scale)
+    elif bloom is None:
+        raise TypeError("bloom must be an array where settings.bloom is True, not None")
+    else:
         glow = as_float(bloom, "bloom", (3, 4))[..., :3]
         if glow.shape != rgb.shape:
             raise ValueError(
                 f"bloom must have the scene's height and width {image.shape[:2]}, "
                 f"not {glow.shape[:2]}"
             )
-        rgb = _blend(rgb, glow, settings.composite, settings.intensity)
-    rgb = ENCODINGS[settings.encoding](TONE_MAPS[settings.tonemap](rgb * 2.0**settings.exposure))
+        if settings.method == "godot":
+            # Its glow was exposed before the threshold.
+            rgb = _godots(rgb * scale, glow, settings, curve)
+        else:
+            rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity) * scale)
+    rgb = ENCODINGS[settings.encoding](rgb)
     rgb = storage(format_of(np.empty(0, stored), None))(rgb)
     if settings.dither and stored == np.uint8:
         rgb = np.floor(255 * rgb + _noise(rgb.shape[:2], settings.dither_seed)) / 255
@@ -124,6 +135,29 @@ def _blend(scene: Array, bloom: Array, mode: str, intensity: float) -> Array:
     if mode == "screen":
         return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(intensity * bloom, 0, 1))
     raise ValueError(f'composite must be "add", "mix" or "screen", not {mode!r}')
+
+
+def _godots(
+    scene: Array, bloom: Array, settings: CompositeSettings, curve: Callable[[Array], Array]
+) -> Array:
+    """Return scene and bloom past the tone map, as Godot blends them.
+
+    From godotengine/godot, servers/rendering/renderer_rd/shaders/effects/tonemap.glsl
+    @ 001c8c9c24dc.
+    """
+    glow = settings.intensity * bloom
+    if settings.composite == "soft_light":
+        light, toned = np.clip(curve(glow), 0, 1), curve(scene)
+        dark = ((16 * toned - 12) * toned + 4) * toned
+        full = np.where(toned <= 0.25, dark, np.sqrt(np.maximum(toned, 0)))
+        return np.where(toned > 1, toned, toned + light * (full - toned))
+    if settings.composite == "screen":
+        white = getattr(settings, "white")  # noqa: B009
+        glow = np.clip(glow, 0, white)
+        return curve(scene + glow - scene * glow / white)
+    if settings.composite == "replace":
+        return curve(glow)
+    return curve(_blend(scene, bloom, settings.composite, settings.intensity))
 
 
 def _noise(size: tuple[int, int], seed: int) -> Array:

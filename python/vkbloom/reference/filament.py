@@ -60,6 +60,7 @@ def passes(
         "down_0" to "down_N-1", "up_N-2" to "up_0" and "bloom", (height, width, C).
     """
     height, width, _ = glow.shape
+    width_of_frame, height_of_frame = width, height
     top = settings.resolution
     first = (
         16 * max(1, math.floor(top * width / height / 16)),
@@ -71,7 +72,8 @@ def passes(
         image = store(_reduce(image, (width, height), threshold, settings.highlight))
         threshold = None
     downs = [store(_reduce(image, first, threshold, settings.highlight))]
-    count = min(settings.levels, math.floor(math.log2(top)) + 1)
+    longer = math.floor(max(top * width_of_frame / height_of_frame, top))
+    count = min(settings.levels, math.floor(math.log2(longer)) + 1)
     for k in range(1, count):
         level = (max(1, first[0] >> k), max(1, first[1] >> k))
         even = downs[-1].shape[0] % 2 == 0 and downs[-1].shape[1] % 2 == 0

@@ -9,7 +9,20 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bevy, dual_kawase, filament, hdrp, kino, pyramid, separable, unreal, urp
+from . import (
+    bevy,
+    blender,
+    dual_kawase,
+    filament,
+    godot,
+    hdrp,
+    kino,
+    pygfx,
+    pyramid,
+    separable,
+    unreal,
+    urp,
+)
 from .compositing import CompositeSettings, check_settings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
@@ -47,7 +60,7 @@ class _Method(NamedTuple):
 
 _METHODS = {
     "separable": _Method(separable.passes, separable.gain),
-    "pyramid": _Method(pyramid.passes, pyramid.gain),
+    "pyramid": _Method(pyramid.passes, pyramid.gain, sized=True),
     "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
     "bevy": _Method(bevy.passes, bevy.gain, published=True),
     "filament": _Method(filament.passes, filament.gain, published=True),
@@ -55,6 +68,9 @@ _METHODS = {
     "hdrp": _Method(hdrp.passes, hdrp.gain, published=True),
     "unreal": _Method(unreal.passes, unreal.gain, published=True),
     "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
+    "godot": _Method(godot.passes, godot.gain, published=True),
+    "blender": _Method(blender.passes, blender.gain, published=True),
+    "pygfx": _Method(pygfx.passes, pygfx.gain, published=True, sized=True),
 }
 
 
@@ -66,7 +82,8 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     0 in the bloom and stay as they are in "final".
 
     Bloom buffers of the format "rgba8unorm" are clamped to 0..1 wherever they are stored, those
-    of "rgba16float" to +-65504; nothing is rounded to a format's levels.
+    of "rgba16float" to +-65504; nothing is rounded to a format's steps, but in "rg11b10ufloat".
+    Published methods keep only their levels in that format: "glow" and "bloom" are not rounded.
 
     Parameters
     ----------
@@ -118,7 +135,8 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     store = storage(format_of(image, settings.format))
     reduced = sample(finite(scene[..., :3]), _bloom_size(settings, (width, height)))
     threshold = None if method.published else settings.threshold
-    glow = store(extract(reduced, threshold, settings.knee))
+    extracted = extract(reduced, threshold, settings.knee)
+    glow = store.end(extracted) if method.published else store(extracted)
     blurred = method.passes(glow, settings, (width, height), store)
     framebuffers = {name: _with_alpha(rgb) for name, rgb in {"glow": glow, **blurred}.items()}
     framebuffers["final"] = composite(scene, framebuffers["bloom"], settings, dtype)
@@ -144,7 +162,7 @@ def passes(
     size : (int, int), optional
         Width and height of the final image, at whose pixels the last pass is evaluated; by
         default the glow's own.
-    format : {"rgba8unorm", "rgba16float", "rgba32float"}, optional
+    format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"}, optional
         Of the bloom buffers; by default that of the settings, and where that is None, the one
         of the glow's dtype.
 
@@ -180,7 +198,8 @@ def passes(
         raise ValueError(f"size must be (width, height) of at least 1, not {size}")
     store = storage(format_of(glow, settings.format if format is None else format))
     has_alpha = channels == 4
-    colours = store(values[..., :3] if has_alpha else values)
+    colours = values[..., :3] if has_alpha else values
+    colours = store.end(colours) if method.published else store(colours)
     framebuffers = method.passes(colours, settings, size or (width, height), store)
     if not has_alpha:
         return framebuffers

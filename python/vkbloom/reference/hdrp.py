@@ -8,19 +8,22 @@ BloomUpsample.compute @ 0e4ca4d79b2c, RenderPipeline/HDRenderPipeline.PostProces
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from .image import Storage
-from .sampling import Array, sample
-from .upsampling import combine, cubic, linear
+from .sampling import Array, read_rows, sample
+from .upsampling import combine, cubic, spline_taps
 
 __all__ = ["gain", "passes"]
 
 # (x, y) in texels of the frame.
 _PREFILTER_TAPS = ((0.0, 0.0), (0.9, -0.4), (-0.9, 0.4), (0.4, 0.9), (-0.4, -0.9))
 _LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
+_RADIUS = 4
+_KERNEL = [math.comb(2 * _RADIUS, i) / 4**_RADIUS for i in range(2 * _RADIUS + 1)]
 
 
 class HdrpSettings(Protocol):
@@ -44,6 +47,11 @@ def passes(
     level, by the cubic B-spline or bilinear, and the level are mixed by the scatter; the bloom is
     the cubic B-spline of up_0.
 
+    The borders are not the same on all sides. Before the first pixel down_0 reads the first two in
+    turn, n mod 2. Beyond the last pixel all levels read the last one's sample. On the way up no
+    position lies beyond the middle between the last two texels, and no tap of the cubic filter
+    beyond 1 - 1 / size of the larger level.
+
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
@@ -65,12 +73,13 @@ def passes(
         (max(1, round(width / 2 ** (k + 1))), max(1, round(height / 2 ** (k + 1))))
         for k in range(count)
     ]
-    image, downs = store(_prefilter(glow, sizes[0])), []
-    for level in sizes:
-        image = _blur(image, level, store)
-        downs.append(image)
+    reduced = store(_prefilter(glow, sizes[0]))
+    downs = [_along_both(reduced, sizes[0], _blur_rows, store)]
+    for level in sizes[1:]:
+        downs.append(_along_both(downs[-1], level, _shrink_rows, store))
     share = 0.05 + (0.95 - 0.05) * settings.scatter
     is_cubic = settings.high_quality_filtering and width >= 800 and height >= 450
+    rows = _cubic_rows if is_cubic else _linear_rows
     return {
         **{f"down_{k}": down for k, down in enumerate(downs)},
         **combine(
@@ -79,7 +88,7 @@ def passes(
             store,
             own=[1 - share] * count,
             coarse=[share] * count,
-            upsample=cubic if is_cubic else linear,
+            upsample=lambda image, larger: _along_both(image, larger, rows),
             last=cubic,
         ),
     }
@@ -101,13 +110,52 @@ def _prefilter(image: Array, size: tuple[int, int]) -> Array:
     return total / shares
 
 
-def _blur(image: Array, size: tuple[int, int], store: Storage) -> Array:
-    """Read 9 x 9 bilinear taps one pixel of the result apart, the columns first."""
-    height, width, _ = image.shape
-    weights = [math.comb(8, i) / 256 for i in range(9)]
-    x_taps, y_taps = (
-        [((i - 4) * ratio, weight) for i, weight in enumerate(weights)]
-        for ratio in (width / size[0], height / size[1])
-    )
-    across = store(sample(image, (size[0], height), x_taps=x_taps))
-    return store(sample(across, size, y_taps=y_taps))
+def _along_both(
+    image: Array,
+    size: tuple[int, int],
+    rows: Callable[[Array, int], Array],
+    store: Storage | None = None,
+) -> Array:
+    """Apply a filter of rows along x, then along y; `store` is between the two and at the end."""
+    across = rows(image.swapaxes(0, 1), size[0]).swapaxes(0, 1)
+    down = rows(across if store is None else store(across), size[1])
+    return np.ascontiguousarray(down) if store is None else store(down)
+
+
+def _convolve(rows: Array, count: int) -> Array:
+    """Apply the binomial to rows of which the first is _RADIUS before the result's first."""
+    total = np.zeros((count, *rows.shape[1:]))
+    for i, weight in enumerate(_KERNEL):
+        total += weight * rows[i : i + count]
+    return total
+
+
+def _blur_rows(image: Array, count: int) -> Array:
+    places = np.arange(-_RADIUS, count + _RADIUS)
+    texels = np.minimum(np.where(places < 0, places % 2, places), count - 1)
+    return _convolve(image[texels], count)
+
+
+def _shrink_rows(image: Array, count: int) -> Array:
+    places = np.minimum(np.arange(-_RADIUS, count + _RADIUS), count - 1)
+    return _convolve(read_rows(image, (places + 0.5) * image.shape[0] / count - 0.5), count)
+
+
+def _up_positions(length: int, count: int) -> Array:
+    """Return where the pixels of the larger level fall, in texels of the smaller one."""
+    return np.minimum((np.arange(count) + 0.5) * length / count - 0.5, length - 1.5)
+
+
+def _linear_rows(image: Array, count: int) -> Array:
+    return read_rows(image, _up_positions(image.shape[0], count))
+
+
+def _cubic_rows(image: Array, count: int) -> Array:
+    """Read the cubic B-spline as two bilinear taps, neither beyond 1 - 1 / count."""
+    length = image.shape[0]
+    furthest = (1 - 1 / count) * length - 0.5
+    total = np.zeros((count, *image.shape[1:]))
+    for position, weight in spline_taps(_up_positions(length, count)):
+        rows = read_rows(image, np.minimum(position, furthest))
+        total += weight[:, np.newaxis, np.newaxis] * rows
+    return total

@@ -74,15 +74,45 @@ def format_of(image: NDArray[Any], format: str | None) -> str:
 class Storage:
     """What storing in a format does to the values: it keeps them between two ends.
 
-    Nothing is rounded to a format's levels, which is what the tolerance of a comparison is for.
+    Nothing is rounded to a format's steps, which is what the tolerance of a comparison is for,
+    unless the format is as coarse as "rg11b10ufloat".
     """
 
     low: float
     high: float
+    is_coarse: bool = False
 
     def __call__(self, image: Array) -> Array:
         """Return the image as stored."""
+        if self.is_coarse:
+            return _as_rg11b10(image)
         return np.clip(image, self.low, self.high)
+
+    def end(self, image: Array) -> Array:
+        """Return an image as engines pass it on that keep only the levels between in the format.
+
+        The frame that they start from and the one that they draw the bloom into have formats of
+        their own: with "rg11b10ufloat" nothing happens here.
+        """
+        return image if self.is_coarse else self(image)
+
+
+def _as_rg11b10(image: Array) -> Array:
+    """Round to the nearest values with 5 bits of exponent and 6 of mantissa, of blue 5.
+
+    Ties go to the even one, as IEEE 754 has it. The least step is 2^-20, of blue 2^-19.
+
+    Parameters
+    ----------
+    image : ndarray of float64, shape (..., C)
+        Three channels are red, green and blue; with another number all have 6 bits.
+    """
+    bits = np.array([6, 6, 5]) if image.shape[-1] == 3 else np.array(6)
+    kept = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 2.0**16 - 2.0 ** (15 - bits))
+    _, exponent = np.frexp(kept)
+    step = np.exp2(np.maximum(exponent - 1, -14) - bits)
+    rounded: Array = np.round(kept / step) * step
+    return rounded
 
 
 _STORAGES = {
@@ -90,6 +120,7 @@ _STORAGES = {
     # A value that overflowed to infinity would spread over the picture, so buffers end here.
     "rgba16float": Storage(-65504, 65504),
     "rgba32float": Storage(-math.inf, math.inf),
+    "rg11b10ufloat": Storage(0, 65024, is_coarse=True),
 }
 
 
@@ -98,7 +129,7 @@ def storage(format: str) -> Storage:
 
     Parameters
     ----------
-    format : {"rgba8unorm", "rgba16float", "rgba32float"}
+    format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"}
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -36,6 +36,8 @@ class PyramidSettings(Protocol):
     def radius(self) -> float: ...
     @property
     def firefly_filter(self) -> bool: ...
+    @property
+    def level_weights(self) -> Sequence[float] | None: ...
 
 
 def passes(
@@ -48,9 +50,11 @@ def passes(
 
     The bloom is the sum of all levels, each brought up through those above it by the tent, and
     divided by their number N: up_N-1 = down_N-1, up_k = down_k + tent(up_k+1), and the bloom is
-    tent(up_0) / N. In buffers that end at 1, up_k is divided by the number of
-    levels in it, up_k = (down_k + (N - 1 - k) tent(up_k+1)) / (N - k), and the bloom, tent(up_0),
-    is the same.
+    tent(up_0) / N. With level weights up_N-1 = w_N-1 down_N-1, up_k = w_k down_k + tent(up_k+1),
+    and the bloom is tent(up_0).
+
+    In buffers that end at 1, up_k is divided by the number of levels in it, or by the sum of the
+    sizes of their weights, and the bloom is the same.
 
     Parameters
     ----------
@@ -82,22 +86,29 @@ def passes(
         downs.append(source)
         framebuffers[f"down_{k}"] = source
 
-    means = store.high == 1
-    up = downs[-1]
-    for k in range(len(sizes) - 2, -1, -1):
-        upsampled = _tent(up, sizes[k], settings.radius)
-        below = len(sizes) - 1 - k
-        up = (downs[k] + below * upsampled) / (below + 1) if means else downs[k] + upsampled
-        up = store(up)
+    count = len(sizes)
+    weights = settings.level_weights
+    shares = [1.0] * count if weights is None else [float(w) for w in weights[:count]]
+    gain = 1 / count if weights is None else 1.0
+    # The sum is what is stored, times the factor; the smallest level is stored without its weight.
+    up, factor = downs[-1], shares[-1]
+    for k in range(count - 2, -1, -1):
+        total = shares[k] * downs[k] + factor * _tent(up, sizes[k], settings.radius)
+        factor = (abs(shares[k]) + abs(factor) or 1.0) if store.high == 1 else 1.0
+        up = store(total / factor)
         framebuffers[f"up_{k}"] = up
-    total = _tent(up, size, settings.radius)
-    framebuffers["bloom"] = store(total if means else total / len(sizes))
+    framebuffers["bloom"] = store(gain * factor * _tent(up, size, settings.radius))
     return framebuffers
 
 
-def gain(settings: PyramidSettings) -> float:
-    """Return what a flat image of 1 becomes: 1, as the weights of every filter sum to 1."""
-    return 1.0
+def gain(settings: PyramidSettings, size: tuple[int, int]) -> float:
+    """Return what a flat image of 1 becomes: 1, as the weights of every filter sum to 1.
+
+    With level weights it is the sum of those that count, fewer where the chain ends early.
+    """
+    if settings.level_weights is None:
+        return 1.0
+    return sum(settings.level_weights[: len(level_sizes(size, settings.levels))])
 
 
 def groups(image: Array, size: tuple[int, int]) -> Iterator[tuple[float, Array]]:

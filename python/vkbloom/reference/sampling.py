@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CENTRE", "Array", "Taps", "sample"]
+__all__ = ["CENTRE", "Array", "Taps", "read_rows", "sample"]
 
 Array = NDArray[np.float64]
 
@@ -87,3 +87,25 @@ def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
         ).reshape(stop - start, band)
         result[start:stop] = matrix @ source[first : first + band]
     return result.reshape(count, *image.shape[1:])
+
+
+def read_rows(image: Array, positions: Array) -> Array:
+    """Read an image along its first axis at any positions, bilinear, clamped to the edge.
+
+    Parameters
+    ----------
+    image : ndarray of float64, shape (H, W, C)
+    positions : ndarray, shape (N,)
+        In texels, with texel n at n.
+
+    Returns
+    -------
+    ndarray of float64, shape (N, W, C)
+    """
+    lower = np.floor(positions)
+    part = (positions - lower)[:, np.newaxis, np.newaxis]
+    first, second = (
+        image[np.clip(lower + i, 0, image.shape[0] - 1).astype(np.intp)] for i in (0, 1)
+    )
+    rows: Array = (1 - part) * first + part * second
+    return rows

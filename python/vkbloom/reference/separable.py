@@ -45,7 +45,7 @@ def passes(
     tap(-i step)), the step being one texel times the scale. A loop is one vertical and one
     horizontal pass at the size of the glow; the last horizontal pass is evaluated at every
     pixel of `size`. Each layer is such a blur of the glow at its own scale, added with its own
-    strength, and the sum is stored after each layer.
+    strength, and the sum is clamped after each layer.
 
     With ``settings.direct`` a loop is a single pass that reads a grid of N x N taps, weighted
     by the products of the kernel with itself, and no vertical framebuffer exists.
@@ -87,8 +87,8 @@ def passes(
                 blurred = sample(vertical, target, x_taps=x_taps)
             if not is_last:
                 blurred = store(blurred)
-        bloom = store(bloom + strength * blurred)
-    return {**framebuffers, "bloom": bloom}
+        bloom = store.end(bloom + strength * blurred)
+    return {**framebuffers, "bloom": store(bloom)}
 
 
 def gain(settings: SeparableSettings) -> float:

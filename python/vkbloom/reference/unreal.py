@@ -19,6 +19,7 @@ __all__ = ["gain", "passes"]
 _TAP_COUNTS = (6, 10, 14, 18, 22)
 _FACTORS = (1.0, 0.8, 0.6, 0.4, 0.2)
 _LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
+_NODES_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class UnrealSettings(Protocol):
@@ -30,6 +31,8 @@ class UnrealSettings(Protocol):
     def smooth_width(self) -> float: ...
     @property
     def radius(self) -> float: ...
+    @property
+    def node(self) -> bool: ...
 
 
 def passes(
@@ -37,11 +40,11 @@ def passes(
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    down_0 and "bright" have half of the frame's size, rounded, each next level half of the one
-    above, rounded. Each level is the one above it, the first one "bright", blurred by a Gaussian
-    along x with taps one pixel of the level apart, then along y. up_0 is the sum of the levels,
-    each bilinear and with its factor; the bloom is up_0, bilinear. In buffers that end at 1, up_0
-    is divided by the sum of the factors, 3.
+    down_0 and "bright" have half of the frame's size, rounded (of `node` floored), each next level
+    half of the one above, likewise. Each level is the one above it, the first one "bright", blurred
+    by a Gaussian along x with taps one pixel of the level apart, then along y. up_0 is the sum of
+    the levels, each bilinear and with its factor; the bloom is up_0, bilinear. In buffers that end
+    at 1, up_0 is divided by the sum of the factors, 3.
 
     Parameters
     ----------
@@ -59,12 +62,12 @@ def passes(
         "bright", "down_0" to "down_4", "up_0" and "bloom", (height, width, C).
     """
     height, width, _ = glow.shape
-    half = (math.floor(width / 2 + 0.5), math.floor(height / 2 + 0.5))
+    half = _halved((width, height), settings)
     image = store(_prefilter(sample(glow, half), settings))
     framebuffers = {"bright": image}
     total = np.zeros_like(image)
     for k, factor in enumerate(_factors(settings.radius)):
-        width, height = math.floor(width / 2 + 0.5), math.floor(height / 2 + 0.5)
+        width, height = _halved((width, height), settings)
         ratio = image.shape[1] / width
         x_taps = [(i * ratio, weight) for i, weight in _kernel(k)]
         across = store(sample(image, (width, height), x_taps=x_taps))
@@ -73,7 +76,7 @@ def passes(
         total += factor * sample(image, half)
     whole = sum(_factors(settings.radius)) if store.high == 1 else 1.0
     framebuffers["up_0"] = store(total / whole)
-    framebuffers["bloom"] = store(whole * sample(framebuffers["up_0"], size))
+    framebuffers["bloom"] = store.end(whole * sample(framebuffers["up_0"], size))
     return framebuffers
 
 
@@ -84,6 +87,13 @@ def gain(settings: UnrealSettings) -> float:
         value *= sum(weight for _, weight in _kernel(k)) ** 2
         total += factor * value
     return total
+
+
+def _halved(size: tuple[int, int], settings: UnrealSettings) -> tuple[int, int]:
+    """Return half of a size, rounded up from .5, or floored but never under 1."""
+    more = 0 if settings.node else 1
+    width, height = (max(1, (side + more) // 2) for side in size)
+    return width, height
 
 
 def _factors(radius: float) -> list[float]:
@@ -102,6 +112,7 @@ def _kernel(level: int) -> list[tuple[float, float]]:
 def _prefilter(rgb: Array, settings: UnrealSettings) -> Array:
     if settings.threshold is None:
         return rgb
-    grey = rgb if rgb.shape[2] == 1 else (rgb * _LUMINANCE).sum(axis=-1, keepdims=True)
+    weights = _NODES_LUMINANCE if settings.node else _LUMINANCE
+    grey = rgb if rgb.shape[2] == 1 else (rgb * weights).sum(axis=-1, keepdims=True)
     t = np.clip((grey - settings.threshold) / settings.smooth_width, 0, 1)
     return rgb * (t * t * (3 - 2 * t))

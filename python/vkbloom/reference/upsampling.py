@@ -9,7 +9,15 @@ import numpy as np
 from .image import Storage
 from .sampling import Array, sample
 
-__all__ = ["combine", "cubic", "flat_gain", "linear", "tent", "tent_of_target"]
+__all__ = [
+    "combine",
+    "cubic",
+    "flat_gain",
+    "linear",
+    "spline_taps",
+    "tent",
+    "tent_of_target",
+]
 
 # (image, size of the result) -> the image enlarged
 Filter = Callable[[Array, tuple[int, int]], Array]
@@ -54,6 +62,32 @@ def _cubic_rows(image: Array, count: int) -> Array:
         texels = np.clip(lower + offset, 0, length - 1).astype(np.intp)
         result += weight / 6 * image[texels]
     return result
+
+
+def spline_taps(positions: Array) -> list[tuple[Array, Array]]:
+    """Return the cubic B-spline as two bilinear taps: their positions and their weights.
+
+    The four texels around a position weigh w_0 to w_3. A bilinear tap between the first two, at
+    w_1 / (w_0 + w_1) of the way, has both their shares (Sigg and Hadwiger, "Fast Third-Order
+    Texture Filtering", GPU Gems 2, chapter 20); likewise the other two.
+
+    Parameters
+    ----------
+    positions : ndarray
+        In texels, with texel n at n.
+
+    Returns
+    -------
+    list of (ndarray, ndarray)
+    """
+    lower = np.floor(positions)
+    f = positions - lower
+    w = ((1 - f) ** 3 / 6, (4 - 6 * f**2 + 3 * f**3) / 6, (1 + 3 * f + 3 * f**2 - 3 * f**3) / 6)
+    right = w[2] + f**3 / 6
+    return [
+        (lower - 1 + w[1] / (w[0] + w[1]), w[0] + w[1]),
+        (lower + 1 + f**3 / 6 / right, right),
+    ]
 
 
 def combine(
@@ -101,7 +135,7 @@ def combine(
         whole = own[k] + coarse[k] * whole if store.high == 1 else 1.0
         up = store(up / whole)
         framebuffers[f"up_{k}"] = up
-    framebuffers["bloom"] = store(gain * whole * last(up, size))
+    framebuffers["bloom"] = store.end(gain * whole * last(up, size))
     return framebuffers
 
 

@@ -1,0 +1,103 @@
+#include "graph/dry_run.h"
+
+#include <string.h>
+
+void vkb_dry_run_destroy(struct vkb_dry_run *dry_run)
+{
+    for (size_t i = 0; i < dry_run->count; ++i) {
+        vkb_free(dry_run->images[i]->content.recipe);
+        vkb_free(dry_run->images[i]);
+    }
+    vkb_free(dry_run->images);
+    vkb_planner_destroy(&dry_run->planner);
+    *dry_run = (struct vkb_dry_run){0};
+}
+
+static struct vkb_dry_image *find_image(const struct vkb_dry_run *dry_run, const char *name)
+{
+    for (size_t i = 0; i < dry_run->count; ++i)
+        if (strcmp(dry_run->images[i]->row.name, name) == 0)
+            return dry_run->images[i];
+    return NULL;
+}
+
+static bool fits(const struct vkb_dry_image *image, const struct vkb_image_row *row)
+{
+    return image->row.format == row->format && image->row.width == row->width
+        && image->row.height == row->height;
+}
+
+static struct vkb_dry_image *add_image(struct vkb_dry_run *dry_run, struct vkb_error *error)
+{
+    struct vkb_dry_image *image;
+
+    if (!vkb_grow(error, &dry_run->images, &dry_run->capacity, dry_run->count + 1,
+                  sizeof(struct vkb_dry_image *))
+        || !(image = vkb_alloc(error, 1, sizeof *image)))
+        return NULL;
+    dry_run->images[dry_run->count++] = image;
+    return image;
+}
+
+// What an image of that row would hold; one of another size or format is replaced.
+static struct vkb_content *resolve(struct vkb_dry_run *dry_run, const struct vkb_image_row *row,
+                                   struct vkb_error *error)
+{
+    struct vkb_dry_image *image = find_image(dry_run, row->name);
+
+    if (!image && !(image = add_image(dry_run, error)))
+        return NULL;
+    image->content.valid = image->content.valid && fits(image, row);
+    image->row = *row;
+    return &image->content;
+}
+
+static bool note_run(void *context, uint32_t first, uint32_t end, struct vkb_error *error)
+{
+    bool *ran = context;
+
+    (void)end;
+    (void)error;
+    ran[first] = true;
+    return true;
+}
+
+static bool step(struct vkb_dry_run *dry_run, struct vkb_plan_step *planned, bool *ran,
+                 struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &planned->plan->graph;
+    struct vkb_content **contents = planned->contents;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        struct vkb_dry_image *image = find_image(dry_run, graph->images[i].name);
+        contents[i] = image && fits(image, &graph->images[i]) ? &image->content : NULL;
+        if (!graph->images[i].input)
+            continue;
+        if (!(contents[i] = resolve(dry_run, &graph->images[i], error)))
+            return false;
+        contents[i]->version = dry_run->source_version;
+    }
+    if (!vkb_planner_mark(&dry_run->planner, planned, error))
+        return false;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (dry_run->planner.wanted[i]
+            && !(contents[i] = resolve(dry_run, &graph->images[i], error)))
+            return false;
+    return vkb_planner_run(&dry_run->planner, planned, &dry_run->clock, note_run, ran, error);
+}
+
+bool vkb_dry_run_step(struct vkb_dry_run *dry_run, const struct vkb_plan *plan, uint64_t source,
+                      bool *ran, struct vkb_error *error)
+{
+    struct vkb_plan_step planned = {.plan = plan};
+
+    if (!dry_run->source_version || dry_run->source != source)
+        dry_run->source_version = ++dry_run->clock;
+    dry_run->source = source;
+    planned.source = planned.scene = dry_run->source_version;
+    planned.contents = vkb_alloc(error, plan->graph.image_count, sizeof *planned.contents);
+    memset(ran, 0, plan->graph.pass_count * sizeof *ran);
+    const bool done = planned.contents && step(dry_run, &planned, ran, error);
+    vkb_free(planned.contents);
+    return done;
+}

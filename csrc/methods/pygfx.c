@@ -1,0 +1,42 @@
+// The PhysicalBasedBloomPass of pygfx. Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py
+// @ f5f8f72c.
+#include "methods/methods.h"
+#include "passes/levels.h"
+
+// A level for each halving of the longer side to 1, that of level 0 counted.
+static uint32_t most_levels(struct vkb_size first)
+{
+    uint32_t longer = first.width > first.height ? first.width : first.height, count = 0;
+
+    for (; longer > 0; longer /= 2)
+        ++count;
+    return count;
+}
+
+bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
+    struct vkb_size size = vkb_halved(source->buffers);
+    const uint32_t wanted = (uint32_t)settings->values.levels, most = most_levels(size);
+    uint32_t from = source->glow;
+
+    levels.count = wanted < most ? wanted : most;
+    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
+        levels.sizes[level] = size;
+        if (!vkb_levels_image(&levels, "down_%u", level, size, &levels.downs[level], error))
+            return false;
+        size = vkb_halved(size);
+        struct vkb_pass_row row =
+            level ? vkb_down_row(&levels, false, from, levels.downs[level])
+                  : vkb_pyramid_row(&levels, VKB_SHADER_pygfx_down_frag, from, levels.downs[0]);
+        row.constants.karis_average = level == 0 && settings->values.karis_average;
+        if (!vkb_graph_add_pass(graph, &row, error))
+            return false;
+    }
+    combination.last_kernel = UPSAMPLE_LINEAR;
+    combination.radius = settings->values.filter_radius;
+    combination.width_step = true;
+    return vkb_levels_combine(&levels, &combination, bloom, error);
+}

@@ -1,0 +1,45 @@
+#include "methods/source.h"
+
+bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings *settings,
+                      uint32_t max_side, struct vkb_graph *graph, struct vkb_error *error)
+{
+    switch (source->kind) {
+    case VKB_SOURCE_NONE:
+        break;
+    case VKB_SOURCE_SCENE:
+        return vkb_check_sizes(settings, "size", source->scene.size, max_side, error)
+            && vkb_build_scene(source->shading, settings, &source->scene, graph, error);
+    case VKB_SOURCE_IMAGE:
+        return vkb_check_sizes(settings, "image", source->image.size, max_side, error)
+            && vkb_build_image(settings, &source->image, graph, error);
+    }
+    return vkb_fail(error, VKB_ERROR_GENERAL, "source: there is nothing in it");
+}
+
+static bool image_fits(const struct vkb_image_source *planned, const struct vkb_image_source *given)
+{
+    return planned->format == given->format && planned->channels == given->channels
+        && planned->size.width == given->size.width && planned->size.height == given->size.height;
+}
+
+static bool scene_fits(const struct vkb_scene_source *planned, const struct vkb_scene_source *given)
+{
+    return planned->has_sky == given->has_sky && planned->has_glow == given->has_glow
+        && planned->body_textured == given->body_textured
+        && planned->glow_textured == given->glow_textured;
+}
+
+bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given)
+{
+    if (planned->kind != given->kind)
+        return false;
+    switch (given->kind) {
+    case VKB_SOURCE_NONE:
+        break;
+    case VKB_SOURCE_SCENE:
+        return scene_fits(&planned->scene, &given->scene);
+    case VKB_SOURCE_IMAGE:
+        return image_fits(&planned->image, &given->image);
+    }
+    return false;
+}

@@ -1,0 +1,84 @@
+// The Pages type: a run of a renderer's pages with the buffer protocol. NumPy's arrays are views of
+// it, so that the pages come back when the last of them is gone, which may be long after the
+// renderer.
+#include "python/module.h"
+
+struct pages_object {
+    PyObject_HEAD
+    struct vkb_pages *pages;
+    struct vkb_page_run *run;
+    Py_ssize_t size;  // asked for; the run may have more
+    long process;     // whose device the run goes back to
+};
+
+PyObject *vkb_new_pages(PyObject *object, PyObject *argument)
+{
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+    struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    PyTypeObject *type = (PyTypeObject *)state->pages_type;
+    const Py_ssize_t size = PyLong_AsSsize_t(argument);
+    struct vkb_error error = {0};
+
+    if (PyErr_Occurred())
+        return NULL;
+    if (size < 1) {
+        PyErr_Format(PyExc_ValueError, "pages: a size of %zd bytes is not above 0", size);
+        return NULL;
+    }
+    if (!vkb_require_open(renderer, &error))
+        return vkb_raise(state, &error);
+    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
+    struct pages_object *self = (struct pages_object *)allocate(type, 0);
+    if (!self)
+        return NULL;
+    self->size = size;
+    self->process = renderer->process;
+    self->run = vkb_pages_take(renderer->pages, (size_t)size, &error);
+    if (!self->run) {
+        Py_DECREF(self);
+        return vkb_raise(state, &error);
+    }
+    self->pages = renderer->pages;
+    return (PyObject *)self;
+}
+
+static void dealloc(PyObject *object)
+{
+    struct pages_object *self = (struct pages_object *)object;
+    PyTypeObject *type = Py_TYPE(object);
+    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
+
+    // A forked process keeps its copies: the device is its parent's.
+    if (self->run && self->process == vkb_current_process())
+        vkb_pages_give_back(self->pages, self->run);
+    release(self);
+    Py_DECREF(type);
+}
+
+static int get_buffer(PyObject *object, Py_buffer *view, int flags)
+{
+    struct pages_object *self = (struct pages_object *)object;
+
+    return PyBuffer_FillInfo(view, object, self->run->memory, self->size, 0, flags);
+}
+
+static Py_ssize_t length(PyObject *object)
+{
+    return ((struct pages_object *)object)->size;
+}
+
+static PyType_Slot slots[] = {
+    {Py_tp_dealloc, dealloc},
+    {Py_bf_getbuffer, get_buffer},
+    {Py_sq_length, length},
+    {Py_tp_doc, "Memory of a renderer's that the device writes to without a copy."},
+    {0},
+};
+
+// It holds no references, so that the collector has nothing to see.
+PyType_Spec vkb_pages_spec = {
+    .name = "vkbloom._core.Pages",
+    .basicsize = sizeof(struct pages_object),
+    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .slots = slots,
+};

@@ -1,0 +1,468 @@
+// The Plan type: the graph of a source with some settings, made without a call to Vulkan.
+#include "python/module.h"
+
+#include "graph/dry_run.h"
+
+#include <string.h>
+
+// What plans without a renderer are checked against: all that some device can do.
+#define ALL_FEATURES (~(VkFormatFeatureFlags)0)
+static const struct vkb_device any_device = {
+    .adapter = {.name = "any"},
+    .limits =
+        {
+            .maxComputeSharedMemorySize = UINT32_MAX,
+            .maxComputeWorkGroupInvocations = UINT32_MAX,
+        },
+    .max_side = VKB_MAX_SIDE,
+    .features =
+        {
+            [VKB_FORMAT_RGBA8_UNORM] = ALL_FEATURES,
+            [VKB_FORMAT_RGBA16_FLOAT] = ALL_FEATURES,
+            [VKB_FORMAT_RGBA32_FLOAT] = ALL_FEATURES,
+            [VKB_FORMAT_DEPTH32_FLOAT] = ALL_FEATURES,
+        },
+    .dispatch = true,
+};
+
+static bool set_steal(PyObject *tuple, Py_ssize_t index, PyObject *item)
+{
+    return item && PyTuple_SetItem(tuple, index, item) == 0;
+}
+
+// Whether the image is wanted: all are where `names` is None. -1 with an exception set.
+static int is_wanted(PyObject *names, const char *name)
+{
+    if (names == Py_None)
+        return 1;
+    PyObject *text = PyUnicode_FromString(name);
+    int wanted = text ? PySequence_Contains(names, text) : -1;
+    Py_XDECREF(text);
+    return wanted;
+}
+
+static bool check_names(const struct vkb_graph *graph, PyObject *names)
+{
+    for (Py_ssize_t i = 0, count = names == Py_None ? 0 : PyTuple_Size(names); i < count; ++i) {
+        PyObject *name = PyTuple_GetItem(names, i);
+        PyObject *text = PyUnicode_Check(name) ? PyUnicode_AsUTF8String(name) : NULL;
+        bool found = text && vkb_graph_find(graph, PyBytes_AsString(text)) != VKB_NO_IMAGE;
+        Py_XDECREF(text);
+        if (found)
+            continue;
+        if (PyErr_Occurred())
+            return false;
+        char list[1024] = "";
+        for (uint32_t image = 0; image < graph->image_count; ++image)
+            if (graph->images[image].framebuffer && strlen(list) + VKB_NAME_SIZE + 2 < sizeof list)
+                strcat(strcat(list, *list ? ", " : ""), graph->images[image].name);
+        PyErr_Format(PyExc_ValueError, "attachments: there is no %R here, only %s", name, list);
+        return false;
+    }
+    return true;
+}
+
+static bool choose_outputs(struct vkb_plan *plan, PyObject *names)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    struct vkb_error error;
+
+    if (names != Py_None && !vkb_require_tuple(names, "attachments"))
+        return false;
+    plan->outputs = vkb_alloc(&error, graph->image_count, sizeof *plan->outputs);
+    if (!plan->outputs) {
+        PyErr_NoMemory();
+        return false;
+    }
+    if (!check_names(graph, names))
+        return false;
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const int wanted =
+            graph->images[i].framebuffer ? is_wanted(names, graph->images[i].name) : 0;
+        if (wanted < 0)
+            return false;
+        if (wanted)
+            plan->outputs[plan->output_count++] = i;
+    }
+    return true;
+}
+
+static PyObject *describe_output(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_image_row *row = &graph->images[image];
+    const uint32_t channels = vkb_graph_channels(graph, image);
+    const char *dtype = vkb_formats[row->format].dtype;
+
+    return channels == 1
+             ? Py_BuildValue("s(II)s", row->name, row->height, row->width, dtype)
+             : Py_BuildValue("s(III)s", row->name, row->height, row->width, channels, dtype);
+}
+
+size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output)
+{
+    const uint32_t image = plan->outputs[output];
+    const struct vkb_image_row *row = &plan->graph.images[image];
+
+    return (size_t)row->width * row->height * vkb_graph_channels(&plan->graph, image)
+         * vkb_formats[row->format].channel_size;
+}
+
+static PyObject *describe_outputs(const struct vkb_plan *plan)
+{
+    PyObject *tuple = PyTuple_New(plan->output_count);
+
+    for (uint32_t i = 0; tuple && i < plan->output_count; ++i)
+        if (!set_steal(tuple, i, describe_output(&plan->graph, plan->outputs[i])))
+            Py_CLEAR(tuple);
+    return tuple;
+}
+
+static bool build_graph(const struct vkb_device *device, enum vkb_forms forms,
+                        const struct vkb_source *source, const struct vkb_settings *settings,
+                        struct vkb_graph *graph, struct vkb_error *error)
+{
+    return vkb_source_build(source, settings, device->max_side, graph, error)
+        && vkb_forms_choose(forms, device, graph, error)
+        && vkb_graph_check(graph, device->max_side, error) && vkb_slots_check(device, graph, error);
+}
+
+static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
+                          enum vkb_forms forms, uint64_t renderer, PyObject *source,
+                          const struct vkb_settings *settings, PyObject *names)
+{
+    PyTypeObject *type = (PyTypeObject *)state->plan_type;
+    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
+    struct vkb_plan_object *self = (struct vkb_plan_object *)allocate(type, 0);
+    struct vkb_error error = {0};
+
+    if (!self)
+        return NULL;
+    self->source = ((struct vkb_source_object *)source)->source;
+    self->renderer = renderer;
+    if (!build_graph(device, forms, &self->source, settings, &self->plan.graph, &error)) {
+        Py_DECREF(self);
+        return vkb_raise(state, &error);
+    }
+    if (!choose_outputs(&self->plan, names) || !(self->outputs = describe_outputs(&self->plan))) {
+        Py_DECREF(self);
+        return NULL;
+    }
+    return (PyObject *)self;
+}
+
+PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
+{
+    const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    PyObject *source, *settings_object, *names;
+    struct vkb_settings settings;
+    struct vkb_error error = {0};
+
+    if (!PyArg_ParseTuple(arguments, "O!OO:plan", state->source_type, &source, &settings_object,
+                          &names)
+        || !vkb_read_settings(state, settings_object, &settings))
+        return NULL;
+    if (!vkb_require_open(renderer, &error))
+        return vkb_raise(state, &error);
+    return new_plan(state, &renderer->device, renderer->forms, renderer->serial, source, &settings,
+                    names);
+}
+
+PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
+{
+    const struct vkb_module_state *state = vkb_module_state(module);
+    PyObject *source, *settings_object, *names;
+    struct vkb_settings settings;
+    struct vkb_device device = any_device;
+    struct vkb_error error = {0};
+    enum vkb_forms forms;
+    const char *variants;
+
+    if (!PyArg_ParseTuple(arguments, "O!OOs:plan", state->source_type, &source, &settings_object,
+                          &names, &variants)
+        || !vkb_read_settings(state, settings_object, &settings))
+        return NULL;
+    if (!vkb_forms_by_name(variants, &device, &forms, &error))
+        return vkb_raise(state, &error);
+    // What the variant is for.
+    device.adapter.device_type =
+        forms == VKB_FORMS_CPU ? VK_PHYSICAL_DEVICE_TYPE_CPU : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    return new_plan(state, &device, forms, 0, source, &settings, names);
+}
+
+static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)
+{
+    PyObject *tuple = PyTuple_New(count);
+
+    for (uint32_t i = 0; tuple && i < count; ++i)
+        if (!set_steal(tuple, i, PyUnicode_FromString(graph->images[images[i]].name)))
+            Py_CLEAR(tuple);
+    return tuple;
+}
+
+// The images that the pass reads, each once; returns how many.
+static uint32_t read_images(const struct vkb_pass_row *pass, uint32_t *images)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < pass->read_count; ++i) {
+        uint32_t seen = 0;
+        while (seen < count && images[seen] != pass->reads[i])
+            ++seen;
+        if (seen == count)
+            images[count++] = pass->reads[i];
+    }
+    return count;
+}
+
+static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, uint32_t index,
+                               uint32_t group)
+{
+    const struct vkb_pass_row *pass = &graph->passes[index];
+    uint32_t reads[VKB_MAX_READS], targets[VKB_MAX_TARGETS + 1];
+    const uint32_t read_count = read_images(pass, reads);
+    const uint32_t target_count = vkb_pass_targets(pass, targets);
+
+    return Py_BuildValue("(ssNNsI)", name, vkb_spirv[pass->shader].name,
+                         image_names(graph, reads, read_count),
+                         image_names(graph, targets, target_count),
+                         pass->variant ? pass->variant : "fragment", group);
+}
+
+// (source subpass, target subpass, source stages, target stages, source access, target access,
+// flags); an external subpass is -1.
+static PyObject *describe_dependency(const VkSubpassDependency *dependency)
+{
+    return Py_BuildValue(
+        "(iikkkkk)", (int)dependency->srcSubpass, (int)dependency->dstSubpass,
+        (unsigned long)dependency->srcStageMask, (unsigned long)dependency->dstStageMask,
+        (unsigned long)dependency->srcAccessMask, (unsigned long)dependency->dstAccessMask,
+        (unsigned long)dependency->dependencyFlags);
+}
+
+static PyObject *describe_dependencies(const struct vkb_graph *graph, uint32_t first, uint32_t end)
+{
+    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
+    VkSubpassDependency dependencies[VKB_MAX_DEPENDENCIES];
+    const uint32_t use_count = vkb_graph_target_uses(graph, first, end, uses);
+    const uint32_t count = vkb_subpass_dependencies(uses, use_count, dependencies);
+    PyObject *tuple = PyTuple_New(count);
+
+    for (uint32_t i = 0; tuple && i < count; ++i)
+        if (!set_steal(tuple, i, describe_dependency(&dependencies[i])))
+            Py_CLEAR(tuple);
+    return tuple;
+}
+
+static bool append_steal(PyObject *list, PyObject *item)
+{
+    bool done = item && PyList_Append(list, item) == 0;
+    Py_XDECREF(item);
+    return done;
+}
+
+// By pass, whether a group of passes that starts with it runs where nothing has run before; freed
+// by the caller. NULL with an exception set.
+static bool *mark_alone(PyObject *object)
+{
+    const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
+    struct vkb_dry_run dry_run = {0};
+    struct vkb_error error = {0};
+    bool *ran = vkb_alloc(&error, plan->graph.pass_count, sizeof *ran);
+
+    if (!ran || !vkb_dry_run_step(&dry_run, plan, 0, ran, &error)) {
+        vkb_free(ran);
+        ran = NULL;
+        vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+    }
+    vkb_dry_run_destroy(&dry_run);
+    return ran;
+}
+
+static bool add_group(PyObject *list, const struct vkb_graph *graph, uint32_t first, uint32_t end,
+                      uint32_t group)
+{
+    const char *name = vkb_graph_timed_as(graph, first);
+    bool done = true;
+
+    for (uint32_t i = first; done && i < end; ++i)
+        done = append_steal(list, describe_pass(graph, name, i, group));
+    return done;
+}
+
+// A list of the passes that run, or of the dependencies of their render passes.
+static PyObject *describe_groups(PyObject *object, bool dependencies)
+{
+    const struct vkb_graph *graph = &((struct vkb_plan_object *)object)->plan.graph;
+    bool *ran = mark_alone(object);
+    PyObject *list = ran ? PyList_New(0) : NULL;
+    uint32_t group = 0;
+
+    for (uint32_t first = 0, end; list && first < graph->pass_count; first = end) {
+        end = vkb_graph_group_end(graph, first);
+        if (!ran[first])
+            continue;
+        if (dependencies ? !append_steal(list, describe_dependencies(graph, first, end))
+                         : !add_group(list, graph, first, end, group))
+            Py_CLEAR(list);
+        ++group;
+    }
+    vkb_free(ran);
+    return list;
+}
+
+static PyObject *get_passes(PyObject *object, void *unused)
+{
+    (void)unused;
+    return describe_groups(object, false);
+}
+
+static PyObject *get_dependencies(PyObject *object, void *unused)
+{
+    (void)unused;
+    return describe_groups(object, true);
+}
+
+static PyObject *get_outputs(PyObject *object, void *unused)
+{
+    (void)unused;
+    return Py_NewRef(((struct vkb_plan_object *)object)->outputs);
+}
+
+static PyObject *get_size(PyObject *object, void *unused)
+{
+    const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
+    size_t size = 0;
+
+    (void)unused;
+    for (uint32_t i = 0; i < plan->output_count; ++i)
+        size += vkb_output_size(plan, i);
+    return PyLong_FromSize_t(size);
+}
+
+static PyObject *shares_images(PyObject *object, PyObject *other)
+{
+    if (Py_TYPE(other) != Py_TYPE(object)) {
+        PyErr_Format(PyExc_TypeError, "shares_images: a Plan is needed, not %R", other);
+        return NULL;
+    }
+    return PyBool_FromLong(vkb_graph_same_images(&((struct vkb_plan_object *)object)->plan.graph,
+                                                 &((struct vkb_plan_object *)other)->plan.graph));
+}
+
+// The names that the passes are timed under, without those that come again.
+static PyObject *names_of(const struct vkb_graph *graph, const bool *ran)
+{
+    PyObject *names = PyDict_New();
+
+    for (uint32_t first = 0; names && first < graph->pass_count; ++first)
+        if (ran[first]
+            && PyDict_SetItemString(names, vkb_graph_timed_as(graph, first), Py_None) < 0)
+            Py_CLEAR(names);
+    PyObject *list = names ? PyDict_Keys(names) : NULL;
+    Py_XDECREF(names);
+    return list;
+}
+
+// Scenes know each other by their serials, whatever the frame's time is; images are compared by
+// their pixels when they come to the device, and here taken for different ones.
+static uint64_t source_number(PyObject *object)
+{
+    const struct vkb_source_object *source = (const struct vkb_source_object *)object;
+
+    return source->source.kind == VKB_SOURCE_SCENE ? source->scene.data.serial
+                                                   : (uint64_t)(uintptr_t)source;
+}
+
+static PyObject *dry_step(const struct vkb_module_state *state, struct vkb_dry_run *dry_run,
+                          PyObject *step)
+{
+    PyObject *source, *object;
+    struct vkb_error error = {0};
+
+    if (!vkb_require_tuple(step, "dry_run")
+        || !PyArg_ParseTuple(step, "O!O!:dry_run", state->source_type, &source, state->plan_type,
+                             &object))
+        return NULL;
+    const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
+    bool *ran = vkb_alloc(&error, plan->graph.pass_count, sizeof *ran);
+    PyObject *names = ran && vkb_dry_run_step(dry_run, plan, source_number(source), ran, &error)
+                        ? names_of(&plan->graph, ran)
+                        : vkb_raise(state, &error);
+    vkb_free(ran);
+    return names;
+}
+
+PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps)
+{
+    struct vkb_dry_run dry_run = {0};
+
+    if (!vkb_require_tuple(steps, "dry_run"))
+        return NULL;
+    PyObject *list = PyList_New(0);
+    for (Py_ssize_t i = 0, count = PyTuple_Size(steps); list && i < count; ++i)
+        if (!append_steal(list,
+                          dry_step(vkb_module_state(module), &dry_run, PyTuple_GetItem(steps, i))))
+            Py_CLEAR(list);
+    vkb_dry_run_destroy(&dry_run);
+    return list;
+}
+
+static int traverse(PyObject *object, visitproc visit, void *arg)
+{
+    Py_VISIT(Py_TYPE(object));
+    Py_VISIT(((struct vkb_plan_object *)object)->outputs);
+    return 0;
+}
+
+static void dealloc(PyObject *object)
+{
+    struct vkb_plan_object *self = (struct vkb_plan_object *)object;
+    PyTypeObject *type = Py_TYPE(object);
+    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
+
+    PyObject_GC_UnTrack(object);
+    vkb_plan_destroy(&self->plan);
+    Py_XDECREF(self->outputs);
+    release(object);
+    Py_DECREF(type);
+}
+
+static PyMethodDef methods[] = {
+    {"shares_images", shares_images, METH_O,
+     "shares_images(plan) -> bool. Whether both have the same images, so that they can be run "
+     "together."},
+    {0},
+};
+
+static PyGetSetDef attributes[] = {
+    {"outputs", get_outputs, NULL, "((name, shape, dtype), ...) of the framebuffers wanted.", NULL},
+    {"passes", get_passes, NULL,
+     "[(name, shader, reads, writes, variant, number of its render pass), ...] of what runs where "
+     "nothing has run before.",
+     NULL},
+    {"dependencies", get_dependencies, NULL,
+     "Of each render pass: ((source subpass, target subpass, source stages, target stages, source "
+     "access, target access, flags), ...)",
+     NULL},
+    {"size", get_size, NULL, "Bytes of all outputs.", NULL},
+    {0},
+};
+
+// What it holds is set once and holds no objects of the collector's: there is nothing to clear.
+static PyType_Slot slots[] = {
+    {Py_tp_dealloc, dealloc},
+    {Py_tp_traverse, traverse},
+    {Py_tp_methods, methods},
+    {Py_tp_getset, attributes},
+    {Py_tp_doc, "The graph of a source with some settings."},
+    {0},
+};
+
+PyType_Spec vkb_plan_spec = {
+    .name = "vkbloom._core.Plan",
+    .basicsize = sizeof(struct vkb_plan_object),
+    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
+           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .slots = slots,
+};

@@ -1,0 +1,351 @@
+// Plans run on a renderer: the Submission type. The GIL is released around all device work.
+#include "python/module.h"
+
+#include <string.h>
+
+struct submission {
+    PyObject_HEAD
+    struct vkb_renderer *renderer;
+    struct vkb_pending *pending;  // NULL: waited for, or abandoned
+};
+
+static struct vkb_module_state *state_of(PyObject *object)
+{
+    return PyType_GetModuleState(Py_TYPE(object));
+}
+
+static const struct vkb_plan_object *plan_at(PyObject *plans, Py_ssize_t index)
+{
+    return (const struct vkb_plan_object *)PyTuple_GetItem(plans, index);
+}
+
+static bool check_plan(const struct vkb_renderer *renderer, const struct vkb_source *source,
+                       PyObject *plans, Py_ssize_t index)
+{
+    const struct vkb_plan_object *plan = plan_at(plans, index);
+
+    if (!PyObject_TypeCheck(PyTuple_GetItem(plans, index),
+                            (PyTypeObject *)state_of((PyObject *)renderer)->plan_type))
+        PyErr_SetString(PyExc_TypeError, "plans: a tuple of Plans is needed");
+    else if (plan->renderer != renderer->serial)
+        PyErr_SetString(PyExc_ValueError, "plans: one was made for another renderer");
+    else if (!vkb_source_fits(&plan->source, source))
+        PyErr_SetString(PyExc_ValueError, "plans: one was made for another source");
+    else if (!vkb_graph_same_images(&plan_at(plans, 0)->plan.graph, &plan->plan.graph))
+        PyErr_SetString(PyExc_ValueError, "plans: not all have the same images");
+    else
+        return true;
+    return false;
+}
+
+static bool check_plans(const struct vkb_renderer *renderer, const struct vkb_source *source,
+                        PyObject *plans, PyObject *arrays)
+{
+    const Py_ssize_t count = PyTuple_Size(plans);
+
+    if (count < 1 || PyTuple_Size(arrays) != count) {
+        PyErr_Format(PyExc_ValueError, "arrays: %zd tuples for %zd plans; one is needed for each",
+                     PyTuple_Size(arrays), count);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i)
+        if (!check_plan(renderer, source, plans, i))
+            return false;
+    return true;
+}
+
+// Room for what the requests need beside their plans.
+static struct vkb_pending *new_pending(PyObject *plans, struct vkb_error *error)
+{
+    struct vkb_pending *pending = vkb_alloc(error, 1, sizeof *pending);
+    const Py_ssize_t count = PyTuple_Size(plans);
+    size_t output_count = 0, pass_count = 0;
+
+    if (!pending)
+        return NULL;
+    for (Py_ssize_t i = 0; i < count; ++i) {
+        output_count += plan_at(plans, i)->plan.output_count;
+        pass_count += plan_at(plans, i)->plan.graph.pass_count;
+    }
+    pending->plans = Py_NewRef(plans);
+    pending->requests = vkb_alloc(error, (size_t)count, sizeof *pending->requests);
+    pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
+    pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
+    pending->timings = vkb_alloc(error, pass_count, sizeof *pending->timings);
+    if (pending->requests && pending->outputs && pending->views && pending->timings)
+        return pending;
+    vkb_pending_release(pending);
+    return NULL;
+}
+
+static void release_views(struct vkb_pending *pending)
+{
+    while (pending->view_count > 0)
+        PyBuffer_Release(&pending->views[--pending->view_count]);
+}
+
+void vkb_pending_release(struct vkb_pending *pending)
+{
+    release_views(pending);
+    vkb_free(pending->requests);
+    vkb_free(pending->outputs);
+    vkb_free(pending->views);
+    vkb_free(pending->timings);
+    Py_XDECREF(pending->plans);
+    vkb_free(pending);
+}
+
+int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg)
+{
+    Py_VISIT(pending->plans);
+    for (size_t i = 0; i < pending->view_count; ++i)
+        Py_VISIT(pending->views[i].obj);
+    return 0;
+}
+
+static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
+                       const struct vkb_plan *plan, uint32_t output, PyObject *array)
+{
+    const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
+    Py_buffer *view = &pending->views[pending->view_count];
+
+    if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
+        return false;
+    pending->outputs[pending->view_count++] = (struct vkb_output){
+        .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
+        .memory = view->buf,
+        // (Whoever keeps many arrays shall not pay for each small one.)
+        .pages = view->len >= VKB_IMPORTED_BYTES && renderer->pages
+                   ? vkb_pages_find(renderer->pages, view->buf)
+                   : NULL,
+    };
+    if ((size_t)view->len == vkb_output_size(plan, output))
+        return true;
+    PyErr_Format(PyExc_ValueError, "%s: the array has the wrong size", row->name);
+    return false;
+}
+
+static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending *pending,
+                        PyObject *arrays)
+{
+    size_t passes = 0;
+
+    for (Py_ssize_t i = 0, count = PyTuple_Size(arrays); i < count; ++i) {
+        const struct vkb_plan *plan = &plan_at(pending->plans, i)->plan;
+        PyObject *tuple = PyTuple_GetItem(arrays, i);
+        pending->requests[i] = (struct vkb_request){
+            .plan = plan,
+            .outputs = pending->outputs + pending->view_count,
+            .timings = pending->timings + passes,
+        };
+        passes += plan->graph.pass_count;
+        if (!vkb_require_tuple(tuple, "arrays"))
+            return false;
+        if (PyTuple_Size(tuple) != (Py_ssize_t)plan->output_count) {
+            PyErr_Format(PyExc_ValueError, "arrays: %zd for %u framebuffers", PyTuple_Size(tuple),
+                         plan->output_count);
+            return false;
+        }
+        for (uint32_t output = 0; output < plan->output_count; ++output)
+            if (!hold_array(renderer, pending, plan, output, PyTuple_GetItem(tuple, output)))
+                return false;
+        ++pending->count;
+    }
+    return true;
+}
+
+static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *plans,
+                                         PyObject *arrays)
+{
+    struct vkb_module_state *state = state_of((PyObject *)renderer);
+    PyTypeObject *type = (PyTypeObject *)state->submission_type;
+    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
+    struct submission *self = (struct submission *)allocate(type, 0);
+    struct vkb_error error = {0};
+
+    if (!self)
+        return NULL;
+    self->renderer = (struct vkb_renderer *)Py_NewRef((PyObject *)renderer);
+    self->pending = new_pending(plans, &error);
+    if (!self->pending)
+        vkb_raise(state, &error);
+    else if (hold_arrays(renderer, self->pending, arrays))
+        return self;
+    Py_DECREF(self);
+    return NULL;
+}
+
+static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object *source,
+                   struct vkb_pending *pending, struct vkb_error *error)
+{
+    const struct vkb_frame_source data = {
+        .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
+        .input = source->source.kind == VKB_SOURCE_IMAGE ? &source->image.input : NULL,
+    };
+
+    if (!vkb_renderer_enter(renderer, error))
+        return false;
+    bool done = vkb_require_open(renderer, error)
+             && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
+                                 pending->count, &pending->flight, error);
+    if (done && data.input)
+        pending->specials = renderer->frame.upload.specials;
+    done = vkb_renderer_check_messages(renderer, done, error);
+    vkb_renderer_leave(renderer);
+    return done;
+}
+
+PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
+{
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+    struct vkb_module_state *state = state_of(object);
+    PyObject *source, *plans, *arrays;
+    struct vkb_error error = {0};
+
+    if (!PyArg_ParseTuple(arguments, "O!O!O!:run", state->source_type, &source, &PyTuple_Type,
+                          &plans, &PyTuple_Type, &arrays)
+        || !check_plans(renderer, &((struct vkb_source_object *)source)->source, plans, arrays))
+        return NULL;
+    struct submission *self = new_submission(renderer, plans, arrays);
+    if (self && !submit(renderer, (struct vkb_source_object *)source, self->pending, &error)) {
+        // Also with an exception set, which is kept: whoever hears of the arrays' end is Python.
+        vkb_raise(state, &error);
+        PyObject *type, *value, *traceback;
+        PyErr_Fetch(&type, &value, &traceback);
+        Py_DECREF(self);
+        PyErr_Restore(type, value, traceback);
+        return NULL;
+    }
+    return (PyObject *)self;
+}
+
+static PyObject *timing_dict(const struct vkb_request *request)
+{
+    PyObject *dict = PyDict_New();
+
+    for (uint32_t i = 0; dict && i < request->timing_count; ++i) {
+        PyObject *number = PyFloat_FromDouble(request->timings[i].seconds);
+        if (!number || PyDict_SetItemString(dict, request->timings[i].name, number) < 0)
+            Py_CLEAR(dict);
+        Py_XDECREF(number);
+    }
+    return dict;
+}
+
+// ([timings, ...], (NaNs, infinities of the input))
+static PyObject *results(const struct vkb_pending *pending)
+{
+    PyObject *list = PyList_New((Py_ssize_t)pending->count);
+
+    for (uint32_t i = 0; list && i < pending->count; ++i) {
+        PyObject *timings = timing_dict(&pending->requests[i]);
+        if (!timings || PyList_SetItem(list, (Py_ssize_t)i, timings) < 0)
+            Py_CLEAR(list);
+    }
+    return list ? Py_BuildValue("(N(KK))", list, (unsigned long long)pending->specials.nan,
+                                (unsigned long long)pending->specials.inf)
+                : NULL;
+}
+
+static PyObject *refuse_to_wait(void)
+{
+    PyErr_SetString(PyExc_RuntimeError, "a submission is waited for once");
+    return NULL;
+}
+
+static PyObject *wait_for(PyObject *object, PyObject *unused)
+{
+    struct submission *self = (struct submission *)object;
+    struct vkb_renderer *renderer = self->renderer;
+    struct vkb_error error = {0};
+    bool over = true;
+
+    (void)unused;
+    if (!self->pending)
+        return refuse_to_wait();
+    if (!vkb_renderer_enter(renderer, &error))
+        return vkb_raise(state_of(object), &error);
+    // Another thread may have had it since it was asked for.
+    struct vkb_pending *pending = self->pending;
+    self->pending = NULL;
+    if (!pending) {
+        vkb_renderer_leave(renderer);
+        return refuse_to_wait();
+    }
+    // A closed renderer has no flights.
+    bool done = renderer->open ? vkb_frame_collect(&renderer->device, &renderer->frame,
+                                                   pending->flight, &over, &error)
+                               : vkb_require_open(renderer, &error);
+    done = vkb_renderer_check_messages(renderer, done, &error);
+    vkb_renderer_leave(renderer);
+    if (!over) {
+        vkb_renderer_abandon(renderer, pending);
+        return vkb_raise(state_of(object), &error);
+    }
+    PyObject *result = done ? results(pending) : vkb_raise(state_of(object), &error);
+    PyObject *type, *value, *traceback;
+    PyErr_Fetch(&type, &value, &traceback);
+    vkb_pending_release(pending);
+    PyErr_Restore(type, value, traceback);
+    return result;
+}
+
+static int traverse(PyObject *object, visitproc visit, void *arg)
+{
+    struct submission *self = (struct submission *)object;
+
+    Py_VISIT(Py_TYPE(object));
+    Py_VISIT((PyObject *)self->renderer);
+    return self->pending ? vkb_pending_traverse(self->pending, visit, arg) : 0;
+}
+
+// What the device may write to is left to the renderer until the device is done.
+static int clear(PyObject *object)
+{
+    struct submission *self = (struct submission *)object;
+    struct vkb_pending *pending = self->pending;
+
+    self->pending = NULL;
+    // A forked process has no device that could write.
+    if (pending && pending->flight && vkb_renderer_is_ours(self->renderer))
+        vkb_renderer_abandon(self->renderer, pending);
+    else if (pending)
+        vkb_pending_release(pending);
+    Py_CLEAR(self->renderer);
+    return 0;
+}
+
+static void dealloc(PyObject *object)
+{
+    PyTypeObject *type = Py_TYPE(object);
+    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
+
+    PyObject_GC_UnTrack(object);
+    clear(object);
+    release(object);
+    Py_DECREF(type);
+}
+
+static PyMethodDef methods[] = {
+    {"wait", wait_for, METH_NOARGS,
+     "wait() -> ([timings, ...], (NaNs, infinities of the input)). Waits until the device has run "
+     "it; the arrays are filled then."},
+    {0},
+};
+
+static PyType_Slot slots[] = {
+    {Py_tp_dealloc, dealloc},
+    {Py_tp_traverse, traverse},
+    {Py_tp_clear, clear},
+    {Py_tp_methods, methods},
+    {Py_tp_doc, "Plans that the device runs in one go."},
+    {0},
+};
+
+PyType_Spec vkb_submission_spec = {
+    .name = "vkbloom._core.Submission",
+    .basicsize = sizeof(struct submission),
+    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
+           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .slots = slots,
+};

@@ -1,0 +1,16 @@
+#!/bin/sh
+# Runs in the build root: builds the core's wheel. Arguments: the source's folder, and where to put
+# the wheel.
+set -eu
+source=$1
+wheels=$2
+. /root/versions.sh
+python=/opt/python/bin/python3.11
+
+cd "$source"
+# volk is compiled in, so its licence comes along.
+cp /build/vulkan/usr/share/doc/libvulkan-volk-dev/copyright LICENSE.volk
+VULKAN_SDK=/build/vulkan/usr "$python" -m pip --quiet wheel \
+    --no-deps --no-build-isolation --no-index --wheel-dir dist .
+"$python" -m wheel tags --remove --platform-tag "$PLATFORM" dist/*.whl
+mv dist/*.whl "$wheels"

@@ -1,0 +1,75 @@
+"""Print a digest of every framebuffer of a set of small renders, to compare drivers and CPUs.
+
+The inputs are made of integers, so that they are the same bits on every CPU; NumPy's own functions
+need not be. Two runs that print the same lines drew the same bits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+
+SIZE = (97, 61)
+TYPES = (np.uint8, np.float16, np.float32)
+# Of the settings that are tried in each type: what encodes, maps, thresholds and dithers.
+VARIED = {
+    "Separable": vkbloom.Separable(threshold=0.5, knee=0.25, tonemap="aces", encoding="srgb"),
+    "Pyramid": vkbloom.Pyramid(firefly_filter=True, tonemap="exponential", encoding="gamma22"),
+    "DualKawase": vkbloom.DualKawase(composite="screen", tonemap="agx", exposure=0.5, dither=True),
+    "neutral": vkbloom.Pyramid(tonemap="khronos_neutral", encoding="srgb", composite="mix"),
+}
+
+
+def image(dtype: type) -> NDArray[np.generic]:
+    """Make noise with a few bright pixels: integers over powers of two."""
+    width, height = SIZE
+    index = np.arange(width * height * 4, dtype=np.uint64)
+    noise = ((index * 2654435761) >> 13) % 256
+    bright = 1 + 15 * (((index // 4 * 40503) >> 7) % 29 == 0).astype(np.uint64)
+    levels = noise.reshape(height, width, 4)
+    if dtype is np.uint8:
+        return levels.astype(np.uint8)
+    pixels = (levels * bright.reshape(height, width, 4)).astype(np.float32) / 256
+    pixels[..., 3] = 1
+    return pixels.astype(dtype)
+
+
+def renders(renderer: vkbloom.Renderer) -> Iterator[tuple[str, vkbloom.Frames]]:
+    """Render everything, with a name each."""
+    pixels = image(np.float16)
+    for name, settings in vkbloom.presets.items():
+        yield f"{name} float16", renderer.apply(pixels, settings)
+    for name, settings in VARIED.items():
+        for dtype in TYPES:
+            yield f"{name} {np.dtype(dtype).name}", renderer.apply(image(dtype), settings)
+    scene = vkbloom.Scene.ufo()
+    aces = vkbloom.Separable(tonemap="aces", encoding="srgb")
+    yield "scene forward", renderer.render(scene, aces, SIZE)
+    deferred = vkbloom.presets["deferred"]
+    yield "scene deferred", renderer.render(scene, deferred, SIZE, shading="deferred")
+
+
+def main() -> None:
+    """Print JSON: the adapter, and for each render the digests of its framebuffers."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--adapter", default="software")
+    with vkbloom.Renderer(parser.parse_args().adapter) as renderer:
+        digests = {
+            name: {
+                key: hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()[:16]
+                for key, array in frames.items()
+            }
+            for name, frames in renders(renderer)
+        }
+        print(json.dumps({"adapter": renderer.info.summary, "renders": digests}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

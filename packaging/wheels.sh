@@ -1,0 +1,41 @@
+#!/bin/sh
+# Builds the wheels of vkbloom and vkbloom-lavapipe into dist/, as root on a system with mmdebstrap.
+# The root that they are built in is made once, in build/wheels; so is Mesa.
+set -eu
+cd "$(dirname "$0")/.."
+work=build/wheels
+root=$work/root
+. packaging/versions.sh
+
+test -d "$root" || packaging/build_root.sh "$root"
+cp packaging/versions.sh "$root/root/"
+
+# PyPI is asked here, so the root needs neither certificates nor the network.
+rm -rf "$root/root/pypi"
+python3 -m pip download --quiet --no-deps --dest "$root/root/pypi" --only-binary=:all: \
+    --python-version 3.11 --implementation cp --abi cp311 --abi abi3 --abi none \
+    --platform manylinux2014_x86_64 --platform manylinux_2_28_x86_64 \
+    --requirement packaging/requirements.txt
+# pip's wheel can be run as it is: Debian's source of Python comes without it.
+chroot "$root" sh -c 'set -- /root/pypi/pip-*.whl
+    /opt/python/bin/python3.11 "$1/pip" install --quiet --no-index --no-deps \
+        --root-user-action=ignore --upgrade /root/pypi/*.whl'
+
+rm -rf "$root/build/vkbloom" "$root/build/wheels"
+mkdir -p "$root/build/vkbloom" "$root/build/wheels" dist
+git ls-files -z --cached --others --exclude-standard | tar -c --null -T - | tar -x -C "$root/build/vkbloom"
+for step in core.sh lavapipe/build.sh; do
+    folder=/build/vkbloom
+    test "$step" = core.sh || folder=$folder/packaging/lavapipe
+    chroot "$root" /usr/bin/env -i PATH=/usr/bin:/bin LANG=C.UTF-8 JOBS="${JOBS:-2}" \
+        sh "/build/vkbloom/packaging/$step" "$folder" /build/wheels
+done
+# Names that promise more than the files keep must not leave here.
+chroot "$root" sh -c 'for library in /build/vkbloom/build/lib*/vkbloom/_core.abi3.so \
+        /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so; do
+    newest=$(objdump -T "$library" | grep -o "GLIBC_[0-9.]*" | sort -uV | tail -n 1)
+    echo "$library needs $newest"
+    test "$(printf "%s\n" "$newest" GLIBC_2.31 | sort -V | tail -n 1)" = GLIBC_2.31 || exit 1
+done'
+cp "$root"/build/wheels/*.whl dist/
+ls -l dist

@@ -1,0 +1,175 @@
+"""What a call would do: its framebuffers and its passes, known before anything is rendered."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from vkbloom import _core
+    from vkbloom.settings import Settings
+
+__all__ = ["Pass", "Plan", "framebuffers"]
+
+Framebuffer = tuple[tuple[int, ...], np.dtype[Any]]
+
+
+class Pass(NamedTuple):
+    """One pass of a plan.
+
+    Attributes
+    ----------
+    name : str
+        The key of `Frames.timings`. Passes that draw into the same images are timed as one, as are
+        the steps of one thing: they have the same name.
+    shader : str
+        The shader's module, such as "blur_frag".
+    reads, writes : tuple of str
+        Names of images: framebuffers, or steps towards them.
+    variant : str
+        What runs in place of the method's own pass on this class of devices; "fragment" is that
+        pass itself, drawn.
+    """
+
+    name: str
+    shader: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    variant: str
+
+
+@dataclass(frozen=True, repr=False)
+class Plan:
+    """What a renderer would do for one source and one settings.
+
+    Made by `Renderer.plan`. Two plans are equal, and have the same hash, where all attributes but
+    the last two are: the passes are those of the renderer that was asked.
+
+    Attributes
+    ----------
+    source : {"image", "forward", "deferred"}
+        An image, or a scene in that shading.
+    size : (int, int)
+        Width and height of the frame in pixels.
+    dtype : numpy.dtype or None
+        Of an image.
+    channels : int or None
+        Of an image: 3 or 4.
+    settings : Settings
+    attachments : tuple of str
+        Names of the framebuffers that are wanted, in the order that the data flows.
+    outputs : mapping of str to (tuple of int, numpy.dtype)
+        Shape and dtype of each framebuffer that is wanted.
+    passes : tuple of Pass
+        In their order, where nothing has run before: a pass whose result is there already is left
+        out when it runs.
+
+    See Also
+    --------
+    Renderer.plan
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import vkbloom
+    >>> image = np.zeros((90, 160, 4), np.float16)
+    >>> with vkbloom.Renderer() as renderer:
+    ...     plan = renderer.plan(image, vkbloom.Separable(threshold=1.0))
+    >>> list(plan.outputs)
+    ['glow', 'blur_vertical', 'bloom', 'final']
+    >>> plan.outputs["final"]
+    ((90, 160, 4), dtype('float16'))
+    >>> [one.name for one in plan.passes]
+    ['glow', 'blur_vertical', 'bloom', 'final']
+    """
+
+    source: str
+    size: tuple[int, int]
+    dtype: np.dtype[Any] | None
+    channels: int | None
+    settings: Settings
+    attachments: tuple[str, ...]
+    outputs: Mapping[str, Framebuffer] = field(compare=False)
+    passes: tuple[Pass, ...] = field(compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outputs", MappingProxyType(dict(self.outputs)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        fields = {**vars(self), "outputs": dict(self.outputs)}
+        return type(self), tuple(fields.values())
+
+    def __repr__(self) -> str:
+        return (
+            f"<vkbloom.Plan of {self._title}: {len(self.passes)} passes, "
+            f"{len(self.outputs)} framebuffers>"
+        )
+
+    @property
+    def _title(self) -> str:
+        width, height = self.size
+        kind = f"{self.dtype} image" if self.source == "image" else f"{self.source} scene"
+        return f"{kind}, {width} x {height}, {self.settings.method}"
+
+    def to_mermaid(self) -> str:
+        """Return the passes as a Mermaid flowchart.
+
+        Returns
+        -------
+        str
+            Framebuffers are boxes, with their size and dtype, and other images are round; passes
+            are hexagons, with their shader. GitHub, JupyterLab and many editors draw it.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import vkbloom
+        >>> image = np.zeros((9, 16, 3), np.float32)
+        >>> with vkbloom.Renderer() as renderer:
+        ...     plan = renderer.plan(image, vkbloom.Separable(bloom=False))
+        >>> print(plan.to_mermaid())  # doctest: +ELLIPSIS
+        flowchart LR
+            image(image)
+            final["final<br>16 x 9, float32"]
+            pass0{{"final<br>composite_..."}}
+            image --> pass0 --> final
+        """
+        images = dict.fromkeys(name for one in self.passes for name in (*one.reads, *one.writes))
+        lines = ["flowchart LR"]
+        for name in images:
+            if name in self.outputs:
+                shape, dtype = self.outputs[name]
+                lines.append(f'{name}["{name}<br>{shape[1]} x {shape[0]}, {dtype}"]')
+            else:
+                lines.append(f"{name}({name})")
+        for number, one in enumerate(self.passes):
+            lines.append(f'pass{number}{{{{"{one.name}<br>{one.shader}"}}}}')
+            reads = f"{' & '.join(one.reads)} --> " if one.reads else ""
+            lines.append(f"{reads}pass{number} --> {' & '.join(one.writes)}")
+        return "\n    ".join(lines)
+
+    def _repr_html_(self) -> str:
+        """Return a table of the passes."""
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{html.escape(_text(part))}</td>" for part in one) + "</tr>"
+            for one in self.passes
+        )
+        head = "".join(f"<th>{name}</th>" for name in Pass._fields)
+        return (
+            f"<table><caption>{html.escape(self._title)}</caption>"
+            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        )
+
+
+def framebuffers(plan: _core.Plan) -> dict[str, Framebuffer]:
+    """Return shape and dtype of each output of a core's plan."""
+    return {name: (shape, np.dtype(dtype)) for name, shape, dtype in plan.outputs}
+
+
+def _text(part: str | tuple[str, ...]) -> str:
+    return part if isinstance(part, str) else ", ".join(part)

@@ -1,0 +1,104 @@
+"""What frames are made from: images and scenes, checked and as the core takes them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from vkbloom import _core
+from vkbloom.checks import check_image, check_size, check_time
+from vkbloom.settings import SHADINGS
+
+if TYPE_CHECKING:
+    from vkbloom.scene import Mesh, Scene
+    from vkbloom.scene.textures import Texture
+    from vkbloom.settings import Shading
+
+__all__ = ["image_source", "scene_arguments", "scene_source"]
+
+
+def image_source(image: object) -> _core.Source:
+    """Return an image as the core takes it; the image must not change while it is used.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `check_image`.
+    """
+    return _core.image_source(check_image(image))
+
+
+def scene_source(
+    scene: Scene, size: tuple[int, int], shading: Shading, time: float
+) -> _core.Source:
+    """Return a frame of a scene as the core takes it.
+
+    Parameters
+    ----------
+    scene, size, shading, time
+        As for `vkbloom.Renderer.render`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        One of them is wrong.
+    """
+    if shading not in SHADINGS:
+        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+    turns = check_time(time)
+    from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: a Scene is needed, not {scene!r}")
+    return _core.scene_source(*scene_arguments(scene, check_size("size", size), shading, turns))
+
+
+def scene_arguments(
+    scene: Scene, size: tuple[int, int], shading: Shading, turns: float
+) -> tuple[Any, ...]:
+    """Return the arguments of the core's scene_source, of what was checked."""
+    camera = scene.camera
+    return (
+        _scene_arrays(scene),
+        (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
+        size,
+        shading,
+        # `time` has period 1; reduced first, large ones keep their float precision.
+        math.fmod(turns, 1.0),
+        scene.glow_intensity,
+    )
+
+
+def _scene_arrays(scene: Scene) -> Any:
+    """Return the scene's meshes, sky and textures."""
+    # Textures by what they are, not by what they hold: each goes to the device once.
+    numbers: dict[Texture, int] = {}
+    body = _mesh_arrays(scene.body, numbers)
+    glow = None if scene.glow is None else _mesh_arrays(scene.glow, numbers)
+    sky = () if scene.skybox is None else scene.skybox.levels
+    textures = tuple(
+        (
+            texture.levels,
+            *texture.address_mode,
+            texture.mag_filter,
+            texture.min_filter,
+            texture.mipmap_filter,
+        )
+        for texture in numbers
+    )
+    return scene.contents_serial, body, glow, sky, textures
+
+
+def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:
+    """Return a mesh's arrays; textures get the next numbers."""
+    surfaces = tuple(
+        (
+            surface.index_count,
+            *(
+                numbers.setdefault(texture, len(numbers))
+                for texture in (surface.base, surface.emission)
+            ),
+        )
+        for surface in mesh.surfaces
+    )
+    return mesh.vertices, mesh.indices, mesh.emission, mesh.texcoords, surfaces

@@ -1,0 +1,297 @@
+"""Plans: what they say is what a call does, and nothing is done to say it."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.images import picture
+from vkbloom import DualKawase, Plan, Pyramid, Renderer, Scene, Separable, Settings, _core, presets
+from vkbloom.sources import image_source, scene_arguments
+
+SIZE = (96, 54)
+
+METHODS: dict[str, Settings] = {
+    **presets,
+    "layers": Separable(layers=((1.0, 0.5), (2.0, 0.5))),
+    "loops": Separable(loops=2, bloom_scale=0.5),
+    "direct": Separable(direct=True),
+    "off": Separable(bloom=False),
+    "kawase": DualKawase(levels=2),
+}
+
+
+def assert_planned(plan: Plan, frames: Any) -> None:
+    """The plan has the framebuffers of the frames, and the passes that ran for them."""
+    assert list(plan.outputs) == list(frames)
+    assert plan.attachments == tuple(frames)
+    for name, array in frames.items():
+        assert plan.outputs[name] == (array.shape, array.dtype)
+    assert list(dict.fromkeys(one.name for one in plan.passes)) == list(frames.timings)
+    # Every image is made before it is read, and everything wanted is made.
+    made = {"image"} if plan.source == "image" else set()
+    for one in plan.passes:
+        assert set(one.reads) <= made
+        made |= set(one.writes)
+    assert set(plan.outputs) <= made
+
+
+@pytest.mark.parametrize("attachments", ["all", ("final",)], ids=["all", "final"])
+@pytest.mark.parametrize("form", ["fragment", "cpu", "gpu"])
+def test_a_plan_of_an_image_is_what_runs(
+    monkeypatch: pytest.MonkeyPatch, form: str, attachments: str | Sequence[str]
+) -> None:
+    monkeypatch.setenv("VKBLOOM_FORM", form)
+    with Renderer() as renderer:
+        for number, (name, method) in enumerate(METHODS.items()):
+            dtype = ("uint8", "float16", "float32")[number % 3]
+            image = picture(SIZE[0], SIZE[1], 3 + number % 2, dtype=dtype, seed=number)
+            plan = renderer.plan(image, method, attachments=attachments)
+            frames = renderer.apply(image, method, attachments=attachments)
+            assert_planned(plan, frames)
+            assert (plan.source, plan.size, plan.dtype) == ("image", SIZE, image.dtype), name
+            if form == "fragment":
+                assert {one.variant for one in plan.passes} == {"fragment"}
+
+
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_a_plan_of_a_scene_is_what_runs(scene: Scene, shading: Any) -> None:
+    for method in METHODS.values():
+        # A renderer that has rendered nothing.
+        with Renderer() as renderer:
+            plan = renderer.plan(scene, method, SIZE, shading=shading)
+            assert_planned(plan, renderer.render(scene, method, SIZE, shading=shading))
+            assert (plan.source, plan.dtype, plan.channels) == (shading, None, None)
+
+
+def test_variants_are_seen_without_a_renderer() -> None:
+    source = image_source(picture(*SIZE, 4, dtype="float16"))
+
+    def variants(name: str, names: Any = None) -> list[tuple[str, str]]:
+        rows = _core.plan(source, Separable(), names, name).passes
+        return [(one[1], one[4]) for one in rows]
+
+    assert variants("fragment") == [
+        ("extract_frag", "fragment"),
+        ("blur_frag", "fragment"),
+        ("blur_frag", "fragment"),
+        ("composite_frag", "fragment"),
+    ]
+    assert variants("cpu") == [
+        ("bright_comp_rgba16float", "pixels"),
+        ("line_comp_rgba16float", "line"),
+        ("line_comp_rgba16float", "line"),
+        ("blend_comp_rgba16float", "pixels"),
+    ]
+    assert variants("cpu", ("final",)) == [("strip_comp_rgba16float", "strips")]
+    assert variants("gpu", ("final",)) == [("tile_comp", "tiles")]
+
+
+@pytest.fixture
+def plain() -> np.ndarray[Any, Any]:
+    return np.zeros((9, 16, 4), np.float32)
+
+
+def test_plans_that_are_equal(renderer: Renderer, scene: Scene, plain: Any) -> None:
+    plan = renderer.plan(plain, Pyramid(levels=2))
+    same = renderer.plan(plain + 1, Pyramid(levels=2))
+    assert plan == same
+    assert hash(plan) == hash(same)
+    assert renderer.plan(plain, Pyramid(levels=2), attachments=list(plan.outputs)) == plan
+    assert pickle.loads(pickle.dumps(plan)) == plan
+    assert pickle.loads(pickle.dumps(plan)).passes == plan.passes
+    others = [
+        renderer.plan(plain, Pyramid(levels=3)),
+        renderer.plan(plain[:8], Pyramid(levels=2)),
+        renderer.plan(plain[..., :3], Pyramid(levels=2)),
+        renderer.plan(plain.astype(np.float16), Pyramid(levels=2)),
+        renderer.plan(plain, Pyramid(levels=2), attachments="final"),
+        renderer.plan(scene, Pyramid(levels=2), (16, 9)),
+        renderer.plan(scene, Pyramid(levels=2), (16, 9), shading="deferred"),
+    ]
+    assert len({plan, *others}) == 1 + len(others)
+
+
+def test_a_plan_cannot_be_changed(renderer: Renderer, plain: Any) -> None:
+    plan: Any = renderer.plan(plain)
+    with pytest.raises(AttributeError):
+        plan.size = (1, 1)
+    with pytest.raises(TypeError):
+        plan.outputs["final"] = None
+
+
+def test_defaults(renderer: Renderer, scene: Scene, plain: Any) -> None:
+    assert renderer.plan(plain).settings == Separable()
+    assert renderer.plan(scene).size == (1280, 720)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"size": (16, 9)}, "size: only scenes have one"),
+        ({"shading": "deferred"}, "shading: only scenes have one"),
+        ({"attachments": ("glare",)}, "attachments: there is no 'glare'"),
+        ({"settings": Separable(bloom_size=(100_000, 1))}, "100000 x 1"),
+    ],
+)
+def test_wrong_arguments_of_an_image(
+    renderer: Renderer, plain: Any, changes: Any, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        renderer.plan(plain, **changes)
+
+
+def test_wrong_arguments(
+    renderer: Renderer, new_renderer: Callable[[], Renderer], scene: Scene, plain: Any
+) -> None:
+    with pytest.raises(ValueError, match="shading: 'toon'"):
+        renderer.plan(scene, shading="toon")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="size: "):
+        renderer.plan(scene, size=(0, 9))
+    for source in (None, [plain], "image"):
+        with pytest.raises(TypeError, match="scene: a Scene is needed"):
+            renderer.plan(source)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="dtype int64"):
+        renderer.plan(plain.astype(np.int64))
+    closed = new_renderer()
+    closed.close()
+    with pytest.raises(ValueError, match="closed"):
+        closed.plan(plain)
+
+
+def test_planning_waits_for_no_other_call(new_renderer: Callable[[], Renderer]) -> None:
+    renderer = new_renderer()
+    image = picture(64, 64)
+    slow = Separable(weights=(1 / 65,) * 33, direct=True, blur_scale=0.5, format="rgba32float")
+    renderer.apply(image, slow)
+    large = picture(768, 768)
+    thread = threading.Thread(target=renderer.apply, args=(large, slow))
+    thread.start()
+    time.sleep(0.05)
+    for _ in range(3):
+        renderer.plan(image)
+    # It takes the device a second or so.
+    assert thread.is_alive()
+    thread.join()
+
+
+def test_planning_makes_nothing(new_renderer: Callable[[], Renderer], plain: Any) -> None:
+    renderer = new_renderer()
+    for method in METHODS.values():
+        renderer.plan(plain, method)
+    assert renderer._core.pipeline_count == 0
+    assert renderer._core.cached == (0, 0, 0)
+
+
+# The dry run
+
+CHANGES = st.sampled_from(
+    [
+        Separable(),
+        Separable(exposure=1.0),
+        Separable(blur_strength=0.5),
+        Separable(threshold=0.5),
+        Separable(loops=2),
+        Separable(bloom_size=(12, 7)),
+        Separable(bloom=False),
+        Pyramid(levels=2),
+        Pyramid(levels=3),
+        presets["kino"],
+    ]
+)
+IMAGES = [picture(20, 14, seed=1), picture(20, 14, seed=2), picture(9, 14, 3, seed=3)]
+NAMES = st.sampled_from([None, ("final",), ("final",), ()])
+CALLS = st.lists(st.tuples(st.integers(0, len(IMAGES) - 1), CHANGES, NAMES), max_size=12)
+
+
+@given(calls=CALLS)
+@settings(max_examples=25, deadline=None)
+def test_a_dry_run_of_images_is_what_runs(
+    calls: list[tuple[int, Settings, tuple[str, ...] | None]],
+) -> None:
+    with Renderer() as renderer:
+        sources = [image_source(image) for image in IMAGES]
+        steps = tuple(
+            (sources[number], renderer._core.plan(sources[number], method, names))
+            for number, method, names in calls
+        )
+        ran = [
+            list(
+                renderer.apply(
+                    IMAGES[number], method, attachments="all" if names is None else names
+                ).timings
+            )
+            for number, method, names in calls
+        ]
+        assert _core.dry_run(steps) == ran
+
+
+def test_a_dry_run_of_scenes_is_what_runs(
+    new_renderer: Callable[[], Renderer], scene: Scene
+) -> None:
+    renderer = new_renderer()
+    calls = [(Separable(exposure=step % 3), step // 3 % 2 / 4, step // 6) for step in range(12)]
+    steps, ran = [], []
+    for method, turns, which in calls:
+        shading: Any = ("forward", "deferred")[which]
+        source = _core.scene_source(*scene_arguments(scene, SIZE, shading, turns))
+        steps.append((source, renderer._core.plan(source, method, None)))
+        frames = renderer.render(scene, method, SIZE, shading=shading, time=turns)
+        ran.append(list(frames.timings))
+    assert _core.dry_run(tuple(steps)) == ran
+    assert ran[1] == ["final"]
+
+
+def test_dry_runs_of_nothing_and_of_what_is_none() -> None:
+    wrong: Any
+    assert _core.dry_run(()) == []
+    for wrong in ([], ((1, 2),), (5,)):
+        with pytest.raises(TypeError):
+            _core.dry_run(wrong)
+
+
+# Shown
+
+
+def test_mermaid(renderer: Renderer, plain: Any) -> None:
+    plan = renderer.plan(plain, Separable(bloom=False), attachments="final")
+    (one,) = plan.passes
+    assert plan.to_mermaid().splitlines() == [
+        "flowchart LR",
+        "    image(image)",
+        '    final["final<br>16 x 9, float32"]',
+        f'    pass0{{{{"final<br>{one.shader}"}}}}',
+        "    image --> pass0 --> final",
+    ]
+
+
+def test_mermaid_has_every_pass_and_image(renderer: Renderer, scene: Scene) -> None:
+    plan = renderer.plan(scene, Pyramid(levels=2), SIZE, shading="deferred")
+    lines = plan.to_mermaid().splitlines()
+    arrows = [line for line in lines if "-->" in line]
+    assert len(arrows) == len(plan.passes)
+    for number, (one, arrow) in enumerate(zip(plan.passes, arrows, strict=True)):
+        parts = [part.strip().split(" & ") for part in arrow.split("-->")]
+        reads = [list(one.reads)] if one.reads else []
+        assert parts == [*reads, [f"pass{number}"], list(one.writes)]
+    for name, (shape, dtype) in plan.outputs.items():
+        assert f'    {name}["{name}<br>{shape[1]} x {shape[0]}, {dtype}"]' in lines
+
+
+def test_html_and_repr(renderer: Renderer, plain: Any) -> None:
+    plan = renderer.plan(plain)
+    table = plan._repr_html_()
+    assert table.count("<tr>") == 1 + len(plan.passes)
+    for one in plan.passes:
+        assert f"<td>{one.shader}</td>" in table
+    assert repr(plan) == (
+        "<vkbloom.Plan of float32 image, 16 x 9, separable: 4 passes, 4 framebuffers>"
+    )

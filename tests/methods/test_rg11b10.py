@@ -1,0 +1,147 @@
+"""Bloom buffers of the format "rg11b10ufloat"."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from numpy.typing import NDArray
+
+from vkbloom import (
+    DualKawase,
+    GodotBloom,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    presets,
+    reference,
+)
+from vkbloom.reference.image import storage
+
+Array = NDArray[Any]
+
+#: A blur that leaves the image as it is.
+NONE = Separable(weights=(1.0,), format="rg11b10ufloat")
+# What is stored, and what of it comes back: in red and green, in blue.
+STORED = [
+    (0.0, 0.0, 0.0),
+    (1.0, 1.0, 1.0),
+    (-1.0, 0.0, 0.0),
+    (-3e38, 0.0, 0.0),
+    # Half way between two steps to the even one, else to the nearer one.
+    (1 + 1 / 128, 1.0, 1.0),
+    (1 + 3 / 128, 1 + 2 / 64, 1 + 1 / 32),
+    (1 + 1.1 / 128, 1 + 1 / 64, 1.0),
+    (1 + 1 / 64, 1 + 1 / 64, 1.0),
+    (1 + 3 / 64, 1 + 3 / 64, 1 + 2 / 32),
+    (1.999, 2.0, 2.0),
+    # The least normal value, the least one, half of it and less, one and a half of it.
+    (2.0**-14, 2.0**-14, 2.0**-14),
+    (2.0**-20, 2.0**-20, 0.0),
+    (2.0**-19, 2.0**-19, 2.0**-19),
+    (2.0**-21, 0.0, 0.0),
+    (1.5 * 2.0**-19, 1.5 * 2.0**-19, 2.0**-18),
+    (1e-30, 0.0, 0.0),
+    # Beyond the largest ones.
+    (64512.0, 64512.0, 64512.0),
+    (65024.0, 65024.0, 64512.0),
+    (65500.0, 65024.0, 64512.0),
+    (3e38, 65024.0, 64512.0),
+]
+
+
+def steps() -> tuple[Array, Array]:
+    """Return an image of one row and what its bloom buffers hold."""
+    values = np.array(STORED)
+    image = np.repeat(values[:, :1], 3, axis=1)[np.newaxis].astype(np.float32)
+    return image, values[np.newaxis][..., [1, 1, 2]]
+
+
+def test_values_are_rounded_to_the_nearest(renderer: Renderer) -> None:
+    image, expected = steps()
+    frames = renderer.apply(image, NONE)
+    for name in ("glow", "blur_vertical", "bloom"):
+        assert frames[name].dtype == np.float32
+        assert_array_equal(frames[name][..., :3], expected, err_msg=name)
+        assert (frames[name][..., 3] == 1).all()
+    assert_array_equal(storage("rg11b10ufloat")(image.astype(np.float64)), expected)
+
+
+def test_nan_is_0(renderer: Renderer) -> None:
+    image = np.full((3, 5, 3), np.nan, np.float32)
+    assert (renderer.apply(image, NONE)["bloom"][..., :3] == 0).all()
+    assert (storage("rg11b10ufloat")(image.astype(np.float64)) == 0).all()
+
+
+def lights(size: tuple[int, int], dtype: str = "float32") -> Array:
+    width, height = size
+    generator = np.random.default_rng(7)
+    image = 0.5 * generator.random((height, width, 3)) ** 2
+    image[generator.random((height, width)) < 0.02] *= 1 if dtype == "uint8" else 40
+    return (image * 255).astype(np.uint8) if dtype == "uint8" else image.astype(dtype)
+
+
+METHODS: list[Settings] = [
+    *(settings.replace(format="rg11b10ufloat") for settings in presets.values()),
+    Separable(layers=((1.0, 1.0), (2.0, 0.5)), format="rg11b10ufloat"),
+    Separable(direct=True, loops=2, blur_scale=0.5, format="rg11b10ufloat"),
+    Pyramid(threshold=0.5, knee=0.3, bloom_scale=0.5, format="rg11b10ufloat"),
+    Pyramid(levels=3, level_weights=(0.5, -0.25, 2.0), format="rg11b10ufloat"),
+    DualKawase(bloom_size=(31, 17), format="rg11b10ufloat"),
+    GodotBloom(composite="add", bicubic=False, format="rg11b10ufloat"),
+]
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+@pytest.mark.parametrize("settings", METHODS)
+def test_every_method_has_the_format(renderer: Renderer, settings: Settings, dtype: str) -> None:
+    """A value may fall on the other side of a step than the reference's: 1/64, of blue 1/32.
+
+    Where sums go on, some such steps add up, and where weights are negative they count against
+    less, so that the mean says more than the largest difference.
+    """
+    image = lights((67, 45), dtype)
+    frames = renderer.apply(image, settings)
+    expected = reference.apply(image, settings)
+    assert list(frames) == list(expected)
+    for name in set(frames) - {"final"}:
+        values = expected[name][..., :3]
+        assert frames[name].dtype == np.float32, name
+        difference = np.abs(frames[name][..., :3] - values)
+        largest = np.maximum(values, 1e-3 * max(1.0, values.max()))
+        assert (difference <= 4 / 32 * largest).all(), name
+        # Near 0 the steps are 2^-20.
+        assert difference.mean() <= 2e-3 * values.mean() + 2.0**-20, name
+    final = frames["final"].astype(np.float64) / (255 if dtype == "uint8" else 1)
+    allowed = 2 / 255 + 0.02 * np.abs(expected["final"])
+    assert (np.abs(final - expected["final"]) <= allowed).all()
+
+
+@pytest.mark.parametrize("name", ["bevy_natural", "filament", "unity_urp", "unity_hdrp"])
+def test_engines_round_their_levels_alone(renderer: Renderer, name: str) -> None:
+    image = lights((40, 30))
+    frames = renderer.apply(image, presets[name].replace(format="rg11b10ufloat"))
+    assert_array_equal(frames["glow"][..., :3], image)
+    rounded = storage("rg11b10ufloat")
+    for level in (one for one in frames if one.startswith(("down", "up"))):
+        values = frames[level][..., :3].astype(np.float64)
+        assert_array_equal(rounded(values), values, err_msg=level)
+    bloom = frames["bloom"][..., :3].astype(np.float64)
+    assert not np.array_equal(rounded(bloom), bloom)
+
+
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+@pytest.mark.parametrize("name", ["tutorial", "jimenez2014", "bevy_natural", "godot_4_6"])
+def test_of_a_scene(renderer: Renderer, name: str, shading: Any) -> None:
+    settings = presets[name].replace(format="rg11b10ufloat")
+    frames = renderer.render(Scene.ufo(), settings, (160, 90), shading=shading)
+    assert frames["bloom"].dtype == np.float32
+    assert frames["bloom"].max() > 0
+    if shading == "forward":
+        expected = reference.passes(frames["glow"], settings, (160, 90))["bloom"]
+        difference = np.abs(frames["bloom"] - expected)[..., :3]
+        assert difference.mean() <= 2e-3 * expected[..., :3].mean()
