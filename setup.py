@@ -142,6 +142,7 @@ class BuildCore(build_ext):
 
     def build_extension(self, ext: Extension) -> None:
         """Build one extension, with the embedded shaders as one more source."""
+        check_vulkan_headers()
         write_spirv()
         ext.include_dirs.append(str(SPIRV))
         ext.sources.append(str(SPIRV / "spirv.c"))
@@ -155,12 +156,28 @@ class BuildCore(build_ext):
         super().build_extension(ext)
 
 
-def volk_folder() -> str:
-    """Find volk.h and volk.c (Debian: libvulkan-volk-dev, elsewhere the Vulkan SDK)."""
+def include_folders() -> list[Path]:
+    """Return where headers may be: the Vulkan SDK's, the compiler's, the system's."""
     places = [Path("/usr/include"), Path("/usr/local/include")]
+    for variable in ("CPATH", "C_INCLUDE_PATH", "INCLUDE"):
+        places[:0] = [Path(one) for one in os.environ.get(variable, "").split(os.pathsep) if one]
     if sdk := os.environ.get("VULKAN_SDK"):
         places[:0] = [Path(sdk) / "include", Path(sdk) / "Include"]
-    for place in places:
+    return places
+
+
+def check_vulkan_headers() -> None:
+    """End with the package that is missing where there are no Vulkan headers."""
+    if not any((place / "vulkan" / "vulkan.h").is_file() for place in include_folders()):
+        raise SystemExit(
+            "the Vulkan headers (vulkan/vulkan.h) are missing; on Debian or Ubuntu: "
+            "apt install libvulkan-dev"
+        )
+
+
+def volk_folder() -> str:
+    """Find volk.h and volk.c (Debian: libvulkan-volk-dev, elsewhere the Vulkan SDK)."""
+    for place in include_folders():
         for folder in (place, place / "volk", place / "Volk"):
             if (folder / "volk.c").is_file() and (folder / "volk.h").is_file():
                 return str(folder)

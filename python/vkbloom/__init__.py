@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from vkbloom.grid.curves import response_curves
     from vkbloom.grid.sheet import contact_sheet
     from vkbloom.grid.zarr_grid import grid_to_zarr
+    from vkbloom.io.array_files import read, write
     from vkbloom.scene import Camera, Scene
 
 #: Version of the installed package, read from its metadata on first access.
@@ -64,7 +65,9 @@ _LATE = {
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
+    "read": "vkbloom.io.array_files",
     "response_curves": "vkbloom.grid.curves",
+    "write": "vkbloom.io.array_files",
 }
 
 __all__ = [
@@ -103,9 +106,11 @@ __all__ = [
     "gaussian_weights",
     "grid_to_zarr",
     "presets",
+    "read",
     "reductions",
     "reference",
     "response_curves",
+    "write",
 ]
 
 

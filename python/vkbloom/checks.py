@@ -36,6 +36,13 @@ FLT_MAX = (2 - 2**-23) * 2.0**127
 _DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 
 
+_DTYPE_CURES = {
+    "uint16": "; convert it: (image / 65535).astype(np.float32)",
+    "bool": "; convert it: image.astype(np.float32)",
+    "longdouble": "; convert it: image.astype(np.float32)",
+}
+
+
 def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
     """Import a package that one of vkbloom's extras installs.
 
@@ -138,22 +145,75 @@ def check_index(field: str, value: int, low: int, high: int) -> int:
 
 
 def check_image(image: object) -> NDArray[Any]:
-    """Return the image in native byte order if the core supports it, or raise an error."""
-    if not isinstance(image, np.ndarray):
-        raise TypeError(f"image: {type(image).__name__} is not a NumPy array")
-    if type(image) is not np.ndarray and np.ma.is_masked(image):
+    """Return the image, in this machine's byte order, if the core can take it.
+
+    Anything that NumPy can view is an image: arrays, ``__array__``, the buffer protocol, DLPack on
+    the CPU, and an xarray.DataArray with the dimensions y, x and channel in any order. float64
+    becomes float32.
+    """
+    array = image if isinstance(image, np.ndarray) else _viewed(image)
+    if type(array) is not np.ndarray and np.ma.is_masked(array):
+        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
+    if array.dtype == np.float64:
+        array = array.astype(np.float32)
+    if array.dtype not in _DTYPES:
+        if array.dtype.name not in ("uint8", "float16", "float32"):
+            cure = _DTYPE_CURES.get(array.dtype.name, "")
+            raise TypeError(
+                f"image: dtype {array.dtype} is not one of uint8, float16, float32, float64{cure}"
+            )
+        array = array.astype(array.dtype.newbyteorder("="), copy=False)
+    if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
         raise ValueError(
-            "image: it has masked values; fill them first, for example with image.filled(0)"
+            f"image: shape {array.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+            + _shape_cure(array.shape)
         )
-    if image.dtype not in _DTYPES:
-        if image.dtype.name not in ("uint8", "float16", "float32"):
-            raise TypeError(f"image: dtype {image.dtype} is not one of uint8, float16, float32")
-        image = image.astype(image.dtype.newbyteorder("="), copy=False)
-    if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
-        raise ValueError(
-            f"image: shape {image.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
-        )
-    return image
+    return array
+
+
+def _viewed(image: object) -> NDArray[Any]:
+    """Return what NumPy sees of an object, or raise TypeError."""
+    dims = getattr(image, "dims", None)
+    if isinstance(dims, tuple) and hasattr(image, "transpose"):
+        # A grid's channels are named after their framebuffer, such as "final_channel".
+        order = [_dimension(dims, name) for name in ("y", "x", "channel")]
+        if len(dims) != len(order) or None in order:
+            raise ValueError(
+                f"image: dimensions {dims} are not y, x and channel; choose of the others first, "
+                "such as image.isel(intensity=0)"
+            )
+        return np.asarray(image.transpose(*order))
+    is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
+    try:
+        if hasattr(image, "__dlpack__") and not is_viewed:
+            return np.from_dlpack(image)
+        if is_viewed:
+            return np.asarray(image)
+        return np.asarray(memoryview(image))  # type: ignore[arg-type]
+    except (TypeError, ValueError, RuntimeError, BufferError) as error:
+        raise TypeError(
+            f"image: an array is needed, not {type(image).__name__}"
+            + (f", of which NumPy says: {error}" if is_viewed else "")
+        ) from None
+
+
+def _dimension(dims: tuple[Any, ...], name: str) -> Any:
+    """Return the dimension of a name, or the one that ends with it behind an underscore."""
+    if name in dims:
+        return name
+    ending = [dim for dim in dims if str(dim).endswith(f"_{name}")]
+    return ending[0] if len(ending) == 1 else None
+
+
+def _shape_cure(shape: tuple[int, ...]) -> str:
+    """Return what makes an image of an array of such a shape, "" where nothing is known."""
+    if len(shape) == 2:
+        return "; of grey make RGB: np.repeat(image[..., None], 3, axis=2)"
+    if len(shape) == 3 and shape[2] == 1:
+        return "; of grey make RGB: np.repeat(image, 3, axis=2)"
+    if len(shape) == 3 and shape[0] in (3, 4):
+        return "; move the channels last: np.moveaxis(image, 0, -1)"
+    return ""
 
 
 def check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:

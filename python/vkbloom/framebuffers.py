@@ -17,7 +17,7 @@ class MadeWith(Protocol):
     def encoding(self) -> str:
         """The encoding of `final`, or "none"."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the fields by name, and ``method``."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,7 +178,7 @@ class Frames(Mapping[str, NDArray[Any]]):
             coords=channels,
             attrs={
                 **{k: v if isinstance(v, int | float) else str(v) for k, v in self._info.items()},
-                "settings": json.dumps(self._settings.as_dict()),
+                "settings": json.dumps(self._settings.to_dict()),
                 "timings": json.dumps(self._timings),
             },
         )
@@ -247,6 +247,40 @@ class Frames(Mapping[str, NDArray[Any]]):
         from vkbloom.io import files  # noqa: PLC0415  costs start-up time
 
         return files.save(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or path-like
+            What `save` was given: a file name, or a folder.
+
+        Returns
+        -------
+        Frames
+            The framebuffers in the order and the dtypes that they had, with their settings,
+            timings and info.
+
+        Raises
+        ------
+        OSError
+            There is no such file, or it cannot be opened; it names the file.
+        ValueError
+            A file is damaged, or holds no settings: `save` did not write it, or its format (all
+            but OpenEXR and PNG) has no place for them. It names the file.
+        ModuleNotFoundError
+            If OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+        See Also
+        --------
+        save : The way there.
+        """
+        from vkbloom.io import files  # noqa: PLC0415  costs start-up time
+
+        arrays, facts = files.load(path)
+        return cls(arrays, **facts)
 
     def _repr_png_(self) -> bytes | None:
         """Return the picture of `pictures.leading_png`; None without framebuffers."""

@@ -17,6 +17,19 @@ if TYPE_CHECKING:
 
     from vkbloom.settings import Settings
 
+
+class _Presets(dict[str, "Settings"]):
+    """Settings by name; an unknown name is told with those that there are."""
+
+    def __missing__(self, name: object) -> Settings:
+        # Late: only for the error.
+        import difflib  # noqa: PLC0415
+
+        near = difflib.get_close_matches(str(name), self, n=1, cutoff=0.3)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise KeyError(f"there is no preset {name!r}; {hint}there are: {', '.join(self)}")
+
+
 #: Name to settings.
 #:
 #: - ``"tutorial"``: the forward system, 256 x 256 bloom buffers, nine taps.
@@ -50,33 +63,35 @@ if TYPE_CHECKING:
 #: - ``"blender_bloom"``: the Glare node of Blender 4.5, type Bloom, quality High, its defaults.
 #: - ``"pygfx"``: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
 presets: Mapping[str, Settings] = MappingProxyType(
-    {
-        "tutorial": Separable(),
-        "outline": Separable(first_tap=0, texel="x"),
-        "deferred": Separable(
-            weights=(0.175713, 0.121703, 0.065984, 0.028002, 0.0093),
-            loops=3,
-            blur_scale=1.1,
-            blur_strength=1.5,
-        ),
-        "jimenez2014": Pyramid(
-            levels=6, radius=1.0, firefly_filter=True, composite="mix", intensity=0.04
-        ),
-        # KWin spreads six strengths of four iterations evenly over the offsets 3 to 8.
-        "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
-        "bevy_natural": BevyBloom(),
-        "kino": KinoBloom(),
-        "filament": FilamentBloom(),
-        "unity_urp": UrpBloom(),
-        "unity_hdrp": HdrpBloom(),
-        "threejs_unreal": UnrealBloom(),
-        "godot_4_5": GodotBloom(
-            level_weights=(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0),
-            intensity=0.8,
-            composite="soft_light",
-        ),
-        "godot_4_6": GodotBloom(),
-        "blender_bloom": BlenderGlare(),
-        "pygfx": PygfxBloom(),
-    }
+    _Presets(
+        {
+            "tutorial": Separable(),
+            "outline": Separable(first_tap=0, texel="x"),
+            "deferred": Separable(
+                weights=(0.175713, 0.121703, 0.065984, 0.028002, 0.0093),
+                loops=3,
+                blur_scale=1.1,
+                blur_strength=1.5,
+            ),
+            "jimenez2014": Pyramid(
+                levels=6, radius=1.0, firefly_filter=True, composite="mix", intensity=0.04
+            ),
+            # KWin spreads six strengths of four iterations evenly over the offsets 3 to 8.
+            "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
+            "bevy_natural": BevyBloom(),
+            "kino": KinoBloom(),
+            "filament": FilamentBloom(),
+            "unity_urp": UrpBloom(),
+            "unity_hdrp": HdrpBloom(),
+            "threejs_unreal": UnrealBloom(),
+            "godot_4_5": GodotBloom(
+                level_weights=(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0),
+                intensity=0.8,
+                composite="soft_light",
+            ),
+            "godot_4_6": GodotBloom(),
+            "blender_bloom": BlenderGlare(),
+            "pygfx": PygfxBloom(),
+        }
+    )
 )

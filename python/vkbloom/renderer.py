@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 import numpy as np
 
@@ -187,6 +187,10 @@ class Renderer:
         """
         self._core.close()
 
+    def __reduce__(self) -> NoReturn:
+        # Of copy.copy, copy.deepcopy and pickle: two would share what `close` closes.
+        raise TypeError("a Renderer cannot be copied or pickled; create another one")
+
     def __enter__(self) -> Renderer:
         if self.closed:
             raise ValueError("the renderer is closed")
@@ -291,7 +295,8 @@ class Renderer:
         Parameters
         ----------
         image : ndarray, shape (H, W, 3) or (H, W, 4)
-            uint8 (read as value / 255), float16 or float32; any strides. RGB gets alpha 1; RGBA
+            Linear light: uint8 (read as value / 255), float16 or float32; any strides. The levels
+            of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; RGBA
             keeps its alpha, which the bloom never changes. NaN and infinity count as 0 in the
             bloom and stay where they are in ``final``.
         settings : Settings, optional

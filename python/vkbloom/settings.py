@@ -9,8 +9,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
-from collections.abc import Sequence
-from typing import Any, ClassVar, Literal, Self, get_args
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal, Self, cast, get_args
 
 from vkbloom import _core
 from vkbloom.checks import as_float, check_floats, check_number, check_size
@@ -223,21 +223,99 @@ class Settings:
         """
         return dataclasses.replace(self, **changes)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the fields by name, and ``method``.
 
         Returns
         -------
         dict
-            Values that `json.dumps` accepts.
+            Plain values that JSON can hold, tuples as its lists.
+
+        See Also
+        --------
+        from_dict : The way back.
+        """
+        return {"method": self.method, **dataclasses.asdict(self)}
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """Make settings of what `to_dict` gave.
+
+        Parameters
+        ----------
+        fields : mapping of str to object
+            Values by field; missing ones are the defaults. ``method`` names the class, and may be
+            missing when this is called on a method, such as ``Separable.from_dict``.
+
+        Returns
+        -------
+        Settings
+            Of that method.
+
+        Raises
+        ------
+        ValueError
+            There is no such method or field, the method is not that of the class, or a value is
+            out of range.
+        TypeError
+            `fields` is no mapping, or a value has the wrong type.
 
         Examples
         --------
-        >>> fields = vkbloom.DualKawase(levels=3).as_dict()
-        >>> fields["method"], fields["levels"], fields["offset"]
-        ('dual_kawase', 3, 1.0)
+        >>> Settings.from_dict({"method": "pyramid", "levels": 3})  # doctest: +SKIP
+        Pyramid(bloom=True, ..., levels=3, ...)
         """
-        return {"method": self.method, **dataclasses.asdict(self)}
+        if not isinstance(fields, Mapping):
+            raise TypeError(f"fields: a mapping is needed, not {type(fields).__name__}")
+        own = getattr(cls, "method", None)
+        method = fields.get("method", own)
+        kinds = {kind.method: kind for kind in Settings.__subclasses__()}
+        if not isinstance(method, str) or method not in kinds:
+            raise ValueError(f"method: {method!r} is not one of {', '.join(kinds)}")
+        if own not in (None, method):
+            raise ValueError(f"method: {method!r} is not the {own!r} of {cls.__name__}")
+        values = {name: value for name, value in fields.items() if name != "method"}
+        known = [field.name for field in dataclasses.fields(kinds[method])]
+        unknown = [name for name in values if name not in known]
+        if unknown:
+            raise ValueError(
+                f"fields: {method} has no {', '.join(map(repr, unknown))}; it has "
+                f"{', '.join(known)}"
+            )
+        made: Any = kinds[method](**values)
+        return cast("Self", made)
+
+    def to_json(self) -> str:
+        """Return `to_dict` as JSON text."""
+        import json  # noqa: PLC0415  costs start-up time
+
+        return json.dumps(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Make settings of JSON text that `to_json` gave.
+
+        Parameters
+        ----------
+        text : str
+            An object with the keys of `from_dict`.
+
+        Returns
+        -------
+        Settings
+
+        Raises
+        ------
+        ValueError, TypeError
+            The text is no JSON object, or as for `from_dict`.
+        """
+        import json  # noqa: PLC0415  costs start-up time
+
+        try:
+            fields = json.loads(text)
+        except RecursionError:
+            raise ValueError("text: lists and objects stand too deep in each other") from None
+        return cls.from_dict(fields)
 
     def _repr_html_(self) -> str:
         """Return the table of `display.fields_html`."""

@@ -49,7 +49,7 @@ def scene_source(
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     if not isinstance(scene, Scene):
-        raise TypeError(f"scene: a Scene is needed, not {scene!r}")
+        raise TypeError(f"scene: a Scene is needed, not {type(scene).__name__}")
     return _core.scene_source(*scene_arguments(scene, check_size("size", size), shading, turns))
 
 

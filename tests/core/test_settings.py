@@ -97,7 +97,7 @@ def test_as_dict_is_plain() -> None:
         weights=np.array([0.5, 0.25], np.float32),
         layers=np.array([[1.0, 0.5], [2.0, 0.25]]),
     )
-    values = settings.as_dict()
+    values = settings.to_dict()
     assert values["method"] == "separable"
     again = json.loads(json.dumps(values))
     assert again.pop("method") == "separable"

@@ -34,7 +34,7 @@ def ask(viewer: Viewer, **message: Any) -> tuple[dict[str, Any], list[bytes]]:
 
 
 def frame(viewer: Viewer, settings: Settings, **rest: Any) -> tuple[dict[str, Any], bytes]:
-    answer, buffers = ask(viewer, kind="frame", sides={"a": settings.as_dict()}, **rest)
+    answer, buffers = ask(viewer, kind="frame", sides={"a": settings.to_dict()}, **rest)
     assert answer["kind"] == "frame", answer
     assert "error" not in answer["sides"]["a"], answer
     (picture,) = buffers
@@ -57,7 +57,7 @@ class TestControls:
         assert list(described["methods"]) == list(METHODS)
         for name, method in described["methods"].items():
             fields = {field["name"]: field for field in method["fields"]}
-            defaults = METHODS[name]().as_dict()
+            defaults = METHODS[name]().to_dict()
             without = set(defaults) - set(fields)
             refused = {
                 "blender": {"knee"},
@@ -101,7 +101,7 @@ class TestControls:
 
     @pytest.mark.parametrize("settings", EXAMPLES)
     def test_settings_come_back_from_the_page(self, settings: Settings) -> None:
-        assert settings_from(json.loads(json.dumps(settings.as_dict()))) == settings
+        assert settings_from(json.loads(json.dumps(settings.to_dict()))) == settings
 
     @pytest.mark.parametrize("settings", EXAMPLES)
     def test_code_makes_the_settings(self, settings: Settings) -> None:
@@ -189,7 +189,7 @@ class TestViewer:
     def test_setup(self, viewer: Viewer) -> None:
         answer, buffers = ask(viewer, kind="setup", view="v", id=4)
         assert (answer["kind"], answer["view"], answer["id"], buffers) == ("setup", "v", 4, [])
-        assert answer["sides"]["a"] == json.loads(json.dumps(Separable().as_dict()))
+        assert answer["sides"]["a"] == json.loads(json.dumps(Separable().to_dict()))
         assert answer["sides"]["b"]["bloom"] is False
         assert (answer["animated"], answer["own_size"]) == (True, [64, 36])
 
@@ -224,7 +224,7 @@ class TestViewer:
         assert frame(viewer, Separable(), framebuffer="down_3")[0]["framebuffer"] == "final"
 
     def test_both_sides_at_once(self, viewer: Viewer, tmp_path: Path) -> None:
-        sides = {"b": Separable(bloom=False).as_dict(), "a": Separable().as_dict()}
+        sides = {"b": Separable(bloom=False).to_dict(), "a": Separable().to_dict()}
         answer, buffers = ask(viewer, kind="frame", sides=sides)
         with_bloom, without = (
             decode(buffers[answer["sides"][side]["picture"]], tmp_path).astype(int).sum()
@@ -274,7 +274,7 @@ class TestViewer:
 
     def test_a_side_that_fails_leaves_the_other(self, viewer: Viewer) -> None:
         wrong = {"method": "kino", "composite": "mix"}
-        sides = {"a": wrong, "b": Separable().as_dict()}
+        sides = {"a": wrong, "b": Separable().to_dict()}
         answer, buffers = ask(viewer, kind="frame", sides=sides)
         assert "composite: 'mix' is not one of add" in answer["sides"]["a"]["error"]
         assert "code" in answer["sides"]["b"]
@@ -349,7 +349,7 @@ class TestWidget:
         explorer = vkbloom.explore(scene, size=(64, 36), renderer=renderer)
         assert explorer.frames is None
         settings = Pyramid(levels=3)
-        message = {"kind": "frame", "id": 1, "sides": {"a": settings.as_dict()}}
+        message = {"kind": "frame", "id": 1, "sides": {"a": settings.to_dict()}}
         explorer._handle_custom_msg(message, [])
         ((answer, buffers),) = sent
         assert answer["sides"]["a"]["framebuffer"] == "final"
@@ -369,7 +369,7 @@ class TestWidget:
         explorer.settings = Pyramid()
         explorer.against = Separable()
         assert [list(content["sides"]) for content, _ in sent] == [["a"], ["b"]]
-        assert sent[0][0]["sides"]["a"] == Pyramid().as_dict()
+        assert sent[0][0]["sides"]["a"] == Pyramid().to_dict()
         assert (explorer.settings, explorer.against) == (Pyramid(), Separable())
         with pytest.raises(TypeError, match="settings"):
             explorer.settings = "pyramid"  # type: ignore[assignment]

@@ -80,7 +80,7 @@ async def answer(connection: WebSocketClientConnection) -> tuple[dict[str, Any],
 
 
 def asked(number: int, *sides: str) -> str:
-    settings = Separable(intensity=number).as_dict()
+    settings = Separable(intensity=number).to_dict()
     return json.dumps({"kind": "frame", "id": number, "sides": dict.fromkeys(sides, settings)})
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vkbloom.io import safe_writing
 from vkbloom.io.image_reading import decode, load
 from vkbloom.io.image_writing import check_writable, save
-from vkbloom.io.images import Colour, Picture, Window
+from vkbloom.io.images import Picture, SavedColour, Window
 from vkbloom.io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -323,7 +323,7 @@ class TestDecode:
         space = {"oiio__ColorSpace": "g22_rec709_scene"}
         path = store(tmp_path / "a.png", noise(4, 6, 3, numbers="uint8"), "uint8", **space)
         (note,) = decode(load(path)).notes
-        assert note == "the file's colour space is g22_rec709_scene; its colours are read as srgb"
+        assert note == "the file says g22_rec709_scene of its colours; converted to linear Rec. 709"
 
     @pytest.mark.parametrize("numbers", ["half", "float"])
     def test_floats_are_linear_and_stay(self, tmp_path: Path, numbers: str) -> None:
@@ -469,7 +469,7 @@ class TestSave:
         ],
     )
     def test_colours(
-        self, tmp_path: Path, name: str, colour: Colour | None, expected: float
+        self, tmp_path: Path, name: str, colour: SavedColour | None, expected: float
     ) -> None:
         pixels = np.full((4, 4, 3), 0.5, np.float32)
         save(linear_picture(pixels, "float"), tmp_path / name, colour)

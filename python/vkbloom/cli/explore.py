@@ -16,8 +16,8 @@ import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
-from vkbloom.cli.image_files import read_picture, subimage_option
-from vkbloom.cli.program import as_wrong_use, given
+from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
+from vkbloom.cli.program import blaming_the_call, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.explorer.viewer import Viewer
@@ -45,6 +45,7 @@ _LARGEST_PORT: Final = 65535
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @subimage_option
+@layer_option
 @device_options
 @scene_options
 @settings_options
@@ -56,6 +57,7 @@ def command(
     size: tuple[int, int],
     shading: Shading,
     subimage: int,
+    layer: str | None,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -72,7 +74,7 @@ def command(
             "--scene, --shading and --size are for a scene; leave them out with an IMAGE"
         )
     looked_at: vkbloom.Scene | NDArray[Any] = (
-        scene() if source is None else read_picture(source, subimage, None).pixels
+        scene() if source is None else read_picture(source, subimage, None, layer=layer).pixels
     )
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 

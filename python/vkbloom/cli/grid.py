@@ -25,7 +25,13 @@ from vkbloom.checks import import_extra
 from vkbloom.cli import axis_options
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
-from vkbloom.cli.image_files import COLOURS, note, read_picture, subimage_option
+from vkbloom.cli.image_files import (
+    input_colour_option,
+    layer_option,
+    note,
+    read_picture,
+    subimage_option,
+)
 from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
@@ -122,13 +128,10 @@ _STORE: Final = ".zarr"
     type=click.Path(),
     help="Also plot the figures along the axes: a PNG, SVG or PDF.",
 )
-@click.option(
-    "--input-colour",
-    type=click.Choice(COLOURS),
-    help="Encoding of the colours in IMAGE, as for vkbloom apply.",
-)
-@click.option("--raw", is_flag=True, help="Use the values of 8-bit files without decoding.")
+@input_colour_option
+@click.option("--raw", is_flag=True, help="Take the values of 8-bit files as they are.")
 @subimage_option
+@layer_option
 @device_options
 @scene_options
 @settings_options
@@ -153,6 +156,7 @@ def command(
     input_colour: Colour | None,
     raw: bool,
     subimage: int,
+    layer: str | None,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -177,7 +181,9 @@ def command(
     _check_drawing("--curves", curves, (".png", ".svg", ".pdf"))
     axes = axis_options.axis_values(axis_words, settings)
     reduce = axis_options.named_reductions(reduce_words, settings)
-    pictures = [read_picture(image, subimage, input_colour, raw=raw) for image in images]
+    pictures = [
+        read_picture(image, subimage, input_colour, layer=layer, raw=raw) for image in images
+    ]
     source = _source(images, pictures, scene)
     shared: dict[str, Any] = {
         "size": size,

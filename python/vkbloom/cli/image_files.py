@@ -13,9 +13,10 @@ import numpy as np
 
 from vkbloom.cli.program import given
 from vkbloom.io import image_reading
+from vkbloom.io.colour import check_space
 from vkbloom.io.images import Colour, Picture, StoredImage
 
-#: Encodings of the colours in a file.
+#: What the colours of a written file can be.
 COLOURS: Final = ("linear", "srgb")
 
 _STANDARD_ERROR = 2
@@ -33,10 +34,30 @@ def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
     )(command)
 
 
-def read(path: str, subimage: int) -> StoredImage:
-    """Read an image file. The libraries below print nothing; errors are exceptions."""
+def layer_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--layer``, the argument of `vkbloom.read`."""
+    return click.option(
+        "--layer",
+        metavar="NAME",
+        help="Which layer to read of an OpenEXR file that has several, such as ViewLayer.Combined.",
+    )(command)
+
+
+def input_colour_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--input-colour``, the argument `colour` of `vkbloom.io.image_reading.decode`."""
+    return click.option(
+        "--input-colour",
+        metavar="linear|srgb|SPACE",
+        help="What the colours in the file are; SPACE is one of OpenColorIO's built-in "
+        "configuration, such as ACEScg or 'Linear Rec.2020' [default linear for floats; for "
+        "integers what the file says, else srgb]",
+    )(command)
+
+
+def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
+    """Read an image file; the only message of a failure is that of the exception."""
     with _silenced():
-        return image_reading.load(path, subimage)
+        return image_reading.load(path, subimage, layer)
 
 
 def check_part_is_given(path: str, stored: StoredImage) -> None:
@@ -58,18 +79,28 @@ def note(text: str) -> None:
 
 
 def read_picture(
-    source: str, subimage: int, colour: Colour | None, *, raw: bool = False
+    source: str,
+    subimage: int,
+    colour: Colour | None,
+    *,
+    layer: str | None = None,
+    raw: bool = False,
 ) -> Picture:
     """Read an image file, decode it for a renderer, and print notes about its contents.
 
     Raises
     ------
     click.UsageError
-        `raw` is set, and the file does not have 8-bit integers.
+        `raw` is for 8-bit files, and this is none; there is no such `colour`.
     OSError, ValueError
         The file cannot be read, or a renderer cannot take its pixels.
     """
-    stored = read(source, subimage)
+    if colour not in (None, *COLOURS):
+        try:
+            check_space(colour)
+        except ValueError as error:
+            raise click.UsageError(f"--input-colour: {error}") from error
+    stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
         raise click.UsageError(
             f"--raw: {source} is not a file of 8-bit integers but of {stored.numbers[0]}; leave "
@@ -79,8 +110,8 @@ def read_picture(
         picture = image_reading.decode(stored, colour, raw=raw)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
-    if len(stored.parts) > 1 and not given("subimage"):
-        note(f"{source}: read the first of its {_listed(stored)}; --subimage chooses another")
+    if len(stored.parts) > 1 and layer is None and not given("subimage"):
+        note(f"{source}: the first of its {_listed(stored)}; --subimage reads another")
     nan = int(np.isnan(picture.values).sum())
     infinite = int(np.isinf(picture.values).sum())
     if nan or infinite:

@@ -17,7 +17,11 @@ from vkbloom.cli.program import as_wrong_use
 METHODS: Final[dict[str, type[vkbloom.Settings]]] = {
     kind.method: kind for kind in vkbloom.Settings.__subclasses__()
 }
-_DEFAULT_METHOD: Final = vkbloom.Separable.method
+#: What settings start from without --preset and --method.
+PRESET_OF_IMAGES: Final = "bevy_natural"
+_PRESET_OF_SCENES: Final = "tutorial"
+# The commands' arguments for image files, of which explore and grid may have none.
+_IMAGES: Final = ("source", "sources", "images")
 
 
 def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -26,12 +30,13 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @click.option(
         "--preset",
         type=click.Choice(list(vkbloom.presets)),
-        help="Published settings to start from; other options change them.",
+        help="Settings to begin with, under the name of where they were published "
+        f"[default {PRESET_OF_IMAGES} for images, {_PRESET_OF_SCENES} for scenes]",
     )
     @click.option(
         "--method",
         type=click.Choice(list(METHODS)),
-        help=f"How the bloom is blurred [default {_DEFAULT_METHOD}, or the preset's]",
+        help="How the bloom is blurred, with that method's defaults [default the preset's]",
     )
     @fields.options({"": vkbloom.Settings}, "shared")
     @fields.options(dict(METHODS), "own", base=vkbloom.Settings)
@@ -43,29 +48,50 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
         own: dict[str, Any],
         **rest: object,
     ) -> object:
-        return command(settings=_settings(preset, method, {**shared, **own}), **rest)
+        if preset is None and method is None:
+            is_image = any(rest.get(name) for name in _IMAGES)
+            preset = PRESET_OF_IMAGES if is_image else _PRESET_OF_SCENES
+        begun = _begun(preset, method)
+        return command(settings=_changed(begun, {**shared, **own}), **rest)
 
     return run
 
 
-def _settings(preset: str | None, method: str | None, changes: dict[str, Any]) -> vkbloom.Settings:
-    """Make settings from the options.
+def _begun(preset: str | None, method: str | None) -> vkbloom.Settings:
+    """Return the settings of a preset or the defaults of a method.
 
     Raises
     ------
     click.UsageError
-        The options contradict each other, or a value is out of range.
+        Both are given, and the preset is of another method.
     """
-    begun = METHODS[method or _DEFAULT_METHOD]() if preset is None else vkbloom.presets[preset]
+    begun = METHODS[str(method)]() if preset is None else vkbloom.presets[preset]
     if method not in (None, begun.method):
-        raise click.UsageError(
-            f"--method: the preset {preset} has the method {begun.method}, not {method}"
-        )
-    foreign = [name for name in changes if name not in begun.as_dict()]
+        raise click.UsageError(f"--preset {preset} is of the method {begun.method}, not {method}")
+    return begun
+
+
+def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settings:
+    """Return settings with the options' changes.
+
+    Raises
+    ------
+    click.UsageError
+        The method has no such field, or a value is out of range.
+    """
+    foreign = [name for name in changes if not hasattr(begun, name)]
     if foreign:
         declared = {one.name: one for kind in METHODS.values() for one in dataclasses.fields(kind)}
         options = (declared[name].metadata.get("option", name) for name in foreign)
         names = ", ".join(f"--{option.replace('_', '-')}" for option in options)
-        raise click.UsageError(f"the method {begun.method} has no {names}")
-    with as_wrong_use():
+        having = " or ".join(
+            method
+            for method, kind in METHODS.items()
+            if all(name in kind.__dataclass_fields__ for name in foreign)
+        )
+        raise click.UsageError(
+            f"the method {begun.method} has no {names}; "
+            + (f"give --method {having}" if having else "no method has all of them")
+        )
+    with blaming_the_call():
         return begun.replace(**changes)

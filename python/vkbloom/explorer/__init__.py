@@ -48,7 +48,8 @@ def explore(
         The scene, or an image as `Renderer.apply` takes it. An image that is larger than it is
         shown is reduced first by averaging, unless the page selects its own size.
     settings : Settings, optional
-        The initial settings. Default: ``Separable()``.
+        To begin with; by default ``presets["bevy_natural"]`` for an image and
+        ``presets["tutorial"]`` for a scene.
     against : Settings, optional
         The initial settings of B. Default: `settings` without bloom.
     size : (int, int)

@@ -60,14 +60,14 @@ def controls() -> dict[str, Any]:
         "kind" ("bool", "number", "choice"), "help", whether it stands "first", and whether it is
         "optional", which is to say may be None. Numbers have "from", "to" and "step" of their
         slider, "low" and "high" of what is accepted, and "whole"; choices have "choices".
-        "presets": settings by name, as `Settings.as_dict` gives them.
+        "presets": settings by name, as `Settings.to_dict` gives them.
     """
     return {
         "methods": {
-            name: {"defaults": kind().as_dict(), "fields": _fields(kind)}
+            name: {"defaults": kind().to_dict(), "fields": _fields(kind)}
             for name, kind in METHODS.items()
         },
-        "presets": {name: settings.as_dict() for name, settings in presets.items()},
+        "presets": {name: settings.to_dict() for name, settings in presets.items()},
     }
 
 
@@ -154,20 +154,15 @@ def settings_from(fields: object) -> Settings:
     Parameters
     ----------
     fields : mapping of str to object
-        As `Settings.as_dict` gives them, and JSON keeps them; what is missing is the default.
+        As `Settings.to_dict` gives them, and JSON keeps them; what is missing is the default.
 
     Raises
     ------
     TypeError, ValueError
         There is no such method or field, or a value is of another type or out of range.
     """
-    if not isinstance(fields, Mapping):
-        raise TypeError(f"settings: fields by name are needed, not {type(fields).__name__}")
-    values = dict(fields)
-    method = values.pop("method", None)
-    if not isinstance(method, str) or method not in METHODS:
-        raise ValueError(f"method: {method!r} is not one of {', '.join(METHODS)}")
-    return METHODS[method](**values)
+    made: Settings = Settings.from_dict(fields)  # type: ignore[arg-type]
+    return made
 
 
 def as_code(settings: Settings) -> str:

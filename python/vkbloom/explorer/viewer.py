@@ -30,6 +30,7 @@ from vkbloom import _core
 from vkbloom.checks import check_image, check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
+from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
 from vkbloom.settings import SHADINGS, check_settings
 
@@ -86,7 +87,10 @@ class Viewer:
     ) -> None:
         from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
-        begun = check_settings(settings)
+        is_image = not isinstance(source, Scene)
+        begun = (
+            presets["bevy_natural"] if settings is None and is_image else check_settings(settings)
+        )
         self.settings: dict[str, Settings] = {
             "a": begun,
             "b": begun.replace(bloom=False) if against is None else check_settings(against),
@@ -142,7 +146,7 @@ class Viewer:
     def _setup(self, message: Mapping[str, Any]) -> Answer:
         return {
             **controls(),
-            "sides": {side: settings.as_dict() for side, settings in self.settings.items()},
+            "sides": {side: settings.to_dict() for side, settings in self.settings.items()},
             "animated": self._scene is not None,
             "own_size": self._own_size,
             "adapter": self.renderer.info.summary,

@@ -66,7 +66,7 @@ class Explorer(anywidget.AnyWidget):
 
     def _set(self, side: str, settings: Settings) -> None:
         self._viewer.settings[side] = check_settings(settings)
-        self.send({"kind": "settings", "sides": {side: settings.as_dict()}}, [])
+        self.send({"kind": "settings", "sides": {side: settings.to_dict()}}, [])
 
     @property
     def frames(self) -> Frames | None:

@@ -74,7 +74,7 @@ class _FileWriter:
                 encoding=form.encoding if encoded == "none" else encoded,
                 grey=form.grey,
             )
-            facts = {"vkbloom:settings": json.dumps(point.settings.as_dict())}
+            facts = {"vkbloom:settings": json.dumps(point.settings.to_dict())}
             image_writing.save(picture, path, None, facts)
             return
         info = {"adapter": self.layout.adapter, "driver": self.layout.driver}

@@ -92,7 +92,7 @@ class Grid:
     def remaining_settings(self) -> dict[str, Any]:
         """The settings that no axis varies, and the method."""
         varied = {axis.name for axis in self.axes}
-        return {k: v for k, v in self.settings.as_dict().items() if k not in varied}
+        return {k: v for k, v in self.settings.to_dict().items() if k not in varied}
 
     def references(self) -> dict[str, dict[int, int]]:
         """Return the reference points of reductions: by name, indices by number of the axis."""

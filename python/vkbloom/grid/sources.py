@@ -249,8 +249,8 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         ("time", time != 0.0),
     ):
         if is_given:
-            raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-    if isinstance(source, np.ndarray):
+            raise ValueError(f"{name}: only scenes have one, an image is given")
+    if hasattr(source, "__array__") or hasattr(source, "__dlpack__"):
         return ImageSource([check_image(source)])
     labels: list[Any]
     if isinstance(source, Mapping):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import glob
 import json
 import os
 from collections.abc import Iterable
@@ -14,17 +16,18 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.framebuffers import Framebuffers, leading
-from vkbloom.io import safe_writing
-from vkbloom.io.images import check_name
+from vkbloom.io import image_reading, safe_writing
+from vkbloom.io.images import PIXEL_TYPES, check_name, failure_of
+from vkbloom.settings import Settings
 
 if TYPE_CHECKING:
     import OpenImageIO
 
 
-__all__ = ["save"]
+__all__ = ["load", "save"]
 
-# OpenImageIO's names of the pixel types, by the array's dtype.
-_PIXEL_TYPES = {"uint8": "uint8", "float16": "half", "float32": "float"}
+# What `_spec` writes beside the entries of `info`.
+_OWN = ("settings", "timings", "dtype", "framebuffer", "place")
 
 
 def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
@@ -92,6 +95,90 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
     return [file for _, file in files]
 
 
+def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read framebuffers from what `save` wrote: what `Frames.load` does and describes.
+
+    Returns
+    -------
+    arrays : dict of str to ndarray
+    facts : dict
+        "settings", "timings" and "info".
+
+    Raises
+    ------
+    OSError, ValueError
+        A file is not there, is damaged or is none of `save`'s; names the file.
+    ModuleNotFoundError
+        OpenImageIO is missing.
+    """
+    found: list[tuple[int, str, NDArray[Any]]] = []
+    facts: dict[str, Any] = {}
+    for file in _files_of(Path(path)):
+        for index in range(len(image_reading.load(file).parts)):
+            pixels, said = _stored(file, index)
+            try:
+                facts = {
+                    "settings": Settings.from_json(said["settings"]),
+                    "timings": json.loads(said["timings"]),
+                    "info": {
+                        name: int(text) if name in ("nan", "inf") else text
+                        for name, text in said.items()
+                        if name not in _OWN
+                    },
+                }
+                array = _as_dtype(pixels, said["dtype"])
+                found.append((int(said["place"]), said["framebuffer"], array))
+            except KeyError as error:
+                raise ValueError(f"{file}: not written by Frames.save: no {error}") from error
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{file}: {error}") from error
+    return {name: array for _, name, array in sorted(found, key=lambda one: one[0])}, facts
+
+
+def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
+    """Return the pixels of a part, without what its window leaves open, and what is said of it."""
+    with image_reading.opened(file, "Frames.load") as reader:
+        reader.seek_subimage(index, 0)
+        spec = reader.spec()
+        image_reading.check_plausible(spec, file)
+        said = {
+            attribute.name.removeprefix("vkbloom:"): str(attribute.value)
+            for attribute in spec.extra_attribs
+            if attribute.name.startswith("vkbloom:")
+        }
+        pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
+        reason = failure_of(reader)
+    if pixels is None or reason:
+        raise ValueError(f"{file}: damaged: {reason or 'the pixels cannot be read'}")
+    return pixels.reshape(spec.height, spec.width, spec.nchannels), said
+
+
+def _files_of(path: Path) -> list[Path]:
+    """Return the files that `save` makes of a name."""
+    if path.is_dir():
+        found = sorted(file for file in path.iterdir() if file.is_file())
+    elif path.exists():
+        return [path]
+    else:
+        stem = glob.escape(path.stem)
+        found = [path.with_suffix(".exr")] if path.with_suffix(".exr").exists() else []
+        for suffix in dict.fromkeys((path.suffix, ".exr")):
+            found += sorted(path.parent.glob(f"{stem}_*{suffix}"))
+    if not found:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+    return found
+
+
+def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
+    """Return pixels in the dtype that they had, depth without a channel."""
+    if dtype not in ("uint8", "float16", "float32"):
+        raise ValueError(f"{dtype!r} is no dtype of a framebuffer")
+    if dtype == "uint8" and pixels.dtype != np.uint8:
+        pixels = np.rint(pixels.astype(np.float32) * 255)
+    made = pixels.astype(dtype, copy=False)
+    return made[:, :, 0] if made.shape[2] == 1 else made
+
+
 def _write_image(
     oiio: ModuleType, frames: Framebuffers, name: str, temporary: Path, file: Path
 ) -> bool:
@@ -103,10 +190,10 @@ def _write_image(
         if not (pixels[:, :, 3] == opaque).all():
             return False
         pixels = pixels[:, :, :3]
-    if not safe_writing.holds(oiio, temporary, pixels.shape[2], _PIXEL_TYPES[str(pixels.dtype)]):
+    if not safe_writing.holds(oiio, temporary, pixels.shape[2], PIXEL_TYPES[str(pixels.dtype)]):
         return False
-    spec = _spec(oiio, frames, pixels)
-    # Otherwise OpenImageIO assumes premultiplied colours and divides them by alpha.
+    spec = _spec(oiio, frames, name, pixels)
+    # Otherwise OpenImageIO takes the colours for premultiplied and divides them by alpha.
     spec.attribute("oiio:UnassociatedAlpha", 1)
     if not (
         writer.open(str(temporary), spec)
@@ -128,10 +215,9 @@ def _write_exr(
         pixels = np.atleast_3d(frames[name])
         if pixels.dtype == np.uint8:
             pixels = (pixels / np.float32(255)).astype(np.float16)
-        spec = _spec(oiio, frames, pixels)
-        # OpenImageIO writes this attribute as the part's name.
+        spec = _spec(oiio, frames, name, pixels)
+        # What OpenEXR calls the name of the part.
         spec.attribute("oiio:subimagename", name)
-        spec.attribute("vkbloom:dtype", str(frames[name].dtype))
         spec.full_width, spec.full_height = width, height
         if pixels.shape[2] == 1:
             spec.channelnames = ("Z",)
@@ -150,13 +236,15 @@ def _write_exr(
         raise safe_writing.write_error(writer, temporary, file)
 
 
-def _spec(oiio: ModuleType, frames: Framebuffers, pixels: NDArray[Any]) -> OpenImageIO.ImageSpec:
-    """Make the ImageSpec of an (H, W, C) array, with the frames' settings and adapter."""
+def _spec(
+    oiio: ModuleType, frames: Framebuffers, name: str, pixels: NDArray[Any]
+) -> OpenImageIO.ImageSpec:
+    """Describe an (H, W, C) array to OpenImageIO, with what the frames came from."""
     height, width, channels = pixels.shape
     spec: OpenImageIO.ImageSpec = oiio.ImageSpec(
-        width, height, channels, _PIXEL_TYPES[str(pixels.dtype)]
+        width, height, channels, PIXEL_TYPES[str(pixels.dtype)]
     )
-    settings = json.dumps(frames.settings.as_dict())
+    settings = json.dumps(frames.settings.to_dict())
     adapter = frames.info.get("adapter", "an unnamed adapter")
     spec.attribute("Software", f"vkbloom {frames.info.get('version', '')}".rstrip())
     spec.attribute("ImageDescription", f"vkbloom on {adapter}, settings {settings}")
@@ -164,6 +252,9 @@ def _spec(oiio: ModuleType, frames: Framebuffers, pixels: NDArray[Any]) -> OpenI
         spec.attribute(f"vkbloom:{key}", str(value))
     spec.attribute("vkbloom:settings", settings)
     spec.attribute("vkbloom:timings", json.dumps(dict(frames.timings)))
+    spec.attribute("vkbloom:dtype", str(frames[name].dtype))
+    spec.attribute("vkbloom:framebuffer", name)
+    spec.attribute("vkbloom:place", str(list(frames).index(name)))
     return spec
 
 

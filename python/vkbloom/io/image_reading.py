@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.io import colour as colours_of
 from vkbloom.io.images import (
     DTYPES,
-    KEPT_ATTRIBUTES,
     SPACES,
     Colour,
-    Encoding,
     Picture,
     StoredImage,
     check_name,
     failure_of,
+    is_kept,
 )
 from vkbloom.io.srgb import decode_srgb
 
@@ -37,7 +37,9 @@ _LARGEST_AREA: Final = 1 << 28
 # PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
-# Number of listed parts. Some files have thousands, and reading each header takes time.
+# Red, green, blue, white.
+_REC_709: Final = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+# That are listed. Some files have thousands, and each takes time.
 _MOST_PARTS: Final = 100
 
 
@@ -96,7 +98,7 @@ def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -
         )
 
 
-def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
+def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = None) -> StoredImage:
     """Read an image file.
 
     Parameters
@@ -104,7 +106,10 @@ def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     path : str or path-like
         A file of any format that OpenImageIO reads.
     subimage : int, default 0
-        Index of the part of a file with several parts (OpenEXR, TIFF, GIF).
+        Which part of a file that has several (OpenEXR, TIFF, GIF), from 0 on.
+    layer : str, optional
+        Of an OpenEXR file: only the channels ``layer.NAME`` are taken, under the NAME. It is
+        looked for in `subimage` and the parts behind it.
 
     Returns
     -------
@@ -115,16 +120,20 @@ def load(path: str | os.PathLike[str], subimage: int = 0) -> StoredImage:
     OSError
         The file does not exist or cannot be opened; the error names it.
     ValueError
-        The file is damaged or not an image, has no such part, is not a flat image of 8-bit or
-        16-bit integers or floats, or its name is not UTF-8; the error names the file.
+        The file is damaged or no image, has no such part or layer, is no flat image of 8 or 16
+        bit integers or floats, or its name is not UTF-8; it names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
     with opened(path, "Reading images") as reader:
-        return _read(reader, os.fspath(path), subimage)
+        return _read(reader, os.fspath(path), subimage, layer)
 
 
-def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredImage:
+def _read(
+    reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
+) -> StoredImage:
+    if layer is not None:
+        subimage = _part_with(reader, name, subimage, layer)
     if subimage < 0 or not reader.seek_subimage(subimage, 0):
         count = 0
         while reader.seek_subimage(count, 0):
@@ -159,9 +168,19 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
     pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
     if pixels.shape[:2] != (height, width):
         row, column = spec.y - top, spec.x - left
-        padded = np.zeros((height, width, spec.nchannels), dtype)
-        padded[row : row + spec.height, column : column + spec.width] = pixels
-        pixels = padded
+        whole = np.zeros((height, width, spec.nchannels), dtype)
+        whole[row : row + spec.height, column : column + spec.width] = pixels
+        pixels = whole
+    names = list(spec.channelnames)
+    formats = [str(spec.channelformat(index)) for index in range(spec.nchannels)]
+    if layer is not None:
+        own = [index for index, of in enumerate(_layers(spec)) if of == layer]
+        pixels = pixels[:, :, own]
+        names = [names[index].rpartition(".")[2] for index in own]
+        formats = [formats[index] for index in own]
+    # Before the other parts are looked at.
+    is_signalled = spec.getattribute("CICP") is not None
+    profile_name = spec.get_string_attribute("ICCProfile:profile_description")
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
         x, y = display[0] - left, display[1] - top
@@ -170,8 +189,8 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
         display = (0, 0, pixels.shape[1], pixels.shape[0])
     return StoredImage(
         pixels=np.ascontiguousarray(pixels),
-        channels=tuple(spec.channelnames),
-        numbers=tuple(str(spec.channelformat(index)) for index in range(spec.nchannels)),
+        channels=tuple(names),
+        numbers=tuple(formats),
         origin=(left, top),
         display=display,
         associated=spec.alpha_channel >= 0 and not spec.get_int_attribute("oiio:UnassociatedAlpha"),
@@ -179,10 +198,32 @@ def _read(reader: OpenImageIO.ImageInput, name: str, subimage: int) -> StoredIma
         attributes={
             attribute.name: (attribute.type, attribute.value)
             for attribute in spec.extra_attribs
-            if attribute.name in (*KEPT_ATTRIBUTES, "ICCProfile")
+            if is_kept(attribute.name)
         },
         parts=tuple(_parts(reader)),
+        profile_name=profile_name,
+        is_signalled=is_signalled,
     )
+
+
+def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
+    """Return the layer of each channel: what is before its name, else the name of the part."""
+    part = spec.get_string_attribute("oiio:subimagename")
+    return [name.rpartition(".")[0] or part for name in spec.channelnames]
+
+
+def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str) -> int:
+    """Return the first part, from `subimage` on, that has a layer."""
+    found: dict[str, None] = {}
+    for index in range(max(subimage, 0), subimage + _MOST_PARTS):
+        if not reader.seek_subimage(index, 0):
+            break
+        layers = _layers(reader.spec())
+        if layer in layers:
+            return index
+        found.update(dict.fromkeys(filter(None, layers)))
+    listed = f"its layers are {', '.join(found)}" if found else "it has no named layers"
+    raise ValueError(f"{name}: there is no layer {layer!r}; {listed}")
 
 
 def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
@@ -209,23 +250,25 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
     Parameters
     ----------
     stored : StoredImage
-    colour : {"linear", "srgb"}, optional
-        Encoding of the colours in the file. Default: floats are linear; integers are sRGB unless
-        the file says that they are linear.
+    colour : str, optional
+        What the colours in the file are: "linear", "srgb" or a colour space of OpenColorIO's
+        built-in configuration, such as "ACEScg". By default floats are linear, and integers what
+        the file says by a cICP chunk, an ICC profile or a gamma, else sRGB.
     raw : bool, default False
         Whether to keep 8-bit values without decoding.
 
     Returns
     -------
     Picture
-        float16 if the file has half, otherwise float32; uint8 if `raw`. Colours are neither
+        Of float16 where the file has half, of float32 for all else; of uint8 if `raw`. Colours of
+        integer files, or with `colour`, are linear Rec. 709, not clipped. They are neither
         multiplied nor divided by alpha.
 
     Raises
     ------
     ValueError
-        The channels are not RGB, RGBA, grey or grey with alpha; or `raw` is set and the file does
-        not have 8-bit integers, or `colour` is given as well.
+        The channels are neither RGB, RGBA, grey nor grey with alpha; there is no such `colour`;
+        `raw` and the file does not hold 8-bit integers, or `colour` is given as well.
     """
     if raw and colour is not None:
         raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
@@ -239,42 +282,29 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
         # OpenImageIO reads all channels as float if another channel is float.
         values = values.astype(np.float16, copy=False)
     notes = [f"left out the channels {', '.join(left_out)}"] if left_out else []
-    encoding: Encoding | None = None
-    if not raw:
-        encoding = colour or _encoding_given_by(stored, values.dtype)
-        if stored.space not in ("", *SPACES.values()) or stored.space == SPACES["gamma22"]:
-            notes.append(
-                f"the file's colour space is {stored.space}; its colours are read as {encoding}"
-            )
-        elif values.dtype.kind == "f" and stored.space == SPACES["srgb"] and colour is None:
-            notes.append("the file's colour space is srgb, but floats are read as linear")
-        values = _linear(values, encoding, len(chosen) in (2, 4))
-        if encoding != "srgb":
-            # The ICC profile describes another encoding than the one that will be written.
-            kept = {
-                name: stored.attributes[name]
-                for name in KEPT_ATTRIBUTES
-                if name in stored.attributes
-            }
-            stored = replace(stored, attributes=kept)
-        encoding = "linear"
     grey = len(chosen) < 3
     if grey:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
+    taken_as = ""
+    if not raw:
+        taken_as, values, said = _linear(values, stored, colour)
+        notes += said
+        stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     return Picture(
         pixels=np.ascontiguousarray(values),
-        encoding=encoding,
+        encoding=None if raw else "linear",
         numbers=numbers,
         grey=grey,
         stored=stored,
         notes=tuple(notes),
+        colour=taken_as,
     )
 
 
 def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
-    """Return the indices of the colour and alpha channels, and the names of the others."""
-    layers = {name.rpartition(".")[0] for name in names}
-    # Remove the layer's name if all channels have the same one.
+    """Return the places of the colour and alpha, and the names of the channels left out."""
+    layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
+    # One layer's name before every channel says nothing.
     plain = [name.rpartition(".")[2] if len(layers) == 1 else name for name in names]
     places = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
     alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
@@ -282,6 +312,10 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
         chosen = [places["R"], places["G"], places["B"], *alpha]
     elif len(names) == 1 + len(alpha):
         chosen = [index for index in range(len(names)) if index not in alpha] + alpha
+    elif len(layers) > 1:
+        raise ValueError(
+            f"the layers are {', '.join(filter(None, layers))}; name one as the layer to read"
+        )
     else:
         raise ValueError(
             f"the channels {', '.join(names)} are not R, G, B or a single one, with or without "
@@ -290,25 +324,96 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     return chosen, [name for index, name in enumerate(names) if index not in chosen]
 
 
-def _encoding_given_by(stored: StoredImage, dtype: np.dtype[Any]) -> Colour:
-    return "linear" if dtype.kind == "f" or stored.space == SPACES["linear"] else "srgb"
-
-
-def _linear(values: NDArray[Any], encoding: Encoding, has_alpha: bool) -> NDArray[Any]:
-    """Return floats of linear colours; alpha is only scaled."""
-    colours = values.shape[2] - has_alpha
+def _linear(
+    values: NDArray[Any], stored: StoredImage, colour: Colour | None
+) -> tuple[str, NDArray[Any], list[str]]:
+    """Return what the colours were taken as, floats of linear ones, and notes; alpha is scaled."""
+    if colour is not None:
+        if colour not in ("linear", "srgb"):
+            colours_of.check_space(colour)
+        return colour, _decoded(values, colour), []
     if values.dtype.kind == "f":
-        if encoding == "linear":
+        return "linear", values, _notes_of_floats(stored)
+    if stored.profile is not None and not stored.is_signalled:
+        return _by_profile(values, stored.profile, stored.profile_name)
+    space = {name: plain for plain, name in SPACES.items()}.get(stored.space, stored.space)
+    if space in ("", "srgb", "linear"):
+        return space or "srgb", _decoded(values, space or "srgb"), []
+    said = f"the file says {stored.space} of its colours"
+    try:
+        return (
+            stored.space,
+            _decoded(values, stored.space),
+            [f"{said}; converted to linear Rec. 709"],
+        )
+    except ValueError:
+        return "srgb", _decoded(values, "srgb"), [f"{said}, which is not known; taken as srgb"]
+
+
+def _by_profile(
+    values: NDArray[Any], profile: bytes, name: str
+) -> tuple[str, NDArray[Any], list[str]]:
+    said = f"its ICC profile {name!r}"
+    try:
+        if not colours_of.is_srgb_profile(profile):
+            plain = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
+            plain[:, :, :3] = colours_of.from_profile(plain[:, :, :3], profile)
+            return name or "ICC profile", plain, [f"converted to linear Rec. 709 by {said}"]
+        notes = []
+    except ValueError:
+        notes = [f"{said} is not one of RGB by a matrix and curves; taken as srgb"]
+    return "srgb", _decoded(values, "srgb"), notes
+
+
+def _notes_of_floats(stored: StoredImage) -> list[str]:
+    """Say what a file of floats tells of its colours, which stay as they are."""
+    notes: list[str] = []
+    if stored.space == SPACES["srgb"]:
+        notes.append("the file says srgb of its colours, which as floats are taken as linear")
+    elif stored.space not in ("", SPACES["linear"]):
+        notes.append(f"the file says {stored.space} of its colours; values are taken as they are")
+    _, primaries = stored.attributes.get("chromaticities", (None, None))
+    if primaries is not None and not np.allclose(primaries, _REC_709, atol=2e-3):
+        listed = ", ".join(f"{x:.4g} {y:.4g}" for x, y in zip(*[iter(primaries)] * 2, strict=True))
+        notes.append(
+            f"the file's chromaticities (red, green, blue, white: {listed}) are not those of Rec. "
+            "709; values are taken as they are"
+        )
+    return notes
+
+
+def _attributes_of_linear(
+    stored: StoredImage, taken_as: str, colour: Colour | None
+) -> dict[str, tuple[Any, Any]]:
+    """Return the attributes without those that tell of colours that were converted."""
+    lost = set()
+    if taken_as != "srgb":
+        lost.add("ICCProfile")
+    if colour not in (None, "linear", "srgb"):
+        lost.add("chromaticities")
+    return {name: value for name, value in stored.attributes.items() if name not in lost}
+
+
+def _decoded(values: NDArray[Any], space: str) -> NDArray[Any]:
+    """Return floats of linear colours out of a space; alpha is only scaled."""
+    if values.dtype.kind == "f":
+        if space == "linear":
             return values
         linear = values.astype(np.float32)
         with np.errstate(over="ignore"):
-            linear[:, :, :colours] = decode_srgb(linear[:, :, :colours])
+            linear[:, :, :3] = (
+                decode_srgb(linear[:, :, :3])
+                if space == "srgb"
+                else colours_of.from_space(linear[:, :, :3], space)
+            )
             return linear.astype(values.dtype)
     # A table with one entry per integer value, computed in float64.
     scale = np.iinfo(values.dtype).max
     plain = np.arange(scale + 1) / scale
-    table = (decode_srgb(plain) if encoding == "srgb" else plain).astype(np.float32)
+    table = (decode_srgb(plain) if space == "srgb" else plain).astype(np.float32)
     decoded: NDArray[Any] = table[values]
-    if has_alpha:
-        decoded[:, :, colours:] = plain.astype(np.float32)[values[:, :, colours:]]
+    if values.shape[2] == 4:
+        decoded[:, :, 3] = plain.astype(np.float32)[values[:, :, 3]]
+    if space not in ("srgb", "linear"):
+        decoded[:, :, :3] = colours_of.from_space(decoded[:, :, :3], space)
     return decoded

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -11,15 +12,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import import_extra
+from vkbloom.checks import check_index, import_extra
 from vkbloom.io import safe_writing
-from vkbloom.io.images import DTYPES, KEPT_ATTRIBUTES, SPACES, Colour, Encoding, Picture
+from vkbloom.io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, SavedColour
 from vkbloom.io.srgb import encode_srgb
 
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["check_writable", "save"]
+__all__ = ["as_numbers", "check_quality", "check_writable", "put", "save"]
 
 # Number types to write, in order of preference, by the number type of the picture. For floats
 # uint8 comes before uint16, because a PNG of a float picture is expected to have 8 bits.
@@ -30,6 +31,8 @@ _PREFERENCES: Final[Mapping[str, tuple[str, ...]]] = {
     "float": ("float", "half", "uint8", "uint16"),
     "double": ("float", "half", "uint8", "uint16"),
 }
+# OpenImageIO's names of the formats that have a quality, 1 to 100.
+_LOSSY: Final = ("jpeg", "webp", "jpegxl")
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -50,11 +53,38 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     safe_writing.check_extension(oiio, Path(path).suffix)
 
 
+def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
+    """Find out whether a file's format has a quality of compression.
+
+    Parameters
+    ----------
+    path : str or path-like
+        Of a format that can be written.
+    quality : int or None
+        1 to 100; None: the format's own.
+
+    Raises
+    ------
+    ValueError
+        It has none, or `quality` is out of range.
+    TypeError
+        `quality` is no int.
+    """
+    if quality is None:
+        return
+    check_index("quality", quality, 1, 100)
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    kind = oiio.ImageOutput.create(f"image{Path(path).suffix}").format_name()
+    if kind not in _LOSSY:
+        raise ValueError(f"quality: {kind} has none; {', '.join(_LOSSY)} have")
+
+
 def save(
     picture: Picture,
     path: str | os.PathLike[str],
-    colour: Colour | None = None,
+    colour: SavedColour | None = None,
     attributes: Mapping[str, str] | None = None,
+    quality: int | None = None,
 ) -> tuple[str, ...]:
     """Write a picture to a file, with its own number type or the closest one of the format.
 
@@ -71,7 +101,9 @@ def save(
     colour : {"linear", "srgb"}, optional
         Encoding of the colours in the file. Default: integers are sRGB and floats linear.
     attributes : mapping of str to str, optional
-        Added to the file if its format has attributes.
+        Added to the file where its format has a place for them.
+    quality : int, optional
+        Of JPEG, WebP and JPEG XL, 1 to 100. By default that of the format's writer.
 
     Returns
     -------
@@ -95,9 +127,13 @@ def save(
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
+    check_quality(target, quality)
     temporary = safe_writing.reserve(target, picture.values.nbytes)
     try:
-        notes = _write(oiio, picture, colour, temporary, target, attributes=attributes or {})
+        added = {} if quality is None else {"CompressionQuality": quality}
+        notes = _write(
+            oiio, picture, colour, temporary, target, attributes={**(attributes or {}), **added}
+        )
         safe_writing.check_complete(oiio, temporary, target)
         safe_writing.put_in_place(temporary, target)
     finally:
@@ -108,11 +144,11 @@ def save(
 def _write(
     oiio: ModuleType,
     picture: Picture,
-    colour: Colour | None,
+    colour: SavedColour | None,
     temporary: Path,
     target: Path,
     *,
-    attributes: Mapping[str, str],
+    attributes: Mapping[str, str | int],
 ) -> tuple[str, ...]:
     writer = oiio.ImageOutput.create(str(temporary))
     chosen = _chosen_layout(oiio, picture, writer, temporary)
@@ -127,23 +163,65 @@ def _write(
     encoding = picture.encoding
     if encoding == "linear" and (colour or ("srgb" if integer else "linear")) == "srgb":
         values, encoding = _encoded(values, has_alpha), "srgb"
-    values = _as_numbers(values, numbers)
+    put(
+        oiio,
+        as_numbers(values, numbers),
+        dataclasses.replace(picture, encoding=encoding),
+        temporary,
+        target,
+        attributes=attributes,
+    )
+    return tuple(notes)
 
+
+def put(
+    oiio: ModuleType,
+    values: NDArray[Any],
+    picture: Picture,
+    temporary: Path,
+    target: Path,
+    *,
+    attributes: Mapping[str, str | int],
+) -> None:
+    """Write values into a temporary file as they are.
+
+    Parameters
+    ----------
+    oiio : module
+        OpenImageIO.
+    values : ndarray, shape (H, W, C)
+        Of a dtype that the format holds, 1 to 4 channels.
+    picture : Picture
+        What is said of the values: their encoding, windows and attributes.
+    temporary, target : Path
+        Of `safe_writing.reserve`, and what it was given.
+    attributes : mapping of str to str or int
+        What is said besides.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; names `target`.
+    """
+    writer = oiio.ImageOutput.create(str(temporary))
     stored = picture.stored
     x, y, width, height = stored.display
     if not writer.supports("displaywindow"):
         row, column = y - stored.origin[1], x - stored.origin[0]
         values = values[row : row + height, column : column + width]
-    spec = oiio.ImageSpec(values.shape[1], values.shape[0], values.shape[2], numbers)
+    spec = oiio.ImageSpec(
+        values.shape[1], values.shape[0], values.shape[2], PIXEL_TYPES[values.dtype.name]
+    )
     if values.shape[2] < 3:
+        has_alpha = values.shape[2] == 2
         spec.channelnames = ("Y", "A")[: values.shape[2]]
         spec.alpha_channel = 1 if has_alpha else -1
     if writer.supports("displaywindow"):
         spec.x, spec.y = stored.origin
         spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
-    _describe(spec, picture, encoding, target)
-    for name, text in attributes.items():
-        spec.attribute(name, text)
+    _describe(spec, picture, writer.format_name(), target)
+    for name, value in attributes.items():
+        spec.attribute(name, value)
     is_written = (
         writer.open(str(temporary), spec)
         and writer.write_image(np.ascontiguousarray(values))
@@ -153,7 +231,6 @@ def _write(
         raise safe_writing.write_error(writer, temporary, target)
     # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
     writer.geterror()
-    return tuple(notes)
 
 
 def _chosen_layout(
@@ -208,8 +285,8 @@ def _encoded(values: NDArray[Any], has_alpha: bool) -> NDArray[np.float32]:
     return encoded
 
 
-def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
-    """Convert values to a file's number type; 1.0 is the largest integer."""
+def as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
+    """Return values as the numbers of a file, whose 1 is the largest for integers."""
     dtype = DTYPES[numbers]
     if values.dtype.kind == "u":
         if values.dtype == dtype:
@@ -223,11 +300,11 @@ def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
 
 
 def _describe(
-    spec: OpenImageIO.ImageSpec, picture: Picture, encoding: Encoding | None, target: Path
+    spec: OpenImageIO.ImageSpec, picture: Picture, format_name: str, target: Path
 ) -> None:
     """Set the attributes that describe a file's colours, alpha and pixels."""
     is_exr = target.suffix.lower() == ".exr"
-    stored = picture.stored
+    stored, encoding = picture.stored, picture.encoding
     space = stored.space if encoding is None else SPACES[encoding]
     # OpenEXR files are linear by definition, and another attribute has their primaries.
     if space and not (is_exr and encoding == "linear"):
@@ -237,9 +314,13 @@ def _describe(
     is_tiff = target.suffix.lower() in (".tif", ".tiff")
     if not is_exr and not (is_tiff and stored.associated):
         spec.attribute("oiio:UnassociatedAlpha", 1)
-    # An ICC profile describes encoded colours, so a linear file must not have it.
-    profiles = ("ICCProfile",) if encoding in ("srgb", None) else ()
-    for name in (*KEPT_ATTRIBUTES, *profiles):
-        if name in stored.attributes:
-            kind, value = stored.attributes[name]
+    is_jpeg = format_name == "jpeg"
+    if is_jpeg and spec.nchannels == 3:
+        # Unless the picture came with another: colours as sharp as brightness.
+        spec.attribute("jpeg:subsampling", "4:4:4")
+    for name, (kind, value) in stored.attributes.items():
+        # A profile describes encoded colours, not those of a picture that was written linear.
+        if name == "ICCProfile" and encoding not in ("srgb", None):
+            continue
+        if is_jpeg or not name.startswith("jpeg:"):
             spec.attribute(name, kind, value)

@@ -3,13 +3,14 @@
 Bloom is computed on linear values: images are decoded before, and encoded after it if the file has
 integers.
 
-=========================== ============================= ==========
-number type of the file     read as                       written as
-=========================== ============================= ==========
-integers of 8 or 16 bits    sRGB, unless the file says    sRGB
-                            that it is linear
-half, float                 linear                        linear
-=========================== ============================= ==========
+==================== ========================= =====================================
+numbers in the file  taken as                  written as
+==================== ========================= =====================================
+8 or 16 bit integers what the file says (ICC   sRGB
+                     profile, gamma, cICP),
+                     else sRGB
+half, float          linear                    linear
+==================== ========================= =====================================
 """
 
 from __future__ import annotations
@@ -24,18 +25,23 @@ from numpy.typing import NDArray
 
 __all__ = [
     "DTYPES",
-    "KEPT_ATTRIBUTES",
+    "PIXEL_TYPES",
     "SPACES",
     "Colour",
     "Encoding",
     "Picture",
+    "SavedColour",
     "StoredImage",
     "Window",
     "check_name",
     "failure_of",
+    "is_kept",
 ]
 
-Colour = Literal["linear", "srgb"]
+#: "linear", "srgb" or the name of a colour space of OpenColorIO.
+Colour: TypeAlias = str
+#: What the colours in a file shall be.
+SavedColour = Literal["linear", "srgb"]
 Encoding = Literal["linear", "srgb", "gamma22"]
 #: x, y, width, height in pixels.
 Window: TypeAlias = tuple[int, int, int, int]
@@ -49,6 +55,14 @@ DTYPES: Final[Mapping[str, np.dtype[Any]]] = {
     "double": np.dtype(np.float32),
 }
 
+# OpenImageIO's names of the numbers to write, by the dtype's.
+PIXEL_TYPES: Final[Mapping[str, str]] = {
+    "uint8": "uint8",
+    "uint16": "uint16",
+    "float16": "half",
+    "float32": "float",
+}
+
 # OpenImageIO's names of colour spaces.
 SPACES: Final[Mapping[str, str]] = {
     "linear": "lin_rec709_scene",
@@ -56,8 +70,21 @@ SPACES: Final[Mapping[str, str]] = {
     "gamma22": "g22_rec709_scene",
 }
 
-# Attributes of colours and pixels that are also true of the image with bloom.
-KEPT_ATTRIBUTES: Final = ("chromaticities", "PixelAspectRatio")
+# Attributes that hold for the result as well: what the colours and the pixels are, how large the
+# picture is in print, and who took it where and how.
+_KEPT_ATTRIBUTES: Final = frozenset(
+    (
+        *("chromaticities", "ICCProfile", "PixelAspectRatio"),
+        *("XResolution", "YResolution", "ResolutionUnit", "jpeg:subsampling"),
+        *("Artist", "Copyright", "DateTime", "ImageDescription", "Make", "Model", "Keywords"),
+        *("ExposureTime", "FNumber"),
+    )
+)
+_KEPT_GROUPS: Final = ("Exif:", "GPS:", "IPTC:")
+# Which conversion or turning makes wrong.
+_LOST_ATTRIBUTES: Final = frozenset(
+    ("Exif:ColorSpace", "Exif:PixelXDimension", "Exif:PixelYDimension")
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,9 +111,14 @@ class StoredImage:
     space : str
         OpenImageIO's name of the file's colour space; "" if the file has none.
     attributes : mapping of str to (OpenImageIO.TypeDesc, value)
-        The attributes that `save` keeps.
+        Those of which `is_kept` is true, by OpenImageIO's names.
     parts : tuple of str
-        The names of the file's parts, at most the first 100; "" for a part without a name.
+        The names of the file's parts, of which the pixels are one; "" where it gives none. Of
+        more than 100 the first.
+    profile_name : str
+        What its ICC profile calls itself, "" without one.
+    is_signalled : bool
+        Whether `space` comes from a cICP chunk, which goes before a profile (PNG, third edition).
     """
 
     pixels: NDArray[Any]
@@ -98,6 +130,14 @@ class StoredImage:
     space: str
     attributes: Mapping[str, tuple[Any, Any]]
     parts: tuple[str, ...] = ("",)
+    profile_name: str = ""
+    is_signalled: bool = False
+
+    @property
+    def profile(self) -> bytes | None:
+        """The file's ICC profile."""
+        _, value = self.attributes.get("ICCProfile", (None, None))
+        return None if value is None else np.asarray(value, np.uint8).tobytes()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,7 +157,10 @@ class Picture:
     stored : StoredImage
         The image as stored in the file.
     notes : tuple of str
-        Notes for the user about how the file was read.
+        What the user may want to know about how the file was taken.
+    colour : str
+        What the colours in the file were taken as: "linear", "srgb", the name of another space or
+        of the file's profile; "" of values that were left as they are.
     """
 
     pixels: NDArray[Any]
@@ -126,17 +169,26 @@ class Picture:
     grey: bool
     stored: StoredImage
     notes: tuple[str, ...] = ()
+    colour: str = ""
 
     @classmethod
-    def of_values(cls, pixels: NDArray[Any], numbers: str = "uint8") -> Self:
-        """Make a picture whose values `save` writes without encoding; 1.0 is white.
+    def of_values(
+        cls,
+        pixels: NDArray[Any],
+        numbers: str = "uint8",
+        encoding: Encoding | None = None,
+        attributes: Mapping[str, tuple[Any, Any]] | None = None,
+    ) -> Self:
+        """Make a picture of an array; without an encoding, `save` writes its values as they are.
 
         Parameters
         ----------
         pixels : ndarray, shape (H, W, 3) or (H, W, 4)
-            uint8, float16 or float32.
+            uint8, float16 or float32, 1 being white.
         numbers : str
-            OpenImageIO's name of the number type to write, if the format has it.
+            OpenImageIO's name of the numbers to write where the file's format has them.
+        encoding : {"linear", "srgb", "gamma22"} or None
+        attributes : mapping of str to (OpenImageIO.TypeDesc, value), optional
         """
         height, width, channels = pixels.shape
         stored = StoredImage(
@@ -147,9 +199,9 @@ class Picture:
             display=(0, 0, width, height),
             associated=False,
             space="",
-            attributes={},
+            attributes=attributes or {},
         )
-        return cls(pixels=pixels, encoding=None, numbers=numbers, grey=False, stored=stored)
+        return cls(pixels=pixels, encoding=encoding, numbers=numbers, grey=False, stored=stored)
 
     @property
     def values(self) -> NDArray[Any]:
@@ -166,6 +218,13 @@ def check_name(path: str | os.PathLike[str]) -> None:
         raise ValueError(
             f"path: {name!r} is not UTF-8; rename the image file or its folder"
         ) from None
+
+
+def is_kept(attribute: str) -> bool:
+    """Tell whether an attribute of a file, by OpenImageIO's name, holds for the result as well."""
+    return attribute not in _LOST_ATTRIBUTES and (
+        attribute in _KEPT_ATTRIBUTES or attribute.startswith(_KEPT_GROUPS)
+    )
 
 
 def failure_of(source: Any) -> str:

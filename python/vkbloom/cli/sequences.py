@@ -1,0 +1,101 @@
+"""Which files a command reads and writes: one, a numbered sequence, a glob, a folder or a pipe."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import click
+
+__all__ = ["PIPE", "pairs"]
+
+#: Stands for standard input and standard output.
+PIPE: Final = "-"
+
+_NUMBER: Final = re.compile(r"%(0?)(\d*)d")
+
+
+def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
+    """Return the files to read, each with the file to write.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        Files, printf patterns (``f.%04d.exr``), globs, folders, or "-".
+    target : str
+        A file; of several sources a folder, where names are kept, or a printf pattern, which gets
+        the numbers of the sources' pattern, else 0, 1, 2 and so on.
+
+    Raises
+    ------
+    FileNotFoundError
+        Nothing fits a pattern, a glob or a folder.
+    click.UsageError
+        Several sources go into one file.
+    """
+    found = [pair for source in sources for pair in _expanded(source)]
+    is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
+    is_pattern = _NUMBER.search(os.path.basename(target)) is not None
+    is_single = len(sources) == 1 and found == [(sources[0], None)]
+    if is_folder or (not is_single and not is_pattern and not Path(target).suffix):
+        written = [os.path.join(target, os.path.basename(name)) for name, _ in found]
+    elif is_pattern:
+        numbers = [number for _, number in found]
+        counted = range(len(found)) if None in numbers else numbers
+        written = [os.path.join(os.path.dirname(target), _filled(target, n)) for n in counted]
+    elif len(found) == 1:
+        written = [target]
+    else:
+        raise click.UsageError(
+            f"{len(found)} images cannot go into the one file {target}; name a folder or a "
+            "pattern such as f.%04d.png"
+        )
+    if PIPE in (name for name, _ in found) and written != [target]:
+        raise click.UsageError("standard input goes into one file or standard output")
+    if len(set(written)) < len(written):
+        raise click.UsageError(f"{target}: two images have the same name; name a pattern")
+    return [(name, file) for (name, _), file in zip(found, written, strict=True)]
+
+
+def _expanded(source: str) -> list[tuple[str, int | None]]:
+    """Return the files that a word stands for, with their numbers where it is a pattern."""
+    # A file whose name happens to look like a pattern is that file.
+    if source == PIPE or os.path.isfile(source):
+        return [(source, None)]
+    folder, name = os.path.split(source)
+    found: list[tuple[str, int | None]] = []
+    if os.path.isdir(source):
+        found = [
+            (file.path, None)
+            for file in sorted(os.scandir(source), key=lambda file: file.name)
+            if file.is_file() and not file.name.startswith(".")
+        ]
+    elif (number := _NUMBER.search(name)) is not None:
+        digits = rf"(\d{{{number[2] or 1},}})"
+        form = re.compile(
+            re.escape(name[: number.start()]) + digits + re.escape(name[number.end() :])
+        )
+        numbered = [
+            (int(fits[1]), entry.path)
+            for entry in os.scandir(folder or ".")
+            if (fits := form.fullmatch(entry.name)) is not None
+        ]
+        found = [(os.path.join(folder, os.path.basename(path)), n) for n, path in sorted(numbered)]
+    elif glob.has_magic(source):
+        found = [(path, None) for path in sorted(glob.glob(source)) if os.path.isfile(path)]
+    else:
+        return [(source, None)]
+    if not found:
+        raise FileNotFoundError(f"{source}: no image is there")
+    return found
+
+
+def _filled(pattern: str, number: int | None) -> str:
+    """Return the name of a pattern with its number."""
+    return _NUMBER.sub(
+        lambda form: f"{number:{form[1]}{form[2]}d}", os.path.basename(pattern), count=1
+    )

@@ -1,0 +1,382 @@
+"""Image files as arrays: `vkbloom.read` and `vkbloom.write`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final, Literal, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import import_extra
+from vkbloom.io import image_reading, safe_writing
+from vkbloom.io.image_writing import as_numbers, check_quality, put
+from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture
+from vkbloom.io.srgb import encode_srgb
+
+__all__ = ["read", "write"]
+
+FileEncoding = Literal["none", "linear", "srgb", "gamma22"]
+
+_ENCODINGS: Final = ("none", "linear", "srgb", "gamma22")
+# The numbers of the file, best first, by whether the array is of floats and the bits asked for.
+_FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
+    None: ("half", "float", "uint8"),
+    8: ("uint8",),
+    16: ("uint16", "half"),
+    32: ("float",),
+}
+# Of a file's metadata, what `read` says of the file; the rest are attributes, which can be written.
+_FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")
+
+
+@overload
+def read(
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = ...,
+    subimage: int = ...,
+    premultiplied: bool = ...,
+    metadata: Literal[False] = ...,
+) -> NDArray[Any]: ...
+@overload
+def read(
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = ...,
+    subimage: int = ...,
+    premultiplied: bool = ...,
+    metadata: Literal[True],
+) -> tuple[NDArray[Any], dict[str, Any]]: ...
+def read(
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    subimage: int = 0,
+    premultiplied: bool = False,
+    metadata: bool = False,
+) -> NDArray[Any] | tuple[NDArray[Any], dict[str, Any]]:
+    """Read an image file as linear light, ready for `Renderer.apply`.
+
+    Parameters
+    ----------
+    path : str or path-like
+        Of any format that OpenImageIO reads: PNG, JPEG, OpenEXR, Radiance HDR, TIFF and others.
+    layer : str, optional
+        The layer of an OpenEXR file, such as ``"ViewLayer.Combined"``: the channels ``layer.R``,
+        ``layer.G`` and so on. A file with one layer needs none.
+    subimage : int, default 0
+        Which part of a file that has several, from 0 on.
+    premultiplied : bool, default False
+        Whether the colours shall be multiplied by alpha. Files have them either way; by default
+        they are divided where the file has them multiplied. Where alpha is 0 they stay as they
+        are: for flames and glows of an OpenEXR file, read it with ``premultiplied=True``.
+    metadata : bool, default False
+        Give what the file says as well.
+
+    Returns
+    -------
+    array : ndarray, shape (H, W, 3) or (H, W, 4)
+        Top row first and upright; grey has three equal colours. Files of 8 and 16 bit integers
+        become float32 of linear Rec. 709 colours: decoded by what the file says (a cICP chunk, an
+        ICC profile, a gamma), else from sRGB, and not clipped, so that colours outside of Rec. 709
+        have negative components. Half becomes float16 and float float32, the values as they are.
+    metadata : dict
+        If asked for. The file's attributes by OpenImageIO's names ("chromaticities",
+        "XResolution", "Exif:LensModel", ...), which `write` takes, and "numbers" (of the file,
+        such as "uint8"), "colour" (what the colours were taken as), "alpha" ("straight",
+        "premultiplied", or None without alpha), "parts" (their names) and "notes" (what was
+        assumed).
+
+    Raises
+    ------
+    OSError
+        The file is not there, or cannot be opened; it names the file.
+    ValueError
+        The file is damaged or no image, has no such part or layer, or has several layers and
+        none is named (the message lists them); it names the file.
+    ModuleNotFoundError
+        OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+    See Also
+    --------
+    write : The way back.
+    Renderer.apply : Takes what this gives.
+
+    Notes
+    -----
+    Profiles and colour spaces are converted by OpenColorIO's built-in configuration, as
+    OpenImageIO carries it. A profile that is not of a matrix and curves (of CMYK, of grey, of
+    tables) is not used: colours are taken as sRGB, which "notes" say.
+
+    Examples
+    --------
+    >>> photo = vkbloom.read("photo.jpg")                                   # doctest: +SKIP
+    >>> with vkbloom.Renderer() as renderer:                                # doctest: +SKIP
+    ...     final = renderer.apply(photo, vkbloom.presets["bevy_natural"])["final"]
+    >>> vkbloom.write("bloom.jpg", final, quality=95)                       # doctest: +SKIP
+    """
+    stored = image_reading.load(path, subimage, layer)
+    try:
+        picture = image_reading.decode(stored)
+    except ValueError as error:
+        raise ValueError(f"{os.fspath(path)}: {error}") from error
+    pixels = picture.pixels
+    has_alpha = pixels.shape[2] == 4
+    if has_alpha and stored.associated is not premultiplied:
+        pixels = _multiplied(pixels) if premultiplied else _divided(pixels)
+    if not metadata:
+        return pixels
+    facts: dict[str, Any] = {
+        name: _plain(value) for name, (_, value) in picture.stored.attributes.items()
+    }
+    facts.update(
+        numbers=picture.numbers,
+        colour=picture.colour,
+        alpha=("premultiplied" if premultiplied else "straight") if has_alpha else None,
+        parts=stored.parts,
+        notes=picture.notes,
+    )
+    return pixels, facts
+
+
+def write(
+    path: str | os.PathLike[str],
+    array: NDArray[Any],
+    *,
+    encoding: FileEncoding | None = None,
+    bits: int | None = None,
+    quality: int | None = None,
+    premultiplied: bool = False,
+    metadata: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write an array to an image file.
+
+    Parameters
+    ----------
+    path : str or path-like
+        With an extension that OpenImageIO writes. What is there is replaced, when the whole file
+        is written under another name.
+    array : ndarray, shape (H, W), (H, W, 1), (H, W, 2), (H, W, 3) or (H, W, 4)
+        Grey, grey with alpha, RGB or RGBA. uint8 and uint16 are written as they are. Floats are
+        linear light: encoded and clipped to 0..1 where the file holds integers (PNG, JPEG, ...),
+        as they are where it holds floats (OpenEXR, Radiance HDR, TIFF).
+    encoding : {"srgb", "gamma22", "linear", "none"}, optional
+        The curve of the file's colours, for floats: by default "srgb" for files of integers and
+        "linear" for files of floats. "none": the values are encoded already, such as a `final`
+        that was made with an `encoding`.
+    bits : {8, 16, 32}, optional
+        Of one number in the file, for floats: by default 8 in files of integers and the array's
+        own in files of floats.
+    quality : int, optional
+        Of JPEG, WebP and JPEG XL, 1 to 100. Their colours are not subsampled, unless the metadata
+        say so.
+    premultiplied : bool, default False
+        Whether the array's colours are multiplied by alpha. OpenEXR holds such, other formats
+        straight ones; colours are multiplied or divided where they differ.
+    metadata : mapping of str to object, optional
+        What `read` gave, or attributes by OpenImageIO's names: text, numbers, sequences of them.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    TypeError
+        The array is not of uint8, uint16 or floats.
+    ValueError
+        The array's shape, or an argument, is not one of the above; the format cannot hold the
+        array: JPEG and Radiance HDR have no alpha, and OpenEXR has no integers.
+    OSError
+        The file cannot be written; it names the file, and no half file is left.
+    ModuleNotFoundError
+        OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+    See Also
+    --------
+    read : The way back.
+    Frames.save : Every framebuffer, with settings and timings.
+
+    Examples
+    --------
+    >>> vkbloom.write("ramp.png", np.linspace(0, 1, 256 * 64 * 3, dtype=np.float32)
+    ...               .reshape(64, 256, 3), bits=16)                        # doctest: +SKIP
+    """
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    target = Path(path)
+    values = _checked(array)
+    is_float = values.dtype.kind == "f"
+    if encoding is not None and (encoding not in _ENCODINGS or not is_float):
+        raise ValueError(
+            f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
+            if is_float
+            else f"encoding: {encoding!r} is for floats; {values.dtype} is written as it is"
+        )
+    if bits is not None and (bits not in _FLOATS or not is_float):
+        own = 8 * values.dtype.itemsize
+        if bits != own or is_float:
+            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
+    safe_writing.check_extension(oiio, target.suffix)
+    check_quality(target, quality)
+    temporary = safe_writing.reserve(target, values.nbytes)
+    try:
+        numbers = _numbers(oiio, values, bits, temporary, target)
+        is_integer = numbers.startswith("uint")
+        if values.shape[2] in (2, 4) and premultiplied is not _is_exr(target):
+            values = _divided(values) if premultiplied else _multiplied(values)
+        curve = encoding or ("srgb" if is_integer else "linear")
+        if is_float:
+            values = _encoded(values, curve)
+        said: Encoding | None = None if curve == "none" or not is_float else curve
+        put(
+            oiio,
+            as_numbers(values, numbers),
+            Picture.of_values(values, numbers, said, _typed(oiio, metadata or {})),
+            temporary,
+            target,
+            attributes={} if quality is None else {"CompressionQuality": quality},
+        )
+        safe_writing.check_complete(oiio, temporary, target)
+        safe_writing.put_in_place(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return target
+
+
+def _checked(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array of (H, W, C) and a dtype that files hold."""
+    values = np.asarray(array)
+    if values.dtype == np.float64:
+        values = values.astype(np.float32)
+    if values.dtype.name not in PIXEL_TYPES:
+        raise TypeError(
+            f"array: dtype {values.dtype} is not one of uint8, uint16, float16, float32, float64"
+        )
+    values = values.astype(values.dtype.newbyteorder("="), copy=False)
+    if values.ndim == 2:
+        values = values[:, :, None]
+    if values.ndim != 3 or not 1 <= values.shape[2] <= 4 or 0 in values.shape:
+        raise ValueError(
+            f"array: shape {np.shape(array)} is not (H, W) or (H, W, C) with 1 to 4 channels"
+        )
+    return values
+
+
+def _numbers(
+    oiio: ModuleType, values: NDArray[Any], bits: int | None, temporary: Path, target: Path
+) -> str:
+    """Return OpenImageIO's name of the numbers to write.
+
+    Raises
+    ------
+    ValueError
+        The format cannot hold them; the message says what it can.
+    """
+    own = PIXEL_TYPES[values.dtype.name]
+    wanted: Sequence[str] = [own]
+    if values.dtype.kind == "f":
+        wanted = [*dict.fromkeys((own, *_FLOATS[None]))] if bits is None else _FLOATS[bits]
+    channels = values.shape[2]
+    writer = oiio.ImageOutput.create(str(temporary))
+    kind = writer.format_name()
+    if channels in (2, 4) and not writer.supports("alpha"):
+        raise ValueError(f"{target}: {kind} has no alpha; write array[..., :{channels - 1}]")
+    for numbers in wanted:
+        if safe_writing.holds(oiio, temporary, channels, numbers):
+            return numbers
+    if values.dtype.kind == "u" and safe_writing.holds(oiio, temporary, channels, "float"):
+        raise ValueError(
+            f"{target}: {kind} holds floats, not {values.dtype}; write linear floats, as "
+            "vkbloom.read gives them"
+        )
+    if channels < 3:
+        raise ValueError(
+            f"{target}: {kind} cannot hold {channels} channels of {' or '.join(wanted)}; write "
+            "np.repeat(array[..., :1], 3, axis=2)"
+        )
+    raise ValueError(f"{target}: {kind} cannot hold {' or '.join(wanted)}; try another bits=")
+
+
+def _encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
+    """Return floats with their colours on a curve; alpha has none."""
+    if curve in ("none", "linear"):
+        return values
+    encoded = values.astype(np.float32)
+    colours = encoded[:, :, : values.shape[2] - (values.shape[2] in (2, 4))]
+    if curve == "srgb":
+        colours[:] = encode_srgb(colours)
+    else:
+        colours[:] = np.maximum(colours, 0) ** np.float32(1 / 2.2)
+    return encoded
+
+
+def _multiplied(values: NDArray[Any]) -> NDArray[Any]:
+    """Return colours multiplied by alpha, in the same dtype."""
+    return _with_alpha(values, values[:, :, -1:])
+
+
+def _divided(values: NDArray[Any]) -> NDArray[Any]:
+    """Return colours divided by alpha, in the same dtype; as they are where that is 0."""
+    alpha = values[:, :, -1:].astype(np.float32)
+    one = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
+    return _with_alpha(values, np.where(alpha == 0, one, one * one / np.where(alpha, alpha, one)))
+
+
+def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
+    """Return values whose colours are multiplied by a factor; of integers, by factor / largest."""
+    made = values.astype(np.float32)
+    made[:, :, :-1] *= factor
+    if values.dtype.kind == "u":
+        largest = np.iinfo(values.dtype).max
+        made[:, :, :-1] = np.rint(np.minimum(made[:, :, :-1] / largest, largest))
+    with np.errstate(over="ignore"):
+        return made.astype(values.dtype)
+
+
+def _is_exr(target: Path) -> bool:
+    return target.suffix.lower() == ".exr"
+
+
+def _plain(value: Any) -> Any:
+    """Return an attribute's value as a str, a number, bytes or a tuple of numbers."""
+    if isinstance(value, np.ndarray):
+        return value.tobytes() if value.dtype == np.uint8 else tuple(value.tolist())
+    return value
+
+
+def _typed(oiio: ModuleType, metadata: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Return attributes with OpenImageIO's types.
+
+    Raises
+    ------
+    TypeError
+        A value is neither text nor numbers.
+    """
+    typed: dict[str, tuple[Any, Any]] = {}
+    for name, value in metadata.items():
+        if name in _FACTS:
+            continue
+        match value:
+            case str():
+                typed[name] = oiio.TypeDesc("string"), value
+            case bytes():
+                array = np.frombuffer(value, np.uint8)
+                typed[name] = oiio.TypeDesc(f"uint8[{len(array)}]"), array
+            case int() | np.integer():
+                typed[name] = oiio.TypeDesc("int"), int(value)
+            case float() | np.floating():
+                typed[name] = oiio.TypeDesc("float"), float(value)
+            case tuple() | list() | np.ndarray():
+                numbers = np.asarray(value)
+                if numbers.ndim != 1 or numbers.dtype.kind not in "iuf" or not numbers.size:
+                    raise TypeError(f"metadata: {name!r} is {value!r}, neither text nor numbers")
+                kind = "float" if numbers.dtype.kind == "f" else "int"
+                typed[name] = oiio.TypeDesc(f"{kind}[{numbers.size}]"), tuple(numbers.tolist())
+            case _:
+                raise TypeError(f"metadata: {name!r} is {value!r}, neither text nor numbers")
+    return typed

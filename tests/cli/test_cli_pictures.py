@@ -1,0 +1,156 @@
+"""``vkbloom apply`` with the files that people have: sequences, pipes, layers, quality, notes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import vkbloom
+from tests.io.profiles import DISPLAY_P3, profile, profile_chunk, store_png
+from tests.io.test_array_files import halves, store_exr
+from vkbloom.cli.program import program
+
+pytest.importorskip("OpenImageIO")
+
+IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(program, ["apply", *map(str, words), "--adapter", "software"])
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.fixture
+def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with frames 8 to 11, all different."""
+    monkeypatch.chdir(tmp_path)
+    for number in range(8, 12):
+        store_png(tmp_path / f"f.{number:04d}.png", IMAGE + np.uint8(number))
+    return tmp_path
+
+
+class TestSequences:
+    @pytest.mark.parametrize(
+        ("words", "written"),
+        [
+            (["f.%04d.png", "g.%04d.png"], [f"g.{n:04d}.png" for n in range(8, 12)]),
+            (["f.*.png", "g.%02d.jpg"], [f"g.{n:02d}.jpg" for n in range(4)]),
+            (["f.%04d.png", "-o", "out"], [f"out/f.{n:04d}.png" for n in range(8, 12)]),
+            ([".", "out/"], [f"out/f.{n:04d}.png" for n in range(8, 12)]),
+            (["f.0008.png", "f.0010.png", "out"], ["out/f.0008.png", "out/f.0010.png"]),
+        ],
+    )
+    def test_names(self, frames: Path, words: list[str], written: list[str]) -> None:
+        result = run(*words)
+        assert result.exit_code == 0, result.stderr
+        found = [str(path.relative_to(frames)) for path in frames.rglob("*") if path.is_file()]
+        assert sorted(found) == sorted([*written, *(f"f.{n:04d}.png" for n in range(8, 12))])
+
+    def test_each_is_as_if_alone(self, frames: Path) -> None:
+        assert run("f.%04d.png", "g.%04d.png").exit_code == 0
+        assert run("f.0010.png", "-o", "alone.png").exit_code == 0
+        assert (frames / "g.0010.png").read_bytes() == (frames / "alone.png").read_bytes()
+
+    @pytest.mark.parametrize(
+        ("words", "status", "message"),
+        [
+            (["f.*.png", "g.png"], 2, "4 images cannot go into the one file g.png"),
+            (["x.%d.png", "g.%d.png"], 1, "x.%d.png: no image is there"),
+            (["f.0008.png", "./f.0008.png", "out"], 2, "two images have the same name"),
+        ],
+    )
+    def test_errors(self, frames: Path, words: list[str], status: int, message: str) -> None:
+        before = names(frames)
+        result = run(*words)
+        assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
+        assert message in result.stderr
+        assert names(frames) == before
+
+
+def test_pipes(tmp_path: Path) -> None:
+    path = store_png(tmp_path / "a.png", IMAGE)
+    for kind in ("png", "exr"):
+        done = subprocess.run(
+            [sys.executable, "-m", "vkbloom.cli", "apply", "-", "-", "--pipe-format", kind],
+            input=path.read_bytes(),
+            capture_output=True,
+            check=True,
+        )
+        (tmp_path / f"piped.{kind}").write_bytes(done.stdout)
+        assert run(path, tmp_path / f"b.{kind}").exit_code == 0
+        piped = vkbloom.read(tmp_path / f"piped.{kind}")
+        assert np.array_equal(piped, vkbloom.read(tmp_path / f"b.{kind}"))
+
+
+def test_layers(tmp_path: Path) -> None:
+    layers = [halves("ViewLayer.Combined", "RGB"), halves("ViewLayer.Emit", "RGB")]
+    path = store_exr(tmp_path / "a.exr", **layers[0], **layers[1])
+    result = run(path, tmp_path / "b.exr")
+    assert result.exit_code == 1
+    assert "the layers are ViewLayer.Combined, ViewLayer.Emit" in result.stderr
+    words = (path, tmp_path / "b.exr", "--layer", "ViewLayer.Emit", "--no-bloom")
+    assert run(*words).exit_code == 0
+    assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), np.stack([*layers[1].values()], -1))
+
+
+def test_quality(tmp_path: Path) -> None:
+    path = store_png(tmp_path / "a.png", IMAGE)
+    for quality in (20, 95):
+        assert run(path, tmp_path / f"{quality}.jpg", "--quality", quality).exit_code == 0
+    assert (tmp_path / "95.jpg").stat().st_size > (tmp_path / "20.jpg").stat().st_size
+    result = run(path, tmp_path / "b.png", "--quality", 90)
+    assert (result.exit_code, "quality: png has none" in result.stderr) == (2, True)
+
+
+def test_profiles_are_noted(tmp_path: Path) -> None:
+    chunk = profile_chunk(profile("Display P3", DISPLAY_P3))
+    result = run(store_png(tmp_path / "a.png", IMAGE, chunk), tmp_path / "b.png")
+    assert result.exit_code == 0
+    assert "note: " in result.stderr
+    assert "converted to linear Rec. 709 by its ICC profile 'Display P3'" in result.stderr
+
+
+def test_input_colour_is_a_space(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(0).random((4, 5, 3), dtype=np.float32)
+    path = vkbloom.write(tmp_path / "a.exr", pixels)
+    words = ("--input-colour", "ACEScg", "--no-bloom")
+    assert run(path, tmp_path / "b.exr", *words).exit_code == 0
+    made = vkbloom.read(tmp_path / "b.exr")
+    # White stays white, and red goes outside of Rec. 709 (ACEScg's primaries, S-2014-004).
+    assert np.allclose(made.sum() / pixels.sum(), 1, atol=0.1)
+    assert not np.allclose(made, pixels, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--method", "pyramid", "--threshold", "1"], "nothing lies above the threshold 1; "),
+        (["--blur-strength", "0", "--method", "separable"], None),
+        (["--no-bloom"], None),
+        ([], None),
+    ],
+)
+def test_no_bloom_is_noted(tmp_path: Path, words: list[str], said: str | None) -> None:
+    path = store_png(tmp_path / "a.png", IMAGE)
+    result = run(path, tmp_path / "b.png", *words)
+    assert result.exit_code == 0
+    if said is None:
+        assert result.stderr == ""
+    else:
+        brightest = float(vkbloom.read(path).max())
+        assert f"{said}the brightest value is {brightest:.3g}" in result.stderr
+
+
+def test_options_that_the_method_lacks(tmp_path: Path) -> None:
+    path = store_png(tmp_path / "a.png", IMAGE)
+    result = run(path, tmp_path / "b.png", "--blur-strength", 2)
+    assert result.exit_code == 2
+    assert "the method bevy has no --blur-strength; give --method separable" in result.stderr

@@ -1,0 +1,392 @@
+"""`vkbloom.read` and `vkbloom.write`."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.io.profiles import (
+    DISPLAY_P3,
+    REC_709,
+    gamma_chunk,
+    grey_profile,
+    png_chunk,
+    profile,
+    profile_chunk,
+    store_png,
+    to_xyz,
+)
+from vkbloom.io.srgb import decode_srgb, encode_srgb
+
+oiio = pytest.importorskip("OpenImageIO")
+
+RNG = np.random.default_rng(5)
+# OpenColorIO's own accuracy, of values of 0..1.
+CLOSE: dict[str, Any] = {"rtol": 1e-3, "atol": 2e-4}
+
+
+def levels(*shape: int, dtype: str = "uint8") -> NDArray[Any]:
+    return RNG.integers(0, np.iinfo(dtype).max + 1, shape, dtype=dtype)
+
+
+def store_exr(path: Path, **channels: NDArray[Any]) -> Path:
+    """Write channels by name, "__" standing for a dot; a float channel makes only itself float."""
+    first = next(iter(channels.values()))
+    halves_only = all(part.dtype == np.float16 for part in channels.values())
+    numbers = "half" if halves_only else "float"
+    spec = oiio.ImageSpec(first.shape[1], first.shape[0], len(channels), numbers)
+    spec.channelnames = tuple(name.replace("__", ".") for name in channels)
+    spec.channelformats = tuple(
+        oiio.TypeDesc("half" if part.dtype == np.float16 else "float") for part in channels.values()
+    )
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer.open(str(path), spec), writer.geterror()
+    assert writer.write_image(np.stack([*channels.values()], -1).astype(np.float32))
+    assert writer.close()
+    return path
+
+
+def halves(layer: str, names: str = "RGBA", size: tuple[int, int] = (3, 5)) -> dict[str, Any]:
+    return {f"{layer}__{name}": RNG.random(size).astype(np.float16) for name in names}
+
+
+class TestRead:
+    @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+    @pytest.mark.parametrize("channels", [1, 2, 3, 4])
+    def test_png(self, tmp_path: Path, dtype: str, channels: int) -> None:
+        pixels = levels(5, 7, channels, dtype=dtype)
+        made = vkbloom.read(store_png(tmp_path / "a.png", pixels))
+        plain = pixels / np.iinfo(dtype).max
+        assert made.dtype == np.float32
+        assert made.shape == (5, 7, 3 if channels in (1, 3) else 4)
+        colours = plain[:, :, : channels - (channels in (2, 4))]
+        assert np.allclose(made[:, :, :3], decode_srgb(colours), rtol=1e-6, atol=0)
+        if channels in (2, 4):
+            assert np.allclose(made[:, :, 3], plain[:, :, -1], rtol=1e-6, atol=0)
+
+    def test_palette(self, tmp_path: Path) -> None:
+        palette, index = levels(16, 3), RNG.integers(0, 16, (5, 7), dtype=np.uint8)
+        made = vkbloom.read(store_png(tmp_path / "a.png", index, palette=palette))
+        assert np.allclose(made, decode_srgb(palette[index] / 255), rtol=1e-6, atol=0)
+
+    @pytest.mark.parametrize("gamma", [1.0, 1.8, 2.2])
+    def test_gamma(self, tmp_path: Path, gamma: float) -> None:
+        pixels = levels(5, 7, 4)
+        path = store_png(tmp_path / "a.png", pixels, gamma_chunk(gamma))
+        made, facts = vkbloom.read(path, metadata=True)
+        assert np.allclose(made[..., :3], (pixels[..., :3] / 255) ** gamma, **CLOSE)
+        assert np.allclose(made[..., 3], pixels[..., 3] / 255, rtol=1e-6, atol=0)
+        assert bool(facts["notes"]) is (gamma != 1)
+
+    @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+    def test_display_p3(self, tmp_path: Path, dtype: str) -> None:
+        pixels = levels(6, 7, 3, dtype=dtype)
+        # Outside of Rec. 709.
+        pixels[0, 0] = (0, np.iinfo(dtype).max, 0)
+        chunk = profile_chunk(profile("Display P3", DISPLAY_P3))
+        made, facts = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunk), metadata=True)
+        matrix = np.linalg.inv(to_xyz(REC_709)) @ to_xyz(DISPLAY_P3)
+        expected = decode_srgb(pixels / np.iinfo(dtype).max) @ matrix.T
+        assert expected.min() < -0.2
+        assert np.allclose(made, expected, **CLOSE)
+        assert facts["colour"] == "Display P3"
+        assert facts["notes"] == ("converted to linear Rec. 709 by its ICC profile 'Display P3'",)
+        assert "ICCProfile" not in facts
+
+    def test_linear_profile(self, tmp_path: Path) -> None:
+        pixels = levels(6, 7, 3)
+        chunk = profile_chunk(profile("Linear", REC_709, 1.0))
+        made = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunk))
+        assert np.allclose(made, pixels / 255, **CLOSE)
+
+    def test_srgb_profile_changes_nothing(self, tmp_path: Path) -> None:
+        cms = pytest.importorskip("PIL.ImageCms")
+        pixels = levels(6, 7, 3)
+        plain = vkbloom.read(store_png(tmp_path / "a.png", pixels))
+        for made in (
+            cms.ImageCmsProfile(cms.createProfile("sRGB")).tobytes(),
+            profile("my screen", REC_709),
+        ):
+            path = store_png(tmp_path / "b.png", pixels, profile_chunk(made))
+            array, facts = vkbloom.read(path, metadata=True)
+            assert np.array_equal(array, plain)
+            assert (facts["colour"], facts["notes"]) == ("srgb", ())
+            assert facts["ICCProfile"] == made
+
+    def test_cicp_goes_before_a_profile(self, tmp_path: Path) -> None:
+        pixels = levels(6, 7, 3)
+        chunks = png_chunk(b"cICP", bytes([12, 13, 0, 1]))
+        by_cicp = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunks))
+        chunk = profile_chunk(profile("Display P3", DISPLAY_P3))
+        by_profile = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunk))
+        assert np.allclose(by_cicp, by_profile, **CLOSE)
+        chunks += profile_chunk(profile("Linear", REC_709, 1.0))
+        both = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunks))
+        assert np.array_equal(both, by_cicp)
+
+    @pytest.mark.parametrize("content", [b"no profile" * 20, grey_profile("Dot Gain", 1.75)])
+    def test_profiles_that_cannot_be_used_are_told(self, tmp_path: Path, content: bytes) -> None:
+        image = pytest.importorskip("PIL.Image")
+        path, pixels = tmp_path / "a.tif", levels(8, 8)
+        image.fromarray(pixels).save(path, icc_profile=content)
+        made, facts = vkbloom.read(path, metadata=True)
+        assert np.allclose(made[..., 0], decode_srgb(pixels / 255), rtol=1e-6, atol=0)
+        assert facts["notes"][0].endswith("is not one of RGB by a matrix and curves; taken as srgb")
+
+    @pytest.mark.parametrize("orientation", range(1, 9))
+    def test_jpeg_is_upright(self, tmp_path: Path, orientation: int) -> None:
+        image = pytest.importorskip("PIL.Image")
+        ops = pytest.importorskip("PIL.ImageOps")
+        pixels = np.kron(levels(2, 3, 3), np.ones((16, 16, 1), np.uint8))
+        picture = image.fromarray(pixels)
+        exif = picture.getexif()
+        exif[274] = orientation
+        path = tmp_path / "a.jpg"
+        picture.save(path, exif=exif, quality=95, subsampling=0)
+        with image.open(path) as opened:
+            expected = np.asarray(ops.exif_transpose(opened))
+        made, facts = vkbloom.read(path, metadata=True)
+        assert np.abs(encode_srgb(made) * 255 - expected).max() < 3
+        assert "Orientation" not in facts
+
+    @pytest.mark.parametrize("dtype", ["float16", "float32"])
+    def test_exr_comes_as_it_is(self, tmp_path: Path, dtype: str) -> None:
+        pixels = (RNG.standard_normal((5, 7, 3)) * 20).astype(dtype)
+        pixels[0, :2, 0] = (np.nan, np.inf)
+        made = vkbloom.read(vkbloom.write(tmp_path / "a.exr", pixels))
+        assert made.dtype == dtype
+        assert np.array_equal(made, pixels, equal_nan=True)
+
+    def test_chromaticities_are_told(self, tmp_path: Path) -> None:
+        pixels = RNG.random((5, 7, 3)).astype(np.float16)
+        rec_2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290)
+        path = vkbloom.write(tmp_path / "a.exr", pixels, metadata={"chromaticities": rec_2020})
+        made, facts = vkbloom.read(path, metadata=True)
+        assert np.array_equal(made, pixels)
+        assert facts["chromaticities"] == pytest.approx(rec_2020)
+        (note,) = facts["notes"]
+        assert "chromaticities (red, green, blue, white: 0.708 0.292, 0.17 0.797" in note
+        again = vkbloom.write(tmp_path / "b.exr", made, metadata=facts)
+        assert vkbloom.read(again, metadata=True)[1] == facts
+
+    @pytest.mark.parametrize("premultiplied", [False, True])
+    @pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.png"])
+    def test_alpha(self, tmp_path: Path, name: str, premultiplied: bool) -> None:
+        straight = RNG.random((5, 7, 4)).astype(np.float32)
+        straight[..., 3] = 0.25 + 0.75 * straight[..., 3]
+        path = vkbloom.write(tmp_path / name, straight, bits=16 if name == "a.png" else 32)
+        made, facts = vkbloom.read(path, premultiplied=premultiplied, metadata=True)
+        expected = straight.copy()
+        if premultiplied:
+            expected[..., :3] *= expected[..., 3:]
+        assert np.allclose(made, expected, rtol=1e-4, atol=1e-4)
+        assert facts["alpha"] == ("premultiplied" if premultiplied else "straight")
+        # And what the file holds: of OpenEXR multiplied, of others straight.
+        raw = oiio.ImageSpec()
+        raw.attribute("oiio:UnassociatedAlpha", 1)
+        reader = oiio.ImageInput.open(str(path), raw)
+        stored = reader.read_image(0, 0, 0, 4, "float")
+        reader.close()
+        if name == "a.exr":
+            assert np.allclose(stored[..., :3], straight[..., :3] * straight[..., 3:], atol=1e-6)
+        elif name == "a.tif":
+            assert np.allclose(stored, straight, atol=1e-6)
+
+    def test_no_alpha_is_divided_by_0(self, tmp_path: Path) -> None:
+        glow = np.full((2, 2, 4), (3.0, 2.0, 1.0, 0.0), np.float16)
+        path = vkbloom.write(tmp_path / "a.exr", glow, premultiplied=True)
+        assert np.array_equal(vkbloom.read(path), glow)
+        assert np.array_equal(vkbloom.read(path, premultiplied=True), glow)
+
+    def test_a_sole_layer_is_read(self, tmp_path: Path) -> None:
+        layer = halves("ViewLayer.Combined", "RGB")
+        made = vkbloom.read(store_exr(tmp_path / "a.exr", **layer))
+        assert made.dtype == np.float16
+        assert np.array_equal(made, np.stack([*layer.values()], -1))
+
+    def test_layers_of_blender(self, tmp_path: Path) -> None:
+        layers = {
+            "ViewLayer.Combined": halves("ViewLayer.Combined"),
+            "ViewLayer.Emit": halves("ViewLayer.Emit", "RGB"),
+            "ViewLayer.Depth": {"ViewLayer.Depth__Z": RNG.random((3, 5)).astype(np.float32)},
+        }
+        channels = {name: part for layer in layers.values() for name, part in layer.items()}
+        path = store_exr(tmp_path / "a.exr", **channels)
+        with pytest.raises(ValueError, match=r"a\.exr: the layers are .*ViewLayer\.") as caught:
+            vkbloom.read(path)
+        assert all(name in str(caught.value) for name in layers)
+        for name, layer in layers.items():
+            made = vkbloom.read(path, layer=name, premultiplied=True)
+            expected = np.stack([*layer.values()], -1)
+            assert made.dtype == expected.dtype
+            assert np.array_equal(made[..., : expected.shape[2]], expected)
+        for wrong in ("Combined", ""):
+            with pytest.raises(ValueError, match=rf"no layer '{wrong}'; its layers are View"):
+                vkbloom.read(path, layer=wrong)
+
+    def test_layers_in_parts(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        parts = [RNG.random((2, 3, 3)).astype(np.float16) for _ in range(2)]
+        specs = [oiio.ImageSpec(3, 2, 3, "half") for _ in parts]
+        for spec, name in zip(specs, ("one", "two"), strict=True):
+            spec.attribute("oiio:subimagename", name)
+        writer = oiio.ImageOutput.create(str(path))
+        assert writer.open(str(path), specs)
+        for index, part in enumerate(parts):
+            assert not index or writer.open(str(path), specs[index], "AppendSubimage")
+            assert writer.write_image(part)
+        assert writer.close()
+        assert np.array_equal(vkbloom.read(path, subimage=1), parts[1])
+        assert np.array_equal(vkbloom.read(path, layer="two"), parts[1])
+        with pytest.raises(ValueError, match="no layer 'one'; its layers are two"):
+            vkbloom.read(path, layer="one", subimage=1)
+        assert vkbloom.read(path, metadata=True)[1]["parts"] == ("one", "two")
+
+    def test_luminance_chroma_is_refused(self, tmp_path: Path) -> None:
+        channels = {name: RNG.random((4, 4)).astype(np.float16) for name in ("Y", "RY", "BY")}
+        path = store_exr(tmp_path / "a.exr", **channels)
+        with pytest.raises(ValueError, match=r"a\.exr: the channels are Y, BY, RY; R, G, B or"):
+            vkbloom.read(path)
+
+    def test_damage_names_the_file(self, tmp_path: Path) -> None:
+        whole = store_png(tmp_path / "a.png", levels(40, 50, 3)).read_bytes()
+        for name, content in (
+            ("empty.png", b""),
+            ("cut.png", whole[:300]),
+            ("words.exr", b"hello"),
+            ("size.png", whole[:16] + struct.pack(">II", 2**30, 2**30) + whole[24:]),
+        ):
+            (tmp_path / name).write_bytes(content)
+            with pytest.raises((OSError, ValueError), match=name):
+                vkbloom.read(tmp_path / name)
+        with pytest.raises(FileNotFoundError):
+            vkbloom.read(tmp_path / "no.png")
+
+
+class TestWrite:
+    @pytest.mark.parametrize(("bits", "dtype"), [(None, "uint8"), (8, "uint8"), (16, "uint16")])
+    def test_floats_become_srgb(self, tmp_path: Path, bits: int | None, dtype: str) -> None:
+        pixels = np.array([[[0.5, -1, 2, 0.5]]], np.float32).repeat(2, 0)
+        path = vkbloom.write(tmp_path / "b.png", pixels, bits=bits)
+        assert path == tmp_path / "b.png"
+        stored = oiio.ImageBuf(str(path)).spec()
+        assert str(stored.format) == dtype
+        made = vkbloom.read(path)
+        assert np.allclose(made[0, 0], [0.5, 0, 1, 0.5], atol=1 / 255)
+        assert np.allclose(made[0, 0, 0], decode_srgb(np.rint(np.array(0.735357 * 255)) / 255)) is (
+            dtype == "uint8"
+        )
+
+    @pytest.mark.parametrize(
+        ("encoding", "level"), [("srgb", 188), ("gamma22", 186), ("linear", 128), ("none", 128)]
+    )
+    def test_encodings(self, tmp_path: Path, encoding: Any, level: int) -> None:
+        pixels = np.full((2, 3, 3), 0.5)
+        path = vkbloom.write(tmp_path / "b.png", pixels, encoding=encoding)
+        assert (oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8) == level).all()
+        if encoding != "none":
+            assert np.allclose(vkbloom.read(path), 0.5, atol=2 / 255)
+
+    @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+    @pytest.mark.parametrize("channels", [0, 1, 2, 3, 4])
+    def test_integers_stay(self, tmp_path: Path, dtype: str, channels: int) -> None:
+        pixels = levels(*((5, 7, channels) if channels else (5, 7)), dtype=dtype)
+        for name in ("b.png", "b.tif"):
+            buffer = oiio.ImageBuf()
+            plain = oiio.ImageSpec()
+            plain.attribute("oiio:UnassociatedAlpha", 1)
+            path = str(vkbloom.write(tmp_path / name, pixels))
+            buffer = oiio.ImageBuf(path, 0, 0, plain)
+            made = buffer.get_pixels(oiio.UINT8 if dtype == "uint8" else oiio.UINT16)
+            assert np.array_equal(made.reshape(pixels.shape), pixels)
+
+    def test_bits_of_floats(self, tmp_path: Path) -> None:
+        pixels = RNG.random((5, 7, 3), dtype=np.float32)
+        for bits, dtype in ((None, np.float32), (16, np.float16), (32, np.float32)):
+            made = vkbloom.read(vkbloom.write(tmp_path / "b.exr", pixels, bits=bits))
+            assert made.dtype == dtype
+            assert np.array_equal(made, pixels.astype(dtype))
+        half = vkbloom.write(tmp_path / "b.exr", pixels.astype(np.float16))
+        assert vkbloom.read(half).dtype == np.float16
+
+    def test_quality(self, tmp_path: Path) -> None:
+        pixels = RNG.random((64, 64, 3), dtype=np.float32)
+        sizes = [
+            vkbloom.write(tmp_path / "b.jpg", pixels, quality=quality).stat().st_size
+            for quality in (10, 50, 100)
+        ]
+        assert sizes == sorted(sizes)
+        assert sizes[2] > 4 * sizes[0]
+        spec = oiio.ImageBuf(str(tmp_path / "b.jpg")).spec()
+        assert spec["jpeg:subsampling"] == "4:4:4"
+        with pytest.raises(ValueError, match="quality: png has none; jpeg, webp, jpegxl have"):
+            vkbloom.write(tmp_path / "b.png", pixels, quality=90)
+        with pytest.raises(ValueError, match="quality: 0 is outside 1 to 100"):
+            vkbloom.write(tmp_path / "b.jpg", pixels, quality=0)
+
+    def test_exif_is_kept(self, tmp_path: Path) -> None:
+        image = pytest.importorskip("PIL.Image")
+        rational = pytest.importorskip("PIL.TiffImagePlugin").IFDRational
+        picture = image.fromarray(levels(32, 48, 3))
+        exif = picture.getexif()
+        exif[271], exif[274] = "Maker", 6
+        exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
+        exif.get_ifd(0x8769)[33434] = rational(1, 2)
+        path = tmp_path / "a.jpg"
+        picture.save(path, exif=exif, dpi=(300, 300))
+        array, facts = vkbloom.read(path, metadata=True)
+        vkbloom.write(tmp_path / "b.jpg", array, metadata=facts)
+        with image.open(tmp_path / "b.jpg") as written:
+            assert written.size == (32, 48)
+            assert written.info["dpi"] == (300, 300)
+            found = written.getexif()
+            assert found[271] == "Maker"
+            assert found.get(274, 1) == 1
+            inner = found.get_ifd(0x8769)
+            assert inner[0x9003] == "2020:01:02 03:04:05"
+            assert float(inner[33434]) == 0.5
+
+    def test_what_formats_refuse(self, tmp_path: Path) -> None:
+        rgba = RNG.random((4, 5, 4), dtype=np.float32)
+        for name in ("b.jpg", "b.hdr"):
+            with pytest.raises(ValueError, match=r"no alpha; write array\[\.\.\., :3\]"):
+                vkbloom.write(tmp_path / name, rgba)
+        for dtype in ("uint8", "uint16"):
+            with pytest.raises(ValueError, match=f"openexr holds floats, not {dtype}; write lin"):
+                vkbloom.write(tmp_path / "b.exr", levels(4, 5, 3, dtype=dtype))
+        with pytest.raises(ValueError, match="jpeg cannot hold uint16"):
+            vkbloom.write(tmp_path / "b.jpg", levels(4, 5, 3, dtype="uint16"))
+        with pytest.raises(ValueError, match="no image format for the extension"):
+            vkbloom.write(tmp_path / "b.unknown", rgba)
+        assert [*tmp_path.iterdir()] == []
+
+    def test_wrong_arguments(self, tmp_path: Path) -> None:
+        path, rgb = tmp_path / "b.png", RNG.random((4, 5, 3), dtype=np.float32)
+        for error, match, array, arguments in (
+            (ValueError, r"array: shape \(4,\)", rgb[:, 0, 0], {}),
+            (ValueError, r"array: shape \(3, 4, 5\)", rgb.transpose(2, 0, 1), {}),
+            (TypeError, "dtype int64", levels(4, 5, 3).astype(np.int64), {}),
+            (ValueError, "encoding: 'sRGB' is not one of", rgb, {"encoding": "sRGB"}),
+            (ValueError, "encoding: 'srgb' is for floats", levels(4, 5, 3), {"encoding": "srgb"}),
+            (ValueError, "bits: 12 is not one of 8, 16, 32", rgb, {"bits": 12}),
+            (ValueError, "bits: 16 is not one of 8", levels(4, 5, 3), {"bits": 16}),
+            (ValueError, "cannot hold float; try another bits", rgb, {"bits": 32}),
+            (TypeError, "metadata: 'Make' is", rgb, {"metadata": {"Make": object()}}),
+        ):
+            with pytest.raises(error, match=match):
+                vkbloom.write(path, array, **arguments)
+        assert [*tmp_path.iterdir()] == []
+
+
+def test_a_photo_through_the_renderer(tmp_path: Path) -> None:
+    store_png(tmp_path / "a.png", levels(21, 33, 3))
+    with vkbloom.Renderer("software") as renderer:
+        final = renderer.apply(vkbloom.read(tmp_path / "a.png"), vkbloom.BevyBloom())["final"]
+    made = vkbloom.read(vkbloom.write(tmp_path / "b.png", final))
+    assert np.abs(encode_srgb(made) - encode_srgb(np.clip(final, 0, 1))).max() <= 0.502 / 255

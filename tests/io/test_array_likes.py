@@ -1,0 +1,117 @@
+"""What else than an ndarray can be given bloom, and what is said of what cannot."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom.checks import check_image
+
+IMAGE = np.random.default_rng(2).random((5, 7, 3), dtype=np.float32)
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[vkbloom.Renderer]:
+    with vkbloom.Renderer("software") as made:
+        yield made
+
+
+class Viewed:
+    """An object that NumPy sees as an array."""
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return IMAGE
+
+
+class Packed:
+    """An object of another array library, of which only DLPack is known."""
+
+    def __dlpack__(self, **options: Any) -> Any:
+        return IMAGE.__dlpack__(**options)
+
+    def __dlpack_device__(self) -> tuple[Any, Any]:
+        return IMAGE.__dlpack_device__()
+
+
+@pytest.mark.parametrize(
+    "like", [Viewed(), Packed(), memoryview(IMAGE.data)], ids=["__array__", "dlpack", "buffer"]
+)
+def test_array_likes(renderer: vkbloom.Renderer, like: Any) -> None:
+    expected = renderer.apply(IMAGE)["final"]
+    assert np.array_equal(renderer.apply(like)["final"], expected)
+
+
+def test_data_arrays_in_any_order(renderer: vkbloom.Renderer) -> None:
+    xr = pytest.importorskip("xarray")
+    expected = renderer.apply(IMAGE)["final"]
+    image: Any = xr.DataArray(IMAGE, dims=("y", "x", "channel"))
+    for dims in (("y", "x", "channel"), ("channel", "y", "x"), ("x", "channel", "y")):
+        assert np.array_equal(renderer.apply(image.transpose(*dims))["final"], expected)
+    with pytest.raises(ValueError, match=r"dimensions \('a', 'b', 'c'\) are not y, x and channel"):
+        renderer.apply(image.rename(y="a", x="b", channel="c"))
+    grid: Any = renderer.grid(image, axes={"intensity": [0.5, 1]}, attachments=("final", "bloom"))
+    again = renderer.apply(grid["final"].isel(intensity=1))
+    assert again["final"].shape == IMAGE.shape
+    bloom = renderer.apply(grid["bloom"].isel(intensity=1))
+    assert bloom["final"].shape == (5, 7, 4)
+    with pytest.raises(ValueError, match=r"image\.isel\(intensity=0\)"):
+        renderer.apply(grid["final"])
+
+
+def test_float64_is_computed_in_float32(renderer: vkbloom.Renderer) -> None:
+    made = renderer.apply(IMAGE.astype(np.float64))["final"]
+    assert made.dtype == np.float32
+    assert np.array_equal(made, renderer.apply(IMAGE)["final"])
+
+
+@pytest.mark.parametrize(
+    ("image", "error", "cure"),
+    [
+        ((IMAGE * 65535).astype(np.uint16), TypeError, "(image / 65535).astype(np.float32)"),
+        (IMAGE[..., 0], ValueError, "np.repeat(image[..., None], 3, axis=2)"),
+        (IMAGE[..., :1], ValueError, "np.repeat(image, 3, axis=2)"),
+        (IMAGE.transpose(2, 0, 1), ValueError, "np.moveaxis(image, 0, -1)"),
+    ],
+    ids=["uint16", "grey", "one channel", "channels first"],
+)
+def test_errors_say_the_cure(image: NDArray[Any], error: type[Exception], cure: str) -> None:
+    with pytest.raises(error) as caught:
+        check_image(image)
+    assert str(caught.value).endswith(cure)
+    cured = eval(cure, {"image": image, "np": np})
+    assert check_image(cured).shape == (5, 7, 3)
+
+
+@pytest.mark.parametrize("image", [None, 3, "a.png", [[1, 2]], b""])
+def test_other_objects(image: Any) -> None:
+    with pytest.raises((TypeError, ValueError), match="image: "):
+        check_image(image)
+
+
+def test_a_scene_is_no_array(renderer: vkbloom.Renderer) -> None:
+    with pytest.raises(TypeError, match=r"^scene: a Scene is needed, not ndarray$"):
+        renderer.render(IMAGE)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_renderers_are_not_copied(renderer: vkbloom.Renderer, duplicate: Any) -> None:
+    with pytest.raises(TypeError, match="a Renderer cannot be copied or pickled"):
+        duplicate(renderer)
+    assert not renderer.closed
+
+
+def test_unknown_presets_suggest_the_nearest() -> None:
+    with pytest.raises(KeyError) as caught:
+        vkbloom.presets["unity"]
+    text = str(caught.value)
+    assert "there is no preset 'unity'; did you mean 'unity_" in text
+    assert all(name in text for name in vkbloom.presets)
+    assert vkbloom.presets.get("unity") is None
+    assert "unity" not in vkbloom.presets
