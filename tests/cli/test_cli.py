@@ -266,7 +266,7 @@ def test_a_method_has_no_field_of_another() -> None:
         settings_from("--radius", "2")
     with pytest.raises(click.UsageError, match="the method pyramid has no --blur-scale, --direct"):
         settings_from("--method", "pyramid", "--blur-scale", "2", "--direct", "--levels", "3")
-    with pytest.raises(click.UsageError, match="the preset tutorial has the method separable"):
+    with pytest.raises(click.UsageError, match="--preset tutorial is of the method separable"):
         settings_from("--method", "pyramid", "--preset", "tutorial")
 
 

@@ -225,7 +225,7 @@ class TestFormats:
         done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", *chosen)
         assert np.array_equal(pixels(tmp_path / "b.exr"), frames["final"])
         result = run(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
-        assert "a.exr: read the first of its parts 0 glow, 1 blur_vertical, " in result.stderr
+        assert "a.exr: the first of its parts 0 glow, 1 blur_vertical, " in result.stderr
         assert np.array_equal(pixels(tmp_path / "b.exr"), frames[names[0]])
 
     def test_in_place(self, tmp_path: Path) -> None:
@@ -352,8 +352,8 @@ class TestErrors:
             ("no.png b.png", 1, "no.png: No such file or directory"),
             (". b.png", 2, "images cannot go into the one file b.png; name a folder or a pattern"),
             ("f.%04d.exr b.png", 1, "f.%04d.exr: no image is there"),
-            ("bad.png b.png", 1, "bad.png: not an image that can be read"),
-            ("bad.exr b.png", 1, "bad.exr: not an image that can be read"),
+            ("bad.png b.png", 1, "bad.png: is not a readable image"),
+            ("bad.exr b.png", 1, "bad.exr: is not a readable image"),
             ("cut.exr b.png", 1, "cut.exr: damaged"),
             ("xyz.exr b.png", 1, "xyz.exr: the channels X, Y, Z are not R, G, B or a single one"),
             ("a.exr none/b.png", 1, "none/b.png: No such file or directory"),

@@ -24,7 +24,7 @@ from vkbloom.cli.image_files import (
     read_picture,
     subimage_option,
 )
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.io import image_writing
@@ -132,7 +132,7 @@ def command(
     if out == PIPE and attachments != "final":
         raise click.UsageError("standard output takes final alone, without --attachments")
     work = pairs(given, out)
-    with blaming_the_call():
+    with as_wrong_use():
         for name in {f"image{Path(target).suffix}" for _, target in work}:
             checked = f"image.{pipe_format}" if out == PIPE else name
             image_writing.check_writable(checked)
@@ -197,7 +197,7 @@ def _applied(
     wanted = ["final", *names] if attachments != "all" else []
     # To know whether it is zero, unless it was turned off.
     looked_at = ["bloom"] if wanted and settings.bloom and "bloom" not in names else []
-    with blaming_the_call():
+    with as_wrong_use():
         frames = renderer.apply(
             picture.pixels, settings, attachments=[*wanted, *looked_at] or "all"
         )

@@ -17,7 +17,7 @@ from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
 from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
-from vkbloom.cli.program import blaming_the_call, given
+from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.explorer.viewer import Viewer

@@ -93,5 +93,5 @@ def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settin
             f"the method {begun.method} has no {names}; "
             + (f"give --method {having}" if having else "no method has all of them")
         )
-    with blaming_the_call():
+    with as_wrong_use():
         return begun.replace(**changes)
