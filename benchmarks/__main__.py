@@ -11,7 +11,7 @@ from rich.console import Console
 from benchmarks import BENCHMARKS, Plan, run, write
 from benchmarks.plan import usable_cores
 from vkbloom.cli.device_options import adapter_option
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 
 
 def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -88,7 +88,7 @@ def command(
     with tempfile.TemporaryFile(dir=target.parent):
         pass
     with Console(stderr=True).status("") as status:
-        with blaming_the_call():
+        with as_wrong_use():
             plan = Plan(
                 adapter=adapter,
                 quick=quick,

@@ -1,7 +1,7 @@
 """vkbloom's pytest plugin: fixtures and options for tests of bloom and other rendered images.
 
-A package of its own, because pytest imports its plugins on every run: nothing of vkbloom, and so
-no NumPy, is imported before a test asks for a fixture.
+It is a separate package because pytest imports its plugins on every run: vkbloom and NumPy are
+imported only when a test requests a fixture.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ __all__ = ["bloom_renderer", "frame_regression"]
 
 _RECORDS = pytest.StashKey[list["Record"]]()
 _RUN = pytest.StashKey["_Run"]()
-# Attributes in which the report of a test carries its checks, and what is known of its module,
-# from an xdist worker to the controller.
+# Attributes of a test's report, which carry its checks and its module's data from an xdist worker
+# to the controller.
 _CHECKS = "vkbloom_checks"
 _MODULE = "vkbloom_module"
 _FOLDER = "bloom_references"
@@ -36,33 +36,33 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--bloom-update",
         action="store_true",
-        help="write the references of checks that fail or have none, in place of the old ones",
+        help="replace the references of failed checks, and write missing ones",
     )
     group.addoption(
         "--bloom-add",
         action="store_true",
-        help="write them as further valid references, beside those of other machines",
+        help="write further references for failed checks, beside those of other machines",
     )
     group.addoption(
         "--bloom-allow-missing",
         action="store_true",
-        help="let checks pass that have no reference",
+        help="let checks without a reference pass",
     )
     group.addoption(
         "--bloom-adapter",
         metavar="NAME",
         default="auto",
-        help='what bloom_renderer runs on: "software", "hardware" or a part of a name',
+        help='adapter of bloom_renderer: "software", "hardware" or a part of its name',
     )
     group.addoption(
         "--bloom-expect-adapter",
         metavar="NAME",
-        help="a part of the name or of the driver of the adapter; any other is an error",
+        help="a part of the adapter's name or driver; another adapter is an error",
     )
     group.addoption(
         "--bloom-report",
         metavar="DIR",
-        help="write a page with all checks, and with pictures of those that fail",
+        help="write an HTML page with all checks, and pictures of the failed ones",
     )
 
 
@@ -72,14 +72,16 @@ def pytest_configure(config: pytest.Config) -> None:
     is_worker = hasattr(config, "workerinput")
     if writes and (is_worker or config.getoption("dist", "no") != "no"):
         raise pytest.UsageError(
-            "--bloom-update and --bloom-add write files that all workers share: run without -n"
+            "--bloom-update and --bloom-add write files that all workers share; run without -n"
         )
     if config.getoption("bloom_update") and config.getoption("bloom_add"):
-        raise pytest.UsageError("--bloom-update replaces references, --bloom-add keeps them")
+        raise pytest.UsageError(
+            "--bloom-update and --bloom-add exclude each other; give one of them"
+        )
     if config.getoption("bloom_expect_adapter") == "":
-        raise pytest.UsageError("--bloom-expect-adapter: a name is needed")
+        raise pytest.UsageError("--bloom-expect-adapter: empty; give a part of the adapter's name")
     if config.getoption("bloom_report") == "":
-        raise pytest.UsageError("--bloom-report: a folder is needed")
+        raise pytest.UsageError("--bloom-report: empty; give a folder")
     run = _Run(config)
     config.stash[_RUN] = run
     config.pluginmanager.register(run, "vkbloom-run")
@@ -87,7 +89,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Tell an xdist worker where the parts of the report belong."""
+    """Tell an xdist worker the folder of the report's parts."""
     parts = node.config.stash[_RUN].parts
     node.workerinput["vkbloom_parts"] = None if parts is None else str(parts)
 
@@ -96,7 +98,7 @@ def pytest_configure_node(node: Any) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item,
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Hand what the checks of a test found to whoever reports it."""
+    """Attach the records of a test's checks to its report."""
     report = yield
     records = item.stash.get(_RECORDS, None)
     if records:
@@ -108,9 +110,20 @@ def pytest_runtest_makereport(
 
 @pytest.fixture(scope="session")
 def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
-    """One `vkbloom.Renderer` for the whole process, on the adapter of ``--bloom-adapter``.
+    """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``.
 
-    No adapter, and another than ``--bloom-expect-adapter`` names, is an error.
+    It is an error if there is no such adapter, or another one than ``--bloom-expect-adapter``.
+
+    See Also
+    --------
+    frame_regression : Compares what the renderer returns.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> def test_black_stays_black(bloom_renderer):
+    ...     frames = bloom_renderer.apply(np.zeros((16, 16, 4), np.uint8))
+    ...     assert not frames["final"][..., :3].any()
     """
     from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
 
@@ -125,7 +138,22 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
 
 @pytest.fixture
 def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
-    """Compare frames with references: see `vkbloom.testing.FrameRegression.check`."""
+    """Compare frames with references: see `vkbloom.testing.FrameRegression.check`.
+
+    See Also
+    --------
+    vkbloom.testing.FrameRegression : What the fixture gives.
+
+    Examples
+    --------
+    A test that compares every framebuffer with its reference:
+
+    >>> import numpy as np
+    >>> import vkbloom
+    >>> def test_blur(bloom_renderer, frame_regression):
+    ...     image = np.full((16, 16, 4), 0.5, np.float32)
+    ...     frame_regression.check(bloom_renderer.apply(image, vkbloom.Pyramid(levels=2)))
+    """
     from vkbloom.testing.regression import (  # noqa: PLC0415  costs start-up time
         FrameRegression,
         Mode,
@@ -154,18 +182,18 @@ def folder_of(module: Path) -> Path:
 
 
 class _Run:
-    """What is known of all checks of a run; registered as a plugin of its own."""
+    """The state of a run's checks; registered as a separate plugin."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
         self._worker_input: dict[str, Any] | None = getattr(config, "workerinput", None)
         self._records: list[Record] = []
-        # By folder of references: how many tests their modules have, and which of them passed.
+        # By folder of references: the number of tests of its module, and the tests that passed.
         self._totals: Counter[str] = Counter()
         self._passed: dict[str, set[str]] = {}
         self._partly: set[Path] = set()
         self._page: Path | None = None
-        # Why there is no page.
+        # Why the page could not be written.
         self._reason = ""
         wanted = config.getoption("bloom_report")
         self._report = None if wanted is None else config.invocation_params.dir / wanted
@@ -174,7 +202,7 @@ class _Run:
             given = self._worker_input["vkbloom_parts"]
             self.parts = None if given is None else Path(given)
         elif self._report is not None and self.parts is not None:
-            # What a run left that was interrupted.
+            # Remove the parts that an interrupted run left.
             shutil.rmtree(self.parts, ignore_errors=True)
             try:
                 self._report.mkdir(parents=True, exist_ok=True)
@@ -182,7 +210,7 @@ class _Run:
                 raise pytest.UsageError(f"--bloom-report={wanted}: {error.strerror}") from error
 
     def pytest_deselected(self, items: list[pytest.Item]) -> None:
-        """Note whose references cannot be called unused."""
+        """Note modules with deselected tests, whose references are not reported as unused."""
         self._partly.update(item.path for item in items)
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
@@ -194,14 +222,14 @@ class _Run:
         self._totals.update(str(folder_of(item.path)) for item in session.items)
 
     def describe(self, item: pytest.Item) -> tuple[str, int] | None:
-        """Return a test's folder of references and how many tests have it; None if unknown."""
+        """Return a test's folder of references and its number of tests; None if unknown."""
         if item.path in self._partly:
             return None
         folder = str(folder_of(item.path))
         return folder, self._totals[folder]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take what a report carries, from this process or from a worker."""
+        """Collect the records of a report from this process or a worker."""
         self._records += getattr(report, _CHECKS, [])
         module = getattr(report, _MODULE, None)
         if module is not None and report.when == "call" and report.passed:
@@ -210,7 +238,7 @@ class _Run:
             self._passed.setdefault(folder, set()).add(report.nodeid)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Write the report; where that fails, what the tests found is told nevertheless."""
+        """Write the report; if that fails, the summary says so and the run goes on."""
         if self._report is None or self.parts is None or self._worker_input is not None:
             return
         from vkbloom.testing.report import write_report  # noqa: PLC0415  costs start-up time
@@ -222,7 +250,7 @@ class _Run:
             session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """List references that were written, are missing or are unused; say where the report is."""
+        """List written, missing and unused references, and the report's path."""
         lines = [
             f"{record['outcome']}: {self._relative(Path(record['folder']) / record['name'])}.json"
             for record in self._records
@@ -239,7 +267,7 @@ class _Run:
                 terminalreporter.write_line(line)
 
     def _unused(self) -> list[Path]:
-        """Find references that no test asked for, of modules whose tests all ran and passed."""
+        """Find references that no test used, in modules whose tests all ran and passed."""
         used = {
             (record["folder"], record["name"]) for record in self._records if record["has_files"]
         }

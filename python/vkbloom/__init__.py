@@ -1,7 +1,18 @@
 """vkbloom: measure bloom.
 
-A whole Vulkan bloom pipeline, on a GPU or on a CPU with Mesa's lavapipe, that gives back every
-framebuffer as a NumPy array.
+A complete Vulkan bloom pipeline that returns each of its framebuffers as a NumPy array. It runs on
+a GPU, or on a CPU with Mesa's lavapipe.
+
+Examples
+--------
+>>> image = np.zeros((16, 16, 4), np.uint8)
+>>> image[8, 8] = 255
+>>> with vkbloom.Renderer("software") as renderer:
+...     frames = renderer.apply(image, vkbloom.Separable())
+>>> list(frames)
+['glow', 'blur_vertical', 'bloom', 'final']
+>>> frames["final"].shape
+(16, 16, 4)
 """
 
 from __future__ import annotations
@@ -38,10 +49,10 @@ if TYPE_CHECKING:
     from vkbloom.io.array_files import read, write
     from vkbloom.scene import Camera, Scene
 
-#: Of the installed package; looked up when it is asked for.
+#: Version of the installed package, read from its metadata on first access.
 __version__: str
 
-# Imported at the first use, because a program that gives images bloom needs none of them.
+# Imported on first use, because a program that only calls `apply` needs none of them.
 _LATE_MODULES = {
     "reductions": "vkbloom.grid.reductions",
     "reference": "vkbloom.reference",

@@ -1,4 +1,4 @@
-"""The Vulkan adapters of this machine."""
+"""List the Vulkan adapters of this machine."""
 
 from __future__ import annotations
 
@@ -14,23 +14,34 @@ from vkbloom import _core
 
 @dataclasses.dataclass(frozen=True)
 class AdapterInfo:
-    """One adapter that can run vkbloom.
+    """An adapter that can run vkbloom.
 
     Attributes
     ----------
     name : str
-        As the driver calls the device.
+        The device's name, from the driver.
     type : str
         "cpu", "integrated", "discrete", "virtual" or "other".
     driver, driver_info : str
-        The driver and its version, in its own words; "" where it has none.
+        Name and version of the driver, as the driver reports them; "" if it reports none.
     api_version : str
-        Of Vulkan.
+        The Vulkan version of the device.
     bundled : bool
-        Whether its driver came with the package ``vkbloom-lavapipe``, or was named by
-        VKBLOOM_DRIVER; else the system's Vulkan loader found it.
+        Whether the driver comes from the package ``vkbloom-lavapipe`` or from VKBLOOM_DRIVER;
+        otherwise the system's Vulkan loader found it.
     summary : str
-        All of it on one line.
+        All of these on one line.
+
+    See Also
+    --------
+    adapters : Lists the adapters.
+    Renderer : Chooses an adapter by type or name.
+
+    Examples
+    --------
+    >>> info = vkbloom.AdapterInfo("llvmpipe", "cpu", "llvmpipe", "Mesa 25.0.7", "1.4.305")
+    >>> info.summary
+    'llvmpipe (cpu, Mesa 25.0.7, Vulkan 1.4.305)'
     """
 
     name: str
@@ -42,7 +53,7 @@ class AdapterInfo:
 
     @property
     def summary(self) -> str:
-        """All of it on one line."""
+        """All attributes on one line."""
         driver = self.driver_info or self.driver or "unnamed driver"
         kind = f"{self.type}, bundled" if self.bundled else self.type
         return f"{self.name} ({kind}, {driver}, Vulkan {self.api_version})"
@@ -91,13 +102,23 @@ def adapters() -> tuple[AdapterInfo, ...]:
     Returns
     -------
     tuple of AdapterInfo
-        First those of the system's Vulkan loader, then those of the bundled driver. Empty where no
+        First those of the system's Vulkan loader, then those of the bundled driver. Empty if no
         driver works.
 
     Raises
     ------
     Error
-        The loader is there, but fails.
+        The Vulkan loader fails.
+
+    See Also
+    --------
+    AdapterInfo : Describes an adapter.
+    Renderer : Chooses an adapter by type or name.
+
+    Examples
+    --------
+    >>> any(adapter.type == "cpu" for adapter in vkbloom.adapters())
+    True
     """
     found: list[_core._Adapter] = []
     for driver in dict.fromkeys(("", bundled_driver())):

@@ -1,6 +1,7 @@
-"""Checks of what a caller gives: numbers, sizes, times, and the optional packages needed.
+"""Check arguments: numbers, sizes, times, images, and the optional packages they need.
 
-Each returns what is to be used, or raises an error that names the argument and what it may be.
+Each function returns the value to use, or raises an error that names the argument, its value and
+the accepted values.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ __all__ = [
     "import_extra",
 ]
 
-#: The largest float of 32 bits, which is what the device computes with.
+#: The largest 32-bit float; the device computes in 32-bit floats.
 FLT_MAX = (2 - 2**-23) * 2.0**127
 
 # Fast path for native byte order.
@@ -43,16 +44,16 @@ _DTYPE_CURES = {
 
 
 def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
-    """Import a package that one of vkbloom's extras brings.
+    """Import a package that one of vkbloom's extras installs.
 
     Parameters
     ----------
     package : str
-        Its name, such as "OpenImageIO".
+        Name of the package, such as "OpenImageIO".
     extra : str
         The extra that installs it, such as "images".
     purpose : str
-        What needs it, as the subject of the message.
+        What needs the package; the subject of the error message.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
     Raises
     ------
     ModuleNotFoundError
-        If it is missing; the message gives the command that installs it.
+        The package is missing; the message gives the command that installs it.
     """
     try:
         return importlib.import_module(package)
@@ -73,15 +74,15 @@ def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
 
 
 def as_float(name: str, value: Any) -> float:
-    """Return a real number as a float, one beyond all floats as infinity, or raise TypeError."""
+    """Convert a real number to float, or raise TypeError. Too large a number becomes infinity."""
     try:
-        # All of these float() would take, the arrays and complex numbers with a warning.
-        no_number = isinstance(value, str | bytes | np.complexfloating)
-        if no_number or getattr(value, "ndim", 0) != 0:
+        # float() would accept these types, with a warning for arrays and complex numbers.
+        is_other = isinstance(value, str | bytes | np.complexfloating)
+        if is_other or getattr(value, "ndim", 0) != 0:
             raise TypeError
         return float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: a number is needed, not {value!r}") from None
+        raise TypeError(f"{name}: {value!r} is not a number") from None
     except OverflowError:
         return math.inf if value > 0 else -math.inf
 
@@ -89,7 +90,7 @@ def as_float(name: str, value: Any) -> float:
 def check_number(name: str, value: float, low: float, high: float) -> float:
     """Return the value as a float if ``low <= value <= high``.
 
-    Else raise ValueError, naming the field and its range, or TypeError where it is no number.
+    Otherwise raise ValueError, naming the field and its range, or TypeError if it is not a number.
     """
     number = as_float(name, value)
     if not low <= number <= high:
@@ -98,46 +99,46 @@ def check_number(name: str, value: float, low: float, high: float) -> float:
 
 
 def check_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
-    """Return the values as floats that 32 bits hold, else raise TypeError or ValueError."""
+    """Return the values as floats within the 32-bit range, or raise TypeError or ValueError."""
     try:
         if isinstance(values, str):
             raise TypeError
         numbers = tuple(as_float(name, value) for value in values)
     except TypeError:
-        raise TypeError(f"{name}: a sequence of numbers is needed, not {values!r}") from None
+        raise TypeError(f"{name}: {values!r} is not a sequence of numbers") from None
     for number in numbers:
-        # The device has 32 bits, of which this is the largest number.
+        # Negated, so that NaN fails too.
         if not abs(number) <= FLT_MAX:
             raise ValueError(f"{name}: {number!r} is out of range, {-FLT_MAX:g} to {FLT_MAX:g}")
     return numbers
 
 
 def check_size(name: str, size: Any) -> tuple[int, int]:
-    """Return (width, height) as two ints of at least 1, else raise TypeError or ValueError."""
+    """Return (width, height) as two ints of at least 1, or raise TypeError or ValueError."""
     try:
         width, height = size
-        whole = (int(width), int(height))
+        integers = (int(width), int(height))
     except (TypeError, ValueError, OverflowError):
-        raise TypeError(f"{name}: (width, height) is needed, not {size!r}") from None
-    if whole != (width, height) or min(whole) < 1 or max(whole) >= 2**31:
-        raise ValueError(f"{name}: {size!r} is out of range, whole numbers from 1 on")
-    return whole
+        raise TypeError(f"{name}: {size!r} is not a pair (width, height)") from None
+    if integers != (width, height) or min(integers) < 1 or max(integers) >= 2**31:
+        raise ValueError(f"{name}: {size!r} is out of range, integers of at least 1")
+    return integers
 
 
 def check_time(time: Any) -> float:
-    """Return a time of a scene as a float, else raise TypeError or ValueError."""
+    """Return the time of a scene as a float, or raise TypeError or ValueError."""
     turns = as_float("time", time)
     if not math.isfinite(turns):
-        raise ValueError(f"time: {time!r} is out of range, a finite number of turns")
+        raise ValueError(f"time: {time!r} is out of range, finite numbers")
     return turns
 
 
 def check_index(field: str, value: int, low: int, high: int) -> int:
-    """Return a whole number, else raise TypeError or ValueError that names the field."""
+    """Return an integer, or raise TypeError or ValueError that names the field."""
     try:
         index = operator.index(value)
     except TypeError:
-        raise TypeError(f"{field}: an int is needed, not {type(value).__name__}") from None
+        raise TypeError(f"{field}: {value!r} is not an integer") from None
     if not low <= index <= high:
         raise ValueError(f"{field}: {index} is outside {low} to {high}")
     return index
@@ -216,7 +217,7 @@ def _shape_cure(shape: tuple[int, ...]) -> str:
 
 
 def check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
-    """Return the wanted names, None for all."""
+    """Return the names of the requested framebuffers; None for all."""
     if attachments == "all":
         return None
     if isinstance(attachments, str):
@@ -224,8 +225,8 @@ def check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | Non
     try:
         names = tuple(attachments)
     except TypeError:
-        raise TypeError(f"attachments: names are needed, not {attachments!r}") from None
+        raise TypeError(f"attachments: {attachments!r} is not a sequence of names") from None
     for name in names:
         if not isinstance(name, str):
-            raise TypeError(f"attachments: names are needed, not {name!r}")
+            raise TypeError(f"attachments: {name!r} is not a name")
     return names

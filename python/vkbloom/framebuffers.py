@@ -1,4 +1,4 @@
-"""What is known of framebuffers without their renderer: which leads, and the axes' names."""
+"""Properties of framebuffers by name and shape: the leading one, and the names of dimensions."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ __all__ = ["Framebuffers", "MadeWith", "dimensions", "leading"]
 
 
 class MadeWith(Protocol):
-    """The part of a `Settings` that those who show and write framebuffers read."""
+    """The part of `Settings` that viewers and writers of framebuffers use."""
 
     @property
     def encoding(self) -> str:
-        """The transfer curve that `final` has passed, or "none"."""
+        """The encoding of `final`, or "none"."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields by name, and ``method``."""
 
 
 class Framebuffers(Protocol):
-    """Framebuffers with how they came about, as those that show and write them see a `Frames`."""
+    """The part of `Frames` that viewers and writers of framebuffers use."""
 
     @property
     def timings(self) -> Mapping[str, float]:
@@ -30,11 +30,11 @@ class Framebuffers(Protocol):
 
     @property
     def settings(self) -> MadeWith:
-        """The settings that the framebuffers were made with."""
+        """The settings of the request."""
 
     @property
     def info(self) -> Mapping[str, Any]:
-        """Adapter, driver and version among others."""
+        """Adapter, driver and version, and other facts."""
 
     def __getitem__(self, name: str, /) -> NDArray[Any]: ...
 
@@ -43,21 +43,21 @@ class Framebuffers(Protocol):
     def __len__(self) -> int: ...
 
     def items(self) -> ItemsView[str, NDArray[Any]]:
-        """Return the framebuffers with their names, in the order that the data flows."""
+        """Return the framebuffers with their names, in the order of the data flow."""
 
 
 def leading(arrays: Mapping[str, NDArray[Any]] | Framebuffers) -> str:
-    """Name the framebuffer that stands for all: `final`, the last image, or the last.
+    """Return the name of the framebuffer that represents all of them.
 
     Parameters
     ----------
     arrays : mapping of str to ndarray
-        Images of shape (H, W, C) and depth of shape (H, W), one at least.
+        At least one image of shape (H, W, C) or depth of shape (H, W).
 
     Returns
     -------
     str
-        "final", or else the last name of an image, or else the last name.
+        "final", or else the name of the last image, or else the last name.
     """
     if "final" in arrays:
         return "final"
@@ -66,26 +66,26 @@ def leading(arrays: Mapping[str, NDArray[Any]] | Framebuffers) -> str:
 
 
 def dimensions(arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, ...]]:
-    """Name the axes of framebuffers, so that those of one size share their dimensions.
+    """Name the dimensions of framebuffers, so that framebuffers of one size share them.
 
     Framebuffers of the size of `final` (or, without it, of the last image) have the
     dimensions "y" and "x"; others "<first>_y" and "<first>_x", where <first> is the first
-    framebuffer of that size. Likewise "channel" belongs to `final`'s number of channels
-    and "<first>_channel" to any other. So `glow - blur_vertical` is an image, and not an
-    array of six dimensions.
+    framebuffer of that size. Likewise "channel" is the dimension of `final`'s number of
+    channels and "<first>_channel" of another number. With shared dimensions, xarray computes
+    `glow - blur_vertical` pixel by pixel; otherwise it would broadcast to six dimensions.
 
     Parameters
     ----------
     arrays : mapping of str to ndarray
-        Images of shape (H, W, C) and depth of shape (H, W), one at least.
+        At least one image of shape (H, W, C) or depth of shape (H, W).
 
     Returns
     -------
     dict of str to tuple of str
-        The names of the axes by framebuffer, three for images, two for depth.
+        The names of the dimensions by framebuffer, three for images, two for depth.
     """
     shape = arrays[leading(arrays)].shape
-    # Keys are (H, W) and (C,), which cannot meet.
+    # Keys are (H, W) and (C,), which differ in length and cannot collide.
     prefixes = {shape[:2]: "", shape[2:]: ""}
     named: dict[str, tuple[str, ...]] = {}
     for name, array in arrays.items():

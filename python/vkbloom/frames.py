@@ -1,4 +1,4 @@
-"""Framebuffers that come back from a renderer: by name, with how they came about."""
+"""The framebuffers that a renderer returns: by name, with timings, settings and adapter."""
 
 from __future__ import annotations
 
@@ -27,31 +27,48 @@ _CHANNELS = ("r", "g", "b", "a")
 
 
 class Frames(Mapping[str, NDArray[Any]]):
-    """Framebuffers by name, in the order that the data flows, with how they came about.
+    """Framebuffers by name, in the order of the data flow, with timings, settings and adapter.
 
-    A read-only mapping: framebuffers cannot be added, replaced or removed. The arrays
-    themselves are plain `numpy.ndarray` and belong to the caller. Two Frames are equal only
-    if they are the same object; compare their arrays with `numpy.array_equal`.
+    A read-only mapping: framebuffers cannot be added, replaced or removed. The arrays are plain
+    `numpy.ndarray` and belong to the caller. Two Frames are equal only if they are the same
+    object; compare their arrays with `numpy.array_equal`.
 
     Parameters
     ----------
     arrays : mapping of str to ndarray
         Images of shape (H, W, 3) or (H, W, 4) and dtype uint8, float16 or float32; depth of
-        shape (H, W) and dtype float32. Top row first. They are kept, not copied.
+        shape (H, W) and dtype float32. Top row first. They are not copied.
     timings : mapping of str to float
-        Seconds on the device by pass name, for the passes that ran; NaN where the device's queue
-        has no timestamps.
+        Seconds on the device by pass name, for the passes that ran; NaN if the device's queue has
+        no timestamps.
     settings : Settings
-        What the frames were made with.
+        The settings of the request.
     info : mapping of str to object
-        "adapter", "driver", "version", and how many "nan" and "inf" the input held.
+        "adapter", "driver", "version", and the numbers of "nan" and "inf" values in the input.
 
     Raises
     ------
     TypeError
-        If a framebuffer is not an ndarray or its name not a str.
+        A framebuffer is not an ndarray, or its name is not a str.
     ValueError
-        If a name is not an identifier, or an array's shape or dtype is not one of the above.
+        A name is not an identifier, or an array's shape or dtype is not one of the above.
+
+    See Also
+    --------
+    Renderer.apply, Renderer.render : Return Frames.
+
+    Examples
+    --------
+    >>> image = np.full((16, 24, 3), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2))
+    >>> {name: array.shape for name, array in frames.items()}
+    {'glow': (16, 24, 4), 'down_0': (8, 12, 4), 'down_1': (4, 6, 4), 'up_0': (8, 12, 4), \
+'bloom': (16, 24, 4), 'final': (16, 24, 3)}
+    >>> frames.settings.levels
+    2
+    >>> frames.info["nan"]
+    0
     """
 
     def __init__(
@@ -71,26 +88,26 @@ class Frames(Mapping[str, NDArray[Any]]):
     def timings(self) -> Mapping[str, float]:
         """Seconds on the device by pass name, for the passes that ran; read-only.
 
-        NaN where the device's queue has no timestamps.
+        NaN if the device's queue has no timestamps.
         """
         return MappingProxyType(self._timings)
 
     @property
     def settings(self) -> Settings:
-        """The settings that the frames were made with."""
+        """The settings of the request."""
         return self._settings
 
     @property
     def info(self) -> dict[str, Any]:
-        """Adapter, driver and version, and how many "nan" and "inf" the input held."""
+        """Adapter, driver and version, and the numbers of "nan" and "inf" values in the input."""
         return self._info
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         try:
             return self._arrays[name]
         except KeyError:
-            held = ", ".join(self._arrays) or "nothing"
-            raise KeyError(f"no framebuffer {name!r}; there are: {held}") from None
+            held = ", ".join(self._arrays) or "none"
+            raise KeyError(f"unknown framebuffer {name!r}; available: {held}") from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._arrays)
@@ -114,20 +131,38 @@ class Frames(Mapping[str, NDArray[Any]]):
         return "\n".join(lines)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the framebuffers as one Dataset, a variable each.
+        """Return the framebuffers as one Dataset with a variable for each.
+
+        Framebuffers of the size of `final` (or, without it, of the last image) have the dimensions
+        "y" and "x". Others have "<first>_y" and "<first>_x", where <first> is the first
+        framebuffer of that size. The dimension of `final`'s channels is "channel", of another
+        number of channels "<first>_channel".
 
         Returns
         -------
         xarray.Dataset
-            Dimensions as `dimensions` gives them; channels carry the coordinates "r", "g",
-            "b" and, where there is one, "a". The attributes hold `info` and, as JSON text,
-            the settings and the timings: text and numbers only, as netCDF and zarr want
-            them. The variables share memory with the framebuffers.
+            The coordinates of channels are "r", "g", "b" and, if there is alpha, "a". The
+            attributes contain `info`, and the settings and timings as JSON, because netCDF and
+            Zarr store only text and numbers. The variables share memory with the framebuffers.
 
         Raises
         ------
         ModuleNotFoundError
-            If xarray is missing: ``pip install vkbloom[grid]``.
+            xarray is missing: ``pip install vkbloom[grid]``.
+
+        See Also
+        --------
+        Renderer.grid : A Dataset of many settings.
+
+        Examples
+        --------
+        >>> image = np.full((16, 16, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     dataset = renderer.apply(image).to_xarray()
+        >>> dataset["bloom"].dims
+        ('y', 'x', 'glow_channel')
+        >>> float(dataset["final"].sel(channel="r").mean().round(3)) > 0.5
+        True
         """
         import json  # noqa: PLC0415  costs start-up time
 
@@ -150,52 +185,64 @@ class Frames(Mapping[str, NDArray[Any]]):
         return dataset
 
     def save(self, path: str | os.PathLike[str]) -> list[Path]:
-        """Write the framebuffers to image files and lose nothing on the way.
+        """Write the framebuffers to image files without loss.
 
         ========================== ========================================================
         path                       files
         ========================== ========================================================
         ``out.exr``                one multi-part OpenEXR file, one part per framebuffer
         ``out.png``, ``out.tif``   ``out_<name>.png``; ``out.png`` if there is one only
-        a folder, or no extension  ``<name>.png`` in that folder, which is made if missing
+        a folder, or no extension  ``<name>.png`` in that folder, which is created if missing
         ========================== ========================================================
 
-        A framebuffer that the chosen format cannot hold as it is becomes an ``.exr`` of the
-        same stem beside the others: float images and depth beside ``out.png``, for example.
-        An alpha that is 1 everywhere is left out where the format has none. Formats that
-        compress with loss (JPEG, WebP, GIF, Radiance HDR) keep their loss.
+        A framebuffer that the format cannot hold is written as ``.exr`` with the same stem: float
+        images and depth beside ``out.png``, for example. If the format has no alpha, an alpha of
+        1 everywhere is left out. JPEG, WebP, GIF and Radiance HDR compress with loss.
 
-        In OpenEXR half stays half and float stays float; 8-bit values are stored as half
-        value / 255, from which ``round(255 * value)`` gives the same levels again, with the
-        attribute ``vkbloom:dtype`` telling what they were. Depth is a float channel ``Z``.
-        The display window of all parts is that of `final` (without it, of the last image), as
-        the parts of one file must share it. Values are stored as they are: no gamma, no
-        multiplication by alpha.
+        In OpenEXR, half stays half and float stays float. 8-bit values are stored as half,
+        value / 255, and the attribute ``vkbloom:dtype`` is "uint8"; ``round(255 * value)`` gives
+        the original levels. Depth is a float channel ``Z``. All parts of a file must have the same
+        display window, which is that of `final` (without it, of the last image). Values are stored
+        without gamma and without multiplication by alpha.
 
-        ``Software`` and ``ImageDescription`` (``Description`` in PNG) carry the version, the
-        adapter and the settings, and ``vkbloom:<key>`` each entry of `info`, the settings
-        and the timings (both as JSON), where the format stores such attributes.
+        If the format has such attributes, ``Software`` and ``ImageDescription`` (``Description``
+        in PNG) contain the version, the adapter and the settings, and ``vkbloom:<key>`` contains
+        each entry of `info`, and the settings and timings as JSON.
 
         Parameters
         ----------
         path : str or path-like
-            A file name with an extension that OpenImageIO writes, or a folder. What is
-            already there is replaced, and links are written through. All files are written
-            under temporary names first and renamed when all are complete.
+            A file name with an extension that OpenImageIO writes, or a folder. Existing files are
+            replaced; symbolic links are followed. All files are written under temporary names and
+            renamed when all are complete.
 
         Returns
         -------
         list of Path
-            The files written, in the order of the framebuffers.
+            The written files, in the order of the framebuffers.
 
         Raises
         ------
         ValueError
-            If the extension is unknown, the name not UTF-8, or there is no framebuffer.
+            The extension is unknown, the name is not UTF-8, or there is no framebuffer.
         OSError
-            If a file cannot be written; it names the file, and no half file is left.
+            A file cannot be written; the error names it, and no partial file is left.
         ModuleNotFoundError
-            If OpenImageIO is missing: ``pip install vkbloom[images]``.
+            OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+        See Also
+        --------
+        Frames.to_xarray : One Dataset, which netCDF and Zarr can store.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> image = np.full((16, 16, 3), 100, np.uint8)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     frames = renderer.apply(image)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in frames.save(f"{folder}/out.png")]
+        ['out_glow.png', 'out_blur_vertical.png', 'out_bloom.png', 'out_final.png']
         """
         from vkbloom.io import files  # noqa: PLC0415  costs start-up time
 
@@ -250,11 +297,11 @@ class Frames(Mapping[str, NDArray[Any]]):
 
 def _checked(name: str, array: NDArray[Any]) -> NDArray[Any]:
     if not isinstance(name, str):
-        raise TypeError(f"arrays: a framebuffer's name is a str, not {type(name).__name__}")
+        raise TypeError(f"arrays: {name!r} is not a name; use a str")
     if not name.isidentifier():
-        raise ValueError(f"arrays: {name!r} cannot name a framebuffer; it must be an identifier")
+        raise ValueError(f"arrays: {name!r} is not an identifier, as names of framebuffers must be")
     if not isinstance(array, np.ndarray):
-        raise TypeError(f"arrays[{name!r}]: an ndarray is needed, not {type(array).__name__}")
+        raise TypeError(f"arrays[{name!r}]: {type(array).__name__} is not a NumPy array")
     is_image = array.ndim == 3 and array.shape[2] in (3, 4) and array.dtype in _IMAGE_DTYPES
     is_depth = array.ndim == 2 and array.dtype == np.float32
     if not (is_image or is_depth) or array.size == 0:

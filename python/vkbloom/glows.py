@@ -57,6 +57,10 @@ class GodotBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
+    See Also
+    --------
+    presets : "godot_4_5" and "godot_4_6".
+
     Notes
     -----
     Level i has the size floor(side / 2) >> i of the frame, never under 1. It is the image above it,
@@ -73,6 +77,11 @@ class GodotBloom(Settings):
 
     Source: godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl
     @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc.
+
+    Examples
+    --------
+    >>> vkbloom.GodotBloom().composite
+    'screen'
     """
 
     method: ClassVar[str] = "godot"
@@ -119,6 +128,10 @@ class BlenderGlare(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
+    See Also
+    --------
+    presets : "blender_bloom".
+
     Notes
     -----
     There are n = floor(log2(size * shorter side)) levels, one at least. ``down_0`` has the frame's
@@ -133,6 +146,11 @@ class BlenderGlare(Settings):
 
     Source: the formulas of the compositor of Blender 4.5, source/blender/nodes/composite/nodes/
     node_composite_glare.cc.
+
+    Examples
+    --------
+    >>> vkbloom.BlenderGlare(size=0.25).size
+    0.25
     """
 
     method: ClassVar[str] = "blender"
@@ -171,6 +189,10 @@ class PygfxBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
+    See Also
+    --------
+    presets : "pygfx".
+
     Notes
     -----
     ``down_0`` is the floored half of the frame, each next level that of the one before, all by the
@@ -179,6 +201,11 @@ class PygfxBloom(Settings):
     sample of up_0, the sum of the levels.
 
     Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
+
+    Examples
+    --------
+    >>> vkbloom.PygfxBloom().levels
+    6
     """
 
     method: ClassVar[str] = "pygfx"

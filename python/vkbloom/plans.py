@@ -34,6 +34,17 @@ class Pass(NamedTuple):
     variant : str
         What runs in place of the method's own pass on this class of devices; "fragment" is that
         pass itself, drawn.
+
+    See Also
+    --------
+    Plan : Has the passes.
+
+    Examples
+    --------
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     plan = renderer.plan(np.zeros((16, 16, 4), np.uint8), vkbloom.Separable())
+    >>> isinstance(plan.passes[0], vkbloom.Pass)
+    True
     """
 
     name: str

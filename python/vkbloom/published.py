@@ -54,6 +54,11 @@ class BevyBloom(Settings):
     **settings
         The other fields of `Settings`.
 
+    See Also
+    --------
+    presets : "bevy_natural" and others.
+    Pyramid : A chain with the same downsample.
+
     Notes
     -----
     ``down_0`` is `max_mip_dimension` high, as wide as the frame's aspect asks for (rounded). It is
@@ -71,6 +76,11 @@ class BevyBloom(Settings):
     composite, as f_0 is the intensity.
 
     Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016), crates/bevy_post_process/src/bloom.
+
+    Examples
+    --------
+    >>> vkbloom.BevyBloom(intensity=0.3).composite
+    'mix'
     """
 
     method: ClassVar[str] = "bevy"
@@ -104,6 +114,10 @@ class KinoBloom(Settings):
     **settings
         The other fields of `Settings`.
 
+    See Also
+    --------
+    presets : "kino".
+
     Notes
     -----
     ``bright`` is, at the frame's size, m = median(median(c, left, right), up, down) past the knee
@@ -115,6 +129,11 @@ class KinoBloom(Settings):
     the way up hold means, and the bloom is N times as coarse.
 
     Source: keijiro/KinoBloom @ 0a04c43fa47d (2017), Assets/Kino/Bloom/Bloom.cs, Bloom.cginc.
+
+    Examples
+    --------
+    >>> vkbloom.KinoBloom(threshold=1.0, radius=4).composite
+    'add'
     """
 
     method: ClassVar[str] = "kino"
@@ -149,6 +168,10 @@ class FilamentBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
+    See Also
+    --------
+    presets : "filament".
+
     Notes
     -----
     ``down_0`` is as wide as the frame's aspect asks for, floored to a multiple of 16. While it is
@@ -164,6 +187,11 @@ class FilamentBloom(Settings):
     Source: google/filament: bloomDownsample2x.mat @ 9f62dc2f2f53, bloomDownsample9.mat and
     bloomDownsample.mat @ 523a261b1052, bloomUpsample.mat @ 9f62dc2f2f53,
     filament/src/PostProcessManager.cpp @ 003e5005713c, include/filament/Options.h @ 2fac13e154fb.
+
+    Examples
+    --------
+    >>> vkbloom.FilamentBloom(levels=7).threshold
+    1.0
     """
 
     method: ClassVar[str] = "filament"
@@ -203,6 +231,11 @@ class UrpBloom(Settings):
     **settings
         The other fields of `Settings`.
 
+    See Also
+    --------
+    HdrpBloom : The bloom of Unity's other pipeline.
+    presets : "unity_urp".
+
     Notes
     -----
     ``down_0`` is one bilinear tap at the floored half of the frame, clamped and past the knee
@@ -217,6 +250,11 @@ class UrpBloom(Settings):
     Shaders/PostProcessing/Bloom.shader @ 00d472fae509,
     Runtime/Passes/PostProcess/BloomPostProcessPass.cs @ 13e28e026298,
     Runtime/Overrides/Bloom.cs @ a085de35f86e.
+
+    Examples
+    --------
+    >>> round(vkbloom.UrpBloom().threshold, 4)
+    0.7874
     """
 
     method: ClassVar[str] = "urp"
@@ -250,6 +288,11 @@ class HdrpBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
+    See Also
+    --------
+    UrpBloom : The bloom of Unity's other pipeline.
+    presets : "unity_hdrp".
+
     Notes
     -----
     Level k has the size of the frame / 2^(k + 1), rounded, halves to even; there are
@@ -264,6 +307,11 @@ class HdrpBloom(Settings):
     Runtime: PostProcessing/Shaders/BloomPrefilter.compute @ 2309d2c2fde8, BloomBlur.compute and
     BloomUpsample.compute @ 0e4ca4d79b2c, PostProcessing/Components/Bloom.cs @ 2084a9d19159,
     RenderPipeline/HDRenderPipeline.PostProcess.cs @ 0148835ea9ba.
+
+    Examples
+    --------
+    >>> vkbloom.HdrpBloom(scatter=0.5).composite
+    'mix'
     """
 
     method: ClassVar[str] = "hdrp"
@@ -305,6 +353,10 @@ class UnrealBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
+    See Also
+    --------
+    presets : "threejs_unreal".
+
     Notes
     -----
     ``bright`` is one bilinear tap at half of the frame's size, rounded, times
@@ -323,6 +375,11 @@ class UnrealBloom(Settings):
     #31528 (kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js
     @ 0255e15dd1d4; defaults of examples/jsm/tsl/display/BloomNode.js, as the pass has none for
     radius and threshold.
+
+    Examples
+    --------
+    >>> vkbloom.UnrealBloom(radius=0.5, threshold=0.8).intensity
+    3.0
     """
 
     method: ClassVar[str] = "unreal"

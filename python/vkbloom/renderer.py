@@ -113,6 +113,11 @@ class Renderer:
         `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
         what the adapter cannot run.
 
+    See Also
+    --------
+    adapters : Lists the adapters.
+    Frames : What the calls return.
+
     Notes
     -----
     A context manager; usable from any thread. Calls release the GIL while the device works, and
@@ -127,6 +132,17 @@ class Renderer:
     The first renderer, or list of `adapters`, opens the Vulkan loader for the life of the process:
     drivers that are installed later, and variables such as VK_DRIVER_FILES that are set later, are
     seen by new processes only.
+
+    Examples
+    --------
+    >>> image = np.zeros((16, 16, 4), np.float32)
+    >>> image[8, 8] = 10
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2, threshold=1.0))
+    >>> frames["bloom"].shape
+    (16, 16, 4)
+    >>> renderer.closed
+    True
     """
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:

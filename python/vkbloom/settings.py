@@ -1,7 +1,7 @@
-"""The settings of a bloom: frozen dataclasses whose numbers and names the C core declares.
+"""The settings of a bloom: frozen dataclasses whose parameters the C core declares.
 
-Defaults and ranges come from ``shaders/params.h`` by way of the core's tables, so that a number is
-written down once for the shaders, the core and Python.
+Defaults and ranges are read from the core's tables, which come from ``shaders/params.h``: each is
+declared once for the shaders, the core and Python.
 """
 
 from __future__ import annotations
@@ -56,30 +56,33 @@ def field_range(field: dataclasses.Field[Any]) -> tuple[float, float]:
 
 
 def flag_field(name: str) -> Any:
-    """Declare a field that is 0 or 1 in the core's table and a bool in Python."""
+    """Declare a bool field, which is 0 or 1 in the core's table."""
     return dataclasses.field(default=bool(_core.VALUES[name][0]))
 
 
 def choice_field(name: str) -> Any:
-    """Declare a field that is one of the core's names; the first is the default."""
+    """Declare a field whose value is one of the core's names; the first is the default."""
     return dataclasses.field(default=_core.CHOICES[name][0])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What all methods share; use one of the methods, such as `Separable`.
+    """Base class of the settings of all methods; use a method's class, such as `Separable`.
+
+    Settings are frozen and hashable; `replace` returns a changed copy.
 
     Parameters
     ----------
     bloom : bool
-        Off: the bloom's passes are left out, and a scene's glow mesh; ``final`` is the tone-mapped
-        scene.
+        Whether to run the bloom passes. False: ``final`` is the tone-mapped scene without bloom
+        and without the scene's glow mesh.
     threshold : float or None
-        Brightness from which a colour goes into the bloom, 0 to 65504; None: no extraction. Of a
-        scene, the threshold is applied to the glow, in deferred shading to the brightness.
+        Brightness above which a colour contributes to the bloom, 0 to 65504; None: every colour
+        does. In a scene the threshold applies to the glow, with deferred shading to the
+        brightness.
     knee : float
-        Softness of the threshold, 0 to 1. 0: colours whose luminance is above the threshold. Else,
-        with b = max(r, g, b), k = threshold * knee and
+        Softness of the threshold, 0 to 1. 0: colours whose luminance is above the threshold pass
+        unchanged. Otherwise, with b = max(r, g, b), k = threshold * knee and
         q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
         max(q, b - threshold) / max(b, 1e-5).
     composite : {"add", "mix", "screen"}
@@ -88,20 +91,20 @@ class Settings:
     intensity : float
         The i of the composite, 0 to 65504.
     tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
-        The curve that the composite passes.
+        The tone curve that is applied to the composite.
     exposure : float
         In stops, -32 to 32: the composite is multiplied by 2**exposure before the curve.
     encoding : {"none", "gamma22", "srgb"}
         Applied to rgb after the curve.
     dither : bool
-        Noise before ``final`` is rounded to 8 bits, so that dark gradients show grain instead of
-        bands. The noise is uniform over one level, +-1/2, each channel its own: the mean over
-        pixels is the unrounded value (Roberts, "Picture Coding Using Pseudo-Random Noise", IRE
-        Transactions on Information Theory, 1962), while values that 8 bits hold, 0 and 1 among
-        them, stay as they are. A ``final`` of floats has none.
+        Whether to add noise before ``final`` is rounded to 8 bits, so that dark gradients show
+        grain instead of bands. The noise of each channel is uniform over one level, +-1/2. The
+        mean over pixels is then the unrounded value (Roberts, "Picture Coding Using Pseudo-Random
+        Noise", IRE Transactions on Information Theory, 1962). Values that 8 bits represent
+        exactly, such as 0 and 1, do not change. A float ``final`` is not dithered.
     dither_seed : int
-        Chooses the noise, 0 to 65535. It is a hash of the pixel's place and the seed: the same
-        seed gives the same noise on every adapter.
+        Seed of the noise, 0 to 65535. The noise is a hash of the pixel's position and the seed,
+        so that it is the same on every adapter.
     bloom_size : (int, int) or None
         Width and height of the bloom buffers in pixels.
     bloom_scale : float
@@ -118,9 +121,25 @@ class Settings:
     Raises
     ------
     ValueError
-        A field is out of its range; names the field, the value and the range.
+        A field is out of its range; the message names the field, the value and the range.
     TypeError
         A field has the wrong type.
+
+    See Also
+    --------
+    Separable, Pyramid, DualKawase : The methods.
+    presets : Published settings by name.
+    Renderer.apply, Renderer.render : Use settings.
+
+    Examples
+    --------
+    >>> settings = vkbloom.Pyramid(levels=5, threshold=1.0, composite="mix")
+    >>> settings.replace(intensity=0.04).intensity
+    0.04
+    >>> settings.replace(knee=2)
+    Traceback (most recent call last):
+        ...
+    ValueError: knee: 2 is out of range, 0 to 1
     """
 
     method: ClassVar[str]
@@ -158,14 +177,14 @@ class Settings:
             object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
-        """Check a number and store it as what it is: NumPy's scalars hash and print otherwise."""
+        """Check a number and store it as a Python number; NumPy scalars print differently."""
         number = check_number(field.name, value, *field_range(field))
         if isinstance(field.default, int):
-            whole = int(number)
-            if whole != value:
-                raise ValueError(f"{field.name}: {value!r} is not a whole number")
-            # A flag as a bool.
-            number = type(field.default)(whole)
+            integer = int(number)
+            if integer != value:
+                raise ValueError(f"{field.name}: {value!r} is not an integer")
+            # Converts flags to bool.
+            number = type(field.default)(integer)
         object.__setattr__(self, field.name, number)
 
     def _check_name(self, field: str, names: tuple[str, ...], of: str = "") -> None:
@@ -178,7 +197,7 @@ class Settings:
         object.__setattr__(self, field, names[names.index(value)])
 
     def replace(self, **changes: Any) -> Self:
-        """Return the same settings with some fields changed, as `dataclasses.replace`.
+        """Return a copy with some fields changed, as `dataclasses.replace` does.
 
         Parameters
         ----------
@@ -188,14 +207,19 @@ class Settings:
         Returns
         -------
         Settings
-            Of the same method.
+            Settings of the same method.
 
         Raises
         ------
         ValueError
             A value is out of its field's range.
         TypeError
-            There is no such field, or a value has the wrong type.
+            The method has no such field, or a value has the wrong type.
+
+        Examples
+        --------
+        >>> vkbloom.Separable(loops=2).replace(blur_scale=4).blur_scale
+        4.0
         """
         return dataclasses.replace(self, **changes)
 
@@ -295,7 +319,7 @@ class Settings:
 
     def _repr_html_(self) -> str:
         """Return the table of `display.fields_html`."""
-        # Late: notebooks need it, and nothing else.
+        # Imported here because only notebooks need it.
         from vkbloom.views import display  # noqa: PLC0415
 
         return display.fields_html(self)
@@ -303,38 +327,55 @@ class Settings:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Separable(Settings):
-    """A blur by a symmetric kernel, vertical then horizontal: the forward and deferred systems'.
+    """A blur by a symmetric kernel, first vertical, then horizontal.
 
-    One pass computes w0 c(0) + strength * sum of w_i (c(+i) + c(-i)) over i = 1..n, its taps
-    ``blur_scale`` texels of the bloom buffer apart, bilinear and clamped to the edge. All passes
-    but the last run at the size of the bloom buffers, the last at every pixel of ``final``.
+    One pass computes w0 c(0) + strength * sum of w_i (c(+i) + c(-i)) over i = 1..n. Its taps are
+    ``blur_scale`` texels of the bloom buffer apart, filtered bilinearly and clamped to the edge.
+    All passes but the last run at the size of the bloom buffers; the last is evaluated at every
+    pixel of ``final``.
 
     Parameters
     ----------
     blur_scale : float
         Distance of the taps in texels, 0 to 16.
     blur_strength : float
-        Factor of all taps but the centre, 0 to 16.
+        Factor of all taps except the centre, 0 to 16.
     weights : sequence of float
         Half-kernel w0..wn, 1 to 65 of them.
     loops : int
-        Vertical and horizontal passes one after the other, 1 to 16 times.
+        How often the vertical and horizontal passes are repeated, 1 to 16 times.
     layers : sequence of (float, float)
-        (scale, strength), 1 to 8 of them, each number 0 to 16: each is a whole blur at
-        blur_scale * scale, added with its strength.
+        (scale, strength), 1 to 8 of them, each number 0 to 16. Each layer is a complete blur at
+        blur_scale * scale; the blurs are added with their strengths.
     first_tap : {1, 0}
-        0 or 1. 0: the loop starts at the centre, which so gets w0 (1 + 2 strength).
+        First index of the sum, 0 or 1. 0: the sum includes the centre, whose weight becomes
+        w0 (1 + 2 strength).
     texel : {"own", "x"}
-        "x": the vertical step is 1 / width of the texture's height, as the horizontal one.
+        Step of the vertical pass. "own": 1 / height of the texture; "x": 1 / width, as in the
+        horizontal pass.
     direct : bool
-        The same kernel as one N x N pass instead of two of N.
+        Whether to apply the kernel as one pass of N x N taps instead of two of N.
     **settings
         The fields of `Settings`.
 
+    See Also
+    --------
+    gaussian_weights : Makes `weights`.
+    Pyramid, DualKawase : Methods for wide blurs.
+
     Notes
     -----
-    Source: the forward system and the outline system, `first_tap` and `texel` being the switches
-    between them.
+    Source: the forward system and the outline system, which differ in `first_tap` and `texel`.
+
+    Examples
+    --------
+    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(1.0), blur_strength=1.0)
+    >>> image = np.zeros((9, 9, 4), np.float32)
+    >>> image[4, 4] = 1
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     bloom = renderer.apply(image, settings)["bloom"]
+    >>> bloom[4, 1:8, 0].round(3)
+    array([0.002, 0.022, 0.097, 0.159, 0.097, 0.022, 0.002], dtype=float32)
     """
 
     method: ClassVar[str] = "separable"
@@ -359,7 +400,7 @@ class Separable(Settings):
             pairs = tuple(tuple(layer) for layer in self.layers)
         except TypeError:
             raise TypeError(
-                f"layers: (scale, strength) pairs are needed, not {self.layers!r}"
+                f"layers: {self.layers!r} is not a sequence of pairs (scale, strength)"
             ) from None
         layers = tuple(check_floats("layers", layer) for layer in pairs)
         if not 1 <= len(layers) <= _core.MAX_LAYERS:
@@ -367,7 +408,9 @@ class Separable(Settings):
                 f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}"
             )
         if any(len(layer) != 2 for layer in layers):
-            raise ValueError(f"layers: {self.layers!r} must hold (scale, strength) pairs")
+            raise ValueError(
+                f"layers: {self.layers!r} is not a sequence of pairs (scale, strength)"
+            )
         if any(not 0 <= number <= 16 for layer in layers for number in layer):
             raise ValueError(f"layers: {self.layers!r} has a number out of range, 0 to 16")
         object.__setattr__(self, "layers", layers)
@@ -390,8 +433,9 @@ class Pyramid(Settings):
     Parameters
     ----------
     levels : int
-        Of the chain, 1 to 16. ``down_0`` is half of the bloom size, each next the floored half,
-        never under 1; a level of 1 x 1 ends the chain, unless it is the first.
+        Number of levels, 1 to 16. ``down_0`` has half of the bloom size, each next level half of
+        the previous one, floored and at least 1. The chain ends before a level of 1 x 1, unless
+        that is the first.
     radius : float
         Distance of the tent's taps in texels of the smaller level, 0 to 16.
     firefly_filter : bool
@@ -403,10 +447,15 @@ class Pyramid(Settings):
     **settings
         The fields of `Settings`.
 
+    See Also
+    --------
+    DualKawase : A chain without additions.
+    BevyBloom, KinoBloom, FilamentBloom, UrpBloom, HdrpBloom : Pyramids of engines.
+
     Notes
     -----
-    Down: centre 0.125; four diagonals 1 texel away 0.125 each; four axials 2 texels away 0.0625
-    each; four diagonals 2 texels away 0.03125 each. Up: (1 2 1)^2 / 16,
+    Weights of the downsample: centre 0.125; four diagonals 1 texel away 0.125 each; four axials
+    2 texels away 0.0625 each; four diagonals 2 texels away 0.03125 each. Upsample: (1 2 1)^2 / 16,
     up_k = down_k + tent(up_k+1). ``bloom`` is tent(up_0) at every pixel of ``final``, divided by
     the number of levels, so that a flat image keeps its value. In "rgba8unorm", which ends at 1,
     the images on the way up hold the mean of the levels that went into them instead of their sum;
@@ -418,6 +467,17 @@ class Pyramid(Settings):
 
     Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
     SIGGRAPH 2014.
+
+    Examples
+    --------
+    >>> image = np.zeros((32, 32, 3), np.float16)
+    >>> image[16, 16] = 100
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=3, composite="mix"))
+    >>> list(frames)
+    ['glow', 'down_0', 'down_1', 'down_2', 'up_1', 'up_0', 'bloom', 'final']
+    >>> frames["down_2"].shape
+    (4, 4, 4)
     """
 
     method: ClassVar[str] = "pyramid"
@@ -436,23 +496,36 @@ class Pyramid(Settings):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DualKawase(Settings):
-    """A chain of halved images, five taps down and eight taps up, nothing added on the way.
+    """A chain of halved images: downsampled with 5 taps, upsampled with 8, nothing added.
 
     Parameters
     ----------
     levels : int
-        Of the chain, 1 to 16; their sizes as those of `Pyramid`.
+        Number of levels, 1 to 16; their sizes are those of `Pyramid`.
     offset : float
-        Factor of all distances between taps, 0 to 16.
+        Factor of the distances of all taps, 0 to 16.
     **settings
         The fields of `Settings`.
 
+    See Also
+    --------
+    Pyramid : A chain whose levels are added.
+
     Notes
     -----
-    Down: (4 c + the four diagonals half a texel of the source away) / 8. Up: (the four axials one
-    texel of the smaller level away + 2 times the four diagonals half a texel of it away) / 12.
+    Downsample: (4 c + the four diagonals at half a texel of the source) / 8. Upsample: (the four
+    axials at one texel of the smaller level + 2 times the four diagonals at half a texel of it)
+    / 12.
 
     Source: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
+
+    Examples
+    --------
+    >>> image = np.full((16, 16, 3), 0.25, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.DualKawase(levels=2))
+    >>> bool(np.allclose(frames["bloom"][..., :3], 0.25, atol=1e-5))
+    True
     """
 
     method: ClassVar[str] = "dual_kawase"
@@ -469,7 +542,7 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     sigma : float
         Standard deviation in taps, above 0.
     radius : int, optional
-        Taps to each side, 0 to 64; by default ceil(3 sigma), at most 64.
+        Number of taps on each side, 0 to 64. Default: ceil(3 sigma), at most 64.
 
     Returns
     -------
@@ -482,7 +555,17 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     ValueError
         `sigma` or `radius` is out of range.
     TypeError
-        `sigma` is no number, or `radius` no integer.
+        `sigma` is not a number, or `radius` not an integer.
+
+    See Also
+    --------
+    Separable : Takes the weights.
+
+    Examples
+    --------
+    >>> weights = vkbloom.gaussian_weights(1.0, radius=2)
+    >>> [round(weight, 4) for weight in weights]
+    [0.4026, 0.2442, 0.0545]
     """
     limit = _core.MAX_WEIGHTS - 1
     deviation = as_float("sigma", sigma)
@@ -493,10 +576,10 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     try:
         radius = operator.index(radius)
     except TypeError:
-        raise TypeError(f"radius: a whole number is needed, not {radius!r}") from None
+        raise TypeError(f"radius: {radius!r} is not an integer") from None
     if not 0 <= radius <= limit:
         raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
-    # Products, because a power beyond all floats would raise OverflowError.
+    # A product becomes infinity where the operator ** would raise OverflowError.
     distances = [tap / deviation for tap in range(radius + 1)]
     weights = [math.exp(-0.5 * distance * distance) for distance in distances]
     total = weights[0] + 2 * sum(weights[1:])
@@ -504,9 +587,9 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
 
 
 def check_settings(settings: Settings | None) -> Settings:
-    """Return the settings, by default `Separable()`; else raise TypeError."""
+    """Return the settings, `Separable()` for None; raise TypeError for anything else."""
     if settings is None:
         return Separable()
     if not isinstance(settings, Settings):
-        raise TypeError(f"settings: Settings are needed, not {settings!r}")
+        raise TypeError(f"settings: {settings!r} is not a Settings")
     return settings

@@ -10,7 +10,7 @@ __all__ = ["installed_version"]
 @functools.cache
 def installed_version() -> str:
     """Return the version of the installed package."""
-    # Late: a sixth of the time of the import is spared whoever does not ask.
+    # Imported here because it takes a sixth of the package's import time.
     from importlib.metadata import version  # noqa: PLC0415
 
     return version("vkbloom")

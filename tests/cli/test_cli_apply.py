@@ -286,8 +286,8 @@ class TestColours:
         result = run(path, tmp_path / "b.exr")
         assert result.exit_code == 0
         assert result.stderr == (
-            f"vkbloom: note: {path} holds NaN 3 times and infinity 1 times: 0 in the bloom, kept "
-            "at their own pixels\n"
+            f"vkbloom: note: {path} has 3 NaN and 1 infinite values; the bloom counts them as 0, "
+            "and their own pixels keep them\n"
         )
         written = pixels(tmp_path / "b.exr")
         assert np.isnan(written[0, 0]).all()
@@ -295,7 +295,7 @@ class TestColours:
         assert np.isfinite(written).sum() == image.size - 4
         result = run(path, tmp_path / "b.png")
         assert result.exit_code == 0
-        assert "b.png holds integers: NaN is written as 0, infinity as 1" in result.stderr
+        assert "b.png has integers: NaN is written as 0, infinity as 1" in result.stderr
         assert (pixels(tmp_path / "b.png")[0, 0] == 0).all()
 
     def test_nan_of_grey_counts_once(self, tmp_path: Path) -> None:
@@ -303,14 +303,14 @@ class TestColours:
         image = light(20, 30, 3)
         image[0, 0] = np.nan
         save(Picture(**{**vars(Picture.of_values(image, "float")), "grey": True}), path)
-        assert "NaN 1 times" in run(path, tmp_path / "b.exr").stderr
+        assert "1 NaN" in run(path, tmp_path / "b.exr").stderr
 
     def test_what_is_lost_is_told(self, tmp_path: Path) -> None:
         image = light(20, 30, 4)
         path = stored(tmp_path / "a.exr", image)
         (line,) = run(path, tmp_path / "b.jpg").stderr.splitlines()
         assert line.startswith("vkbloom: note: ")
-        assert line.endswith("b.jpg has no place for the alpha, which is not 1 everywhere")
+        assert line.endswith("b.jpg cannot hold alpha, which is not 1 everywhere")
 
 
 class TestAttachments:
@@ -352,15 +352,15 @@ class TestErrors:
             ("no.png b.png", 1, "no.png: No such file or directory"),
             (". b.png", 2, "images cannot go into the one file b.png; name a folder or a pattern"),
             ("f.%04d.exr b.png", 1, "f.%04d.exr: no image is there"),
-            ("bad.png b.png", 1, "bad.png: not an image that can be read"),
-            ("bad.exr b.png", 1, "bad.exr: not an image that can be read"),
+            ("bad.png b.png", 1, "bad.png: is not a readable image"),
+            ("bad.exr b.png", 1, "bad.exr: is not a readable image"),
             ("cut.exr b.png", 1, "cut.exr: damaged"),
-            ("xyz.exr b.png", 1, "xyz.exr: the channels are X, Y, Z; R, G, B or one"),
+            ("xyz.exr b.png", 1, "xyz.exr: the channels X, Y, Z are not R, G, B or a single one"),
             ("a.exr none/b.png", 1, "none/b.png: No such file or directory"),
-            ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold such a picture"),
-            ("a.exr b.png --subimage 1", 1, "a.exr: there is no part 1, only 0 to 0"),
-            ("a.exr b.unknown", 2, "no image format for the extension '.unknown'"),
-            ("a.exr b", 2, "no image format for the extension ''"),
+            ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold this picture"),
+            ("a.exr b.png --subimage 1", 1, "a.exr: subimage 1 is not in 0..0"),
+            ("a.exr b.unknown", 2, "'.unknown' is not the extension of a writable"),
+            ("a.exr b", 2, "'' is not the extension of a writable"),
             ("a.exr", 2, "Missing argument 'OUT'"),
             ("a.exr b.png c.png", 2, "2 images cannot go into the one file c.png"),
             (
@@ -376,9 +376,9 @@ class TestErrors:
             ("a.exr b.png --attachments glare", 2, "attachments: there is no 'glare' here"),
             ("a.exr b.png --input-colour red", 2, "--input-colour: colour: 'red' is not linear"),
             ("a.exr b.png --subimage -1", 2, "--subimage"),
-            ("a.exr b.png --raw", 2, "--raw is for files of 8-bit integers; a.exr holds float"),
-            ("a.exr b.png --raw --input-colour srgb", 2, "--raw leaves colours as they are"),
-            ("a.exr b.png --encoding srgb --output-colour srgb", 2, "--output-colour does not go"),
+            ("a.exr b.png --raw", 2, "a.exr is not a file of 8-bit integers but of float"),
+            ("a.exr b.png --raw --input-colour srgb", 2, "--raw does not convert colours"),
+            ("a.exr b.png --encoding srgb --output-colour srgb", 2, "already encodes the output"),
             ("a.exr b.png --attachments bloom --no-bloom", 2, "attachments"),
         ],
     )
@@ -474,7 +474,7 @@ def test_the_help_tells_of_colours() -> None:
         "Integers are encoded to sRGB and clipped to 0..1",
         "floats (as in OpenEXR and Radiance HDR) are written linear",
         "Alpha is kept",
-        "OUT is replaced when it is complete",
+        "OUT is replaced only when the new file is complete",
     ):
         assert sentence in text
 

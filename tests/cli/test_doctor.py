@@ -100,7 +100,7 @@ def test_no_driver(without_variables: None, variable: str, tmp_path: Path) -> No
     assert by_topic(findings, "Vulkan loader").status == "ok"
     manifest = by_topic(findings, "driver absent.json")
     assert manifest.status == "problem"
-    assert f"{absent}, of {variable}, cannot be read: No such file" in manifest.found
+    assert f"{absent}, from {variable}, cannot be read: No such file" in manifest.found
     assert by_topic(findings, "adapters").status == "problem"
     assert f"{variable}={absent}" in by_topic(findings, "environment").found
     assert "test render" not in {finding.topic for finding in findings}
@@ -111,7 +111,7 @@ def test_no_driver_in_words(without_variables: None, tmp_path: Path) -> None:
     absent = str(tmp_path / "absent.json")
     ended = python("-m", "vkbloom.cli", "doctor", VK_DRIVER_FILES=absent)
     assert (ended.returncode, ended.stderr) == (1, "")
-    assert ended.stdout.endswith("\nNothing can render here. Problems found: 2.\n")
+    assert ended.stdout.endswith("\nThis machine cannot render. Problems found: 2.\n")
 
 
 @linux_only
@@ -121,7 +121,7 @@ def test_broken_manifests(without_variables: None, tmp_path: Path) -> None:
     missing.write_text(json.dumps({"ICD": {"library_path": str(tmp_path / "none.so")}}))
     status, _, findings = examined(VK_DRIVER_FILES=f"{damaged}:{missing}")
     assert status == 1
-    assert f"{damaged} is damaged: no JSON in line 1" in (
+    assert f"{damaged} is damaged: line 1 is not JSON" in (
         by_topic(findings, "driver damaged.json").found
     )
     assert f"{tmp_path / 'none.so'}: cannot open shared object file" in (
@@ -129,7 +129,7 @@ def test_broken_manifests(without_variables: None, tmp_path: Path) -> None:
     )
     adapters = by_topic(findings, "adapters")
     assert "the loader says: " in adapters.found
-    assert adapters.advice == "See to the problems above first."
+    assert adapters.advice == "Solve the problems above first."
 
 
 @linux_only
@@ -244,14 +244,14 @@ def test_wrong_pictures_are_no_rendering(monkeypatch: pytest.MonkeyPatch) -> Non
     def tampered(*question: str, **options: Any) -> child.Answer:
         answer = ask(*question, **options)
         if question[0] == "render" and answer.value is not None:
-            return child.Answer({**answer.value, "differences": ["bloom is up to 9 off"]})
+            return child.Answer({**answer.value, "differences": ["bloom differs by up to 9"]})
         return answer
 
     monkeypatch.setattr(child, "ask", tampered)
     report = doctor.examine()
     assert not report.can_render
     render = by_topic(report.findings, "test render")
-    assert (render.status, "bloom is up to 9 off" in render.found) == ("problem", True)
+    assert (render.status, "bloom differs by up to 9" in render.found) == ("problem", True)
 
 
 # Manifests
@@ -261,10 +261,10 @@ def test_wrong_pictures_are_no_rendering(monkeypatch: pytest.MonkeyPatch) -> Non
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        (b"", "no JSON in line 1"),
-        (b'{"ICD":\n{]', "no JSON in line 2"),
+        (b"", "line 1 is not JSON"),
+        (b'{"ICD":\n{]', "line 2 is not JSON"),
         (b"[" * 100_000, "nested too deeply"),
-        (b"\xff\xfe\xff", "it is no text"),
+        (b"\xff\xfe\xff", "it is not text"),
         (b"[]", 'it has no object "ICD"'),
         (b'{"ICD": 1}', 'it has no object "ICD"'),
         (b'{"ICD": {}}', 'its "ICD" has no "library_path"'),
@@ -384,7 +384,7 @@ def test_a_driver_that_crashes_is_reported(monkeypatch: pytest.MonkeyPatch) -> N
     crash = "import os; os.kill(os.getpid(), 11)"
     monkeypatch.setattr(child, "_OPEN_DRIVER", crash)
     assert child.why_driver_does_not_open("any.so") == (
-        "the process that tried it was ended by signal 11 (SIGSEGV)"
+        "the probe process was ended by signal 11 (SIGSEGV)"
     )
 
 
@@ -398,7 +398,7 @@ def test_a_driver_that_never_returns_is_reported(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     ("executable", "failure"),
     [
-        ("", "this Python does not know its own executable"),
+        ("", "sys.executable is empty"),
         ("{tmp}/absent", "{tmp}/absent does not start: No such file"),
         ("/bin/true", "ended without an answer"),
         ("/bin/false", "exit 1"),
@@ -440,7 +440,7 @@ def test_a_wrong_framebuffer_is_found(frames: vkbloom.Frames, name: str) -> None
     arrays[name][5, 7] = np.where(arrays[name][5, 7] > 0.5, 0, 1) * (1 if name == "depth" else 99)
     tampered = vkbloom.Frames(arrays, timings={}, settings=frames.settings, info={})
     found = trial.differences(tampered)
-    assert any(sentence.startswith(f"{name} is up to ") for sentence in found)
+    assert any(sentence.startswith(f"{name} differs by up to ") for sentence in found)
 
 
 def test_a_mirrored_picture_is_found(frames: vkbloom.Frames) -> None:
@@ -472,10 +472,10 @@ def test_the_cache_of_a_render_is_whole(monkeypatch: pytest.MonkeyPatch, tmp_pat
         trial.render(renderer)
     (file,) = tmp_path.iterdir()
     uuid = file.stem.removeprefix("pipelines-")
-    here = f"{file.name} ({file.stat().st_size} bytes, whole, of a driver that is "
+    here = f"{file.name} ({file.stat().st_size} bytes, intact, of "
     finding = installation.cache([uuid])
-    assert (finding.status, f"{here}here)" in finding.found) == ("ok", True)
-    assert f"{here}not here)" in installation.cache([]).found
+    assert (finding.status, f"{here}an installed driver)" in finding.found) == ("ok", True)
+    assert f"{here}a driver that is not installed)" in installation.cache([]).found
 
 
 def test_a_damaged_cache_is_noted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -488,7 +488,7 @@ def test_a_damaged_cache_is_noted(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     finding = installation.cache([])
     assert finding.status == "note"
     assert f"{file.name} is damaged" in finding.found
-    assert "pipelines-of-mine.bin is not of vkbloom" in finding.found
+    assert "pipelines-of-mine.bin is not a file of vkbloom" in finding.found
 
 
 def test_a_cache_file_that_cannot_be_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -514,7 +514,7 @@ def test_a_cache_folder_that_cannot_be(
 def test_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
     finding = installation.cache([])
-    assert finding.found == "off, as VKBLOOM_CACHE_DIR is set to nothing"
+    assert finding.found == "off: VKBLOOM_CACHE_DIR is empty"
 
 
 def test_examining_the_cache_leaves_nothing(
@@ -545,7 +545,7 @@ def test_extras_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(metadata, "version", without_openimageio)
     finding = by_topic(installation.extras(), "extra images")
     assert finding.status == "note"
-    assert finding.found.startswith("missing: OpenImageIO; for ")
+    assert finding.found.startswith("missing: OpenImageIO; needed for ")
     assert "pip install vkbloom[images]" in finding.advice
 
 

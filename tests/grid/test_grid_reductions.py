@@ -109,5 +109,5 @@ class TestComparing:
     def test_references_of_other_kinds(self) -> None:
         with pytest.raises(TypeError, match="against"):
             reductions.SSIM(against=1.0)  # type: ignore[arg-type]
-        with pytest.raises(TypeError, match="grid only"):
+        with pytest.raises(TypeError, match="only a grid"):
             reductions.SSIM(against={"blur_scale": 1})(frames(final=noise(9, 9, 3, dtype="uint8")))

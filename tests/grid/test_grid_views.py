@@ -78,10 +78,10 @@ class TestContactSheet:
         ("arguments", "told"),
         [
             ({"rows": "knee"}, "rows: 'knee'"),
-            ({"rows": "tonemap", "columns": "tonemap"}, "across already"),
+            ({"rows": "tonemap", "columns": "tonemap"}, "is already the horizontal axis"),
             ({"attachment": "glow"}, "attachment: 'glow'"),
             ({"at": {"knee": 0}}, "at: 'knee'"),
-            ({"at": {"intensity": 0}}, "that are shown"),
+            ({"at": {"intensity": 0}}, "is a shown axis"),
             ({"at": {"tonemap": "agx"}}, "has no value 'agx'"),
             ({"width": 1}, "width"),
             ({"most": 0}, "most"),
@@ -185,7 +185,7 @@ class TestResponseCurves:
         ("arguments", "told"),
         [
             ({"axis": "knee"}, "axis: 'knee'"),
-            ({"axis": "tonemap", "lines": "tonemap"}, "across already"),
+            ({"axis": "tonemap", "lines": "tonemap"}, "is already the horizontal axis"),
             ({"variables": ["glow"]}, "variables: 'glow'"),
         ],
     )

@@ -251,7 +251,7 @@ class TestRead:
     def test_luminance_chroma_is_refused(self, tmp_path: Path) -> None:
         channels = {name: RNG.random((4, 4)).astype(np.float16) for name in ("Y", "RY", "BY")}
         path = store_exr(tmp_path / "a.exr", **channels)
-        with pytest.raises(ValueError, match=r"a\.exr: the channels are Y, BY, RY; R, G, B or"):
+        with pytest.raises(ValueError, match=r"a\.exr: the channels Y, BY, RY are not R, G, B or"):
             vkbloom.read(path)
 
     def test_damage_names_the_file(self, tmp_path: Path) -> None:
@@ -362,7 +362,7 @@ class TestWrite:
                 vkbloom.write(tmp_path / "b.exr", levels(4, 5, 3, dtype=dtype))
         with pytest.raises(ValueError, match="jpeg cannot hold uint16"):
             vkbloom.write(tmp_path / "b.jpg", levels(4, 5, 3, dtype="uint16"))
-        with pytest.raises(ValueError, match="no image format for the extension"):
+        with pytest.raises(ValueError, match="is not the extension of a writable image format"):
             vkbloom.write(tmp_path / "b.unknown", rgba)
         assert [*tmp_path.iterdir()] == []
 

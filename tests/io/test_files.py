@@ -241,7 +241,7 @@ class TestFiles:
 
     def test_no_name(self, frames: Frames, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.chdir(tmp_path)
-        with pytest.raises(ValueError, match=r"^path: .* is needed, not ''"):
+        with pytest.raises(ValueError, match=r"^path: '' is not the name of a file"):
             frames.save("")
         assert names_in(tmp_path) == []
         frames.save(".")
@@ -368,7 +368,7 @@ class TestWriteErrors:
         assert names_in(tmp_path) == []
         monkeypatch.setattr(Path, "replace", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            safe_writing.write_whole(tmp_path / "a.png", b"bytes")
+            safe_writing.write_file(tmp_path / "a.png", b"bytes")
         assert names_in(tmp_path) == []
 
     @pytest.mark.parametrize("name", ["a.png", "a.txt"])
@@ -376,11 +376,11 @@ class TestWriteErrors:
         file, old, new = tmp_path / name, b"o" * 300_000, b"n" * 200_000
         code = (
             "from pathlib import Path\n"
-            "from vkbloom.io.safe_writing import write_whole\n"
+            "from vkbloom.io.safe_writing import write_file\n"
             f"file = Path({str(file)!r})\n"
             "while True:\n"
-            "    write_whole(file, b'n' * 200_000)\n"
-            "    write_whole(file, b'o' * 300_000)\n"
+            "    write_file(file, b'n' * 200_000)\n"
+            "    write_file(file, b'o' * 300_000)\n"
         )
         for _ in range(5):
             with subprocess.Popen([sys.executable, "-c", code]) as child:
@@ -412,10 +412,10 @@ class TestWriteErrors:
 
     def test_disk_is_full_of_bytes(self, tmp_path: Path) -> None:
         file = tmp_path / "sheet.png"
-        safe_writing.write_whole(file, b"the one before, and longer")
-        safe_writing.write_whole(file, b"the one before")
+        safe_writing.write_file(file, b"the one before, and longer")
+        safe_writing.write_file(file, b"the one before")
         with small_files_only(), pytest.raises(OSError, match=r"sheet\.png") as caught:
-            safe_writing.write_whole(file, bytes(1 << 20))
+            safe_writing.write_file(file, bytes(1 << 20))
         assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
         assert names_in(tmp_path) == [file.name]
         assert file.read_bytes() == b"the one before"

@@ -205,7 +205,7 @@ class TestLoad:
         assert np.array_equal(load(path, 2).pixels, parts[2])
         assert load(path).parts == load(path, 2).parts == ("part 0", "part 1", "part 2")
         for wrong in (3, -1):
-            with pytest.raises(ValueError, match=f"a.exr: there is no part {wrong}, only 0 to 2"):
+            with pytest.raises(ValueError, match=f"a.exr: subimage {wrong} is not in 0..2"):
                 load(path, wrong)
 
     @pytest.mark.parametrize("name", ["no.png", "no.exr", "no/a.png"])
@@ -244,12 +244,12 @@ class TestLoad:
         for width, height in ((100_000, 1), (20_000, 20_000)):
             fields = {"full_width": width, "full_height": height}
             store(path, noise(1, 2, 3, numbers="half"), "half", **fields)
-            with pytest.raises(ValueError, match=f"a.exr: {width} x {height} pixels are too many"):
+            with pytest.raises(ValueError, match=f"a.exr: {width} x {height} is larger than"):
                 load(path)
 
     def test_numbers_of_other_types(self, tmp_path: Path) -> None:
         path = store(tmp_path / "a.tif", np.zeros((2, 2, 3), np.int16), "int16")
-        with pytest.raises(ValueError, match=r"a\.tif: holds numbers of int16"):
+        with pytest.raises(ValueError, match=r"a\.tif: numbers of int16 are not supported"):
             load(path)
 
     @pytest.mark.parametrize("folder", ["", "caf\udce9/"], ids=["file", "folder"])
@@ -259,7 +259,7 @@ class TestLoad:
         other.parent.mkdir(exist_ok=True)
         other.write_bytes(path.read_bytes())
         for call in (lambda: load(other), lambda: save(decode(load(path)), other)):
-            with pytest.raises(ValueError, match=r"b\\udce9\.png': names .* must be UTF-8"):
+            with pytest.raises(ValueError, match=r"b\\udce9\.png' is not UTF-8"):
                 call()
         assert other.read_bytes() == path.read_bytes()
 
@@ -285,7 +285,7 @@ class TestLoad:
         deep.init(spec)
         assert writer.write_deep_image(deep)
         assert writer.close()
-        with pytest.raises(ValueError, match=r"a\.exr: a flat image is needed"):
+        with pytest.raises(ValueError, match=r"a\.exr: a deep image or a volume is not supported"):
             load(path)
 
     def test_openimageio_missing(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -352,9 +352,9 @@ class TestDecode:
 
     def test_raw_has_conditions(self, tmp_path: Path) -> None:
         wide = load(store(tmp_path / "a.png", noise(2, 2, 3, numbers="uint16"), "uint16"))
-        with pytest.raises(ValueError, match="raw: 8-bit integers are needed, not uint16"):
+        with pytest.raises(ValueError, match="raw: uint16 is not an 8-bit integer type"):
             decode(wide, raw=True)
-        with pytest.raises(ValueError, match="colour: 'linear' has no meaning for raw"):
+        with pytest.raises(ValueError, match="colour: 'linear' cannot be combined with raw"):
             decode(wide, "linear", raw=True)
 
     @pytest.mark.parametrize("names", [("Y",), ("Z",), ("Y", "A"), ("left.Y", "left.A")])
@@ -390,7 +390,7 @@ class TestDecode:
     def test_other_channels_are_refused(self, tmp_path: Path, names: tuple[str, ...]) -> None:
         pixels = noise(3, 4, len(names), numbers="half")
         path = store(tmp_path / "a.exr", pixels, "half", channelnames=names)
-        with pytest.raises(ValueError, match=f"the channels are {', '.join(names)}; R, G, B"):
+        with pytest.raises(ValueError, match=f"the channels {', '.join(names)} are not R, G, B"):
             decode(load(path))
 
 
@@ -493,7 +493,7 @@ class TestSave:
         assert (reread(tmp_path / "b.png")[1] == 128).all()
         assert (reread(tmp_path / "b.exr")[1] == 0.5).all()
         with pytest.raises(
-            ValueError, match=f"colour: 'srgb' needs a linear picture, not {encoding}"
+            ValueError, match=f"colour: 'srgb' needs a linear picture; this one is {encoding}"
         ):
             save(made, tmp_path / "b.png", "srgb")
 
@@ -501,7 +501,7 @@ class TestSave:
         row = np.array([-5, -0.0, 1, 1.001, 1e30, np.nan, np.inf, -np.inf], np.float32)
         pixels = np.repeat(row[None, :, None], 3, axis=2)
         (note,) = save(linear_picture(pixels, "float"), tmp_path / "b.png")
-        assert note.endswith("b.png holds integers: NaN is written as 0, infinity as 1")
+        assert note.endswith("b.png has integers: NaN is written as 0, infinity as 1")
         levels = reread(tmp_path / "b.png")[1][0, :, 0].tolist()
         assert levels == [0, 0, 255, 255, 255, 0, 255, 0]
 
@@ -532,7 +532,7 @@ class TestSave:
         pixels = np.full((8, 8, 4), 0.5, np.float32)
         for name in ("b.jpg", "b.hdr"):
             (note,) = save(linear_picture(pixels, "float"), tmp_path / name)
-            assert note.endswith(f"{name} has no place for the alpha, which is not 1 everywhere")
+            assert note.endswith(f"{name} cannot hold alpha, which is not 1 everywhere")
         pixels[:, :, 3] = 1
         assert save(linear_picture(pixels, "float"), tmp_path / "b.hdr") == ()
 
@@ -541,7 +541,7 @@ class TestSave:
         plain = decode(load(store(tmp_path / "a.png", (pixels * 255).astype("uint8"), "uint8")))
         multiplied = decode(load(store(tmp_path / "a.exr", pixels, "half")))
         (note,) = save(plain, tmp_path / "b.exr")
-        assert note.endswith("take the colours as multiplied by alpha")
+        assert note.endswith("its readers expect colours multiplied by alpha")
         assert save(plain, tmp_path / "b.tif") == save(plain, tmp_path / "b.png") == ()
         assert not load(tmp_path / "b.tif").associated
         assert save(multiplied, tmp_path / "b.exr") == save(multiplied, tmp_path / "b.tif") == ()
@@ -605,7 +605,7 @@ class TestSave:
     def test_extensions_that_cannot_be_written(self, tmp_path: Path, name: str) -> None:
         made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         for write in (lambda: save(made, tmp_path / name), lambda: check_writable(name)):
-            with pytest.raises(ValueError, match="no image format for the extension"):
+            with pytest.raises(ValueError, match="is not the extension of a writable image format"):
                 write()
         assert only_in(tmp_path) == []
         check_writable("b.PNG")
@@ -613,7 +613,7 @@ class TestSave:
     def test_pictures_that_no_format_holds(self, tmp_path: Path) -> None:
         made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         # Of depth only.
-        with pytest.raises(ValueError, match=r"b\.zfile: zfile cannot hold such a picture"):
+        with pytest.raises(ValueError, match=r"b\.zfile: zfile cannot hold this picture"):
             save(made, tmp_path / "b.zfile")
         assert only_in(tmp_path) == []
 

@@ -199,13 +199,13 @@ def test_image(frame_regression):
     @pytest.mark.parametrize(
         ("image", "message"),
         [
-            ("np.zeros((3, 4, 3))", "*image: float64 cannot be kept without loss*"),
+            ("np.zeros((3, 4, 3))", "*image: float64 cannot be stored without loss*"),
             ("np.zeros((3, 4, 5), np.float32)", "*image: shape (3, 4, 5) is not*"),
             ("np.full((3, 4, 3), np.nan, np.float32)", "*image has NaN or infinity; allow_nan*"),
             ("{'a/b': np.zeros((3, 4), np.float32)}", "*'a/b' cannot name a framebuffer*"),
             ("{}", "*TypeError: frames: Frames, a mapping*"),
             ("[[1.0]]", "*TypeError: frames: Frames, a mapping*"),
-            ("{'a': [[1.0]]}", "*TypeError: frames: a must be an array, not list*"),
+            ("{'a': [[1.0]]}", "*TypeError: frames: a: list is not a NumPy array*"),
         ],
     )
     def test_what_cannot_be_a_reference(
@@ -286,7 +286,7 @@ class TestAll:
 def test_second_needs_a_name(frame_regression):
     frame_regression.check(frames())
     frame_regression.check(frames(), "own")
-    with pytest.raises(ValueError, match="name: a second check"):
+    with pytest.raises(ValueError, match="name: the test already has a check"):
         frame_regression.check(frames())
     for name in ("", ".hidden", "a/b", "a" * 101):
         with pytest.raises(ValueError, match="name: .* cannot name a reference"):
@@ -620,7 +620,7 @@ def test_again(bloom_renderer):
         run(project, "--bloom-expect-adapter=some gpu").assert_outcomes(passed=1)
         result = run(project, "--bloom-expect-adapter=GeForce")
         result.assert_outcomes(failed=1)
-        result.stdout.fnmatch_lines(["*--bloom-expect-adapter=GeForce: these frames come from*"])
+        result.stdout.fnmatch_lines(["*--bloom-expect-adapter=GeForce: the frames come from*"])
 
     def test_images_need_no_vulkan(
         self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch

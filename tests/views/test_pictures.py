@@ -267,7 +267,7 @@ class TestContactSheet:
         [
             ({"columns": 0}, ValueError, "columns: 0 is outside 1 to 32"),
             ({"width": 127}, ValueError, "width: 127 is outside 128 to 4096"),
-            ({"width": 320.0}, TypeError, "width: an int"),
+            ({"width": 320.0}, TypeError, "width: 320.0 is not an integer"),
         ],
     )
     def test_arguments_out_of_range(

@@ -13,10 +13,10 @@ def main() -> None:
     if missing:
         needed = " and ".join(missing)
         sys.exit(f"vkbloom: the command line needs {needed}: pip install vkbloom[cli]")
-    # Late, because it imports what may be missing.
+    # Imported here because it needs the optional packages checked above.
     from vkbloom.cli.program import program  # noqa: PLC0415
 
-    # A file's name may hold what the terminal's encoding has no place for.
+    # File names may hold characters that the terminal's encoding cannot represent.
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
     program()

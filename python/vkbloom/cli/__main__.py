@@ -1,4 +1,4 @@
-"""``python -m vkbloom.cli``, the command line where the installed script is not on the path."""
+"""``python -m vkbloom.cli``: the command line if the installed script is not on the path."""
 
 from vkbloom.cli import main
 

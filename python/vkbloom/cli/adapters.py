@@ -1,4 +1,4 @@
-"""``vkbloom adapters``: what there is to render on."""
+"""``vkbloom adapters``: list the Vulkan adapters that vkbloom can use."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from vkbloom.cli.terminal import show
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a list of objects.")
 def command(as_json: bool) -> None:
-    """List the Vulkan adapters that can render."""
+    """List the Vulkan adapters that vkbloom can use."""
     found = vkbloom.adapters()
     if as_json:
         click.echo(json.dumps([dataclasses.asdict(adapter) for adapter in found], indent=2))
     if not found:
-        raise click.ClickException("there is no Vulkan adapter; vkbloom doctor tells why")
+        raise click.ClickException("no Vulkan adapter was found; run vkbloom doctor for the reason")
     if as_json:
         return
     table = Table(box=box.SIMPLE_HEAD)

@@ -1,4 +1,4 @@
-"""``vkbloom apply``: an image file gets bloom."""
+"""``vkbloom apply``: add bloom to an image file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vkbloom.cli.image_files import (
     read_picture,
     subimage_option,
 )
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.io import image_writing
@@ -55,20 +55,21 @@ from vkbloom.settings import Encoding
     metavar="all|NAME,...",
     default="final",
     show_default=True,
-    help="The framebuffers wanted. final is OUT; each other is written beside it as OUT's name "
-    "with _NAME, its values as they are, and as .exr where OUT's format cannot hold them.",
+    help="The framebuffers to write. final is written to OUT; each other framebuffer is written "
+    "beside it, as OUT's name with _NAME appended, its values not converted. A framebuffer that "
+    "OUT's format cannot hold is written as .exr.",
 )
 @input_colour_option
 @click.option(
     "--output-colour",
     type=click.Choice(COLOURS),
-    help="What the colours in OUT shall be [default linear for floats, srgb for integers]",
+    help="Encoding of the colours in OUT [default linear for floats, srgb for integers]",
 )
 @click.option(
     "--raw",
     is_flag=True,
-    help="Take the values of an 8-bit file as they are, without decoding, through 8-bit buffers, "
-    "and write them so.",
+    help="Do not decode or encode colours: use the values of an 8-bit file unchanged, in 8-bit "
+    "buffers.",
 )
 @subimage_option
 @layer_option
@@ -90,7 +91,7 @@ def command(
     validation: bool,
     settings: vkbloom.Settings,
 ) -> None:
-    """Give the image IN bloom and write it to OUT.
+    """Add bloom to the image IN and write the result to OUT.
 
     The formats are those of OpenImageIO, by extension: OpenEXR, Radiance HDR, PNG, JPEG, TIFF and
     others. IN and OUT may be folders, where names are kept, or printf patterns (f.%04d.exr); IN
@@ -104,7 +105,7 @@ def command(
     sRGB. Files of floats are taken as linear; half stays half, and float stays float.
     --input-colour says otherwise.
 
-    OUT holds the same numbers as IN, or the next best that its format has: a PNG of a float image
+    OUT has the number type of IN, or the closest one that its format has: a PNG of a float image
     has 8 bits. Integers are encoded to sRGB and clipped to 0..1; floats (as in OpenEXR and
     Radiance HDR) are written linear. --output-colour says otherwise. With an --encoding, the
     values are encoded already and written as they come. EXIF, resolution and a JPEG's chroma
@@ -117,23 +118,21 @@ def command(
     is read, or --subimage, and of several layers the one that --layer names; channels other than
     R, G, B and A are left out.
 
-    OUT is replaced when it is complete; nothing is left of one that failed.
+    OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
     """
     if raw and (input_colour or output_colour):
         raise click.UsageError(
-            "--raw leaves colours as they are, so neither --input-colour nor "
-            "--output-colour goes with it"
+            "--raw does not convert colours; leave out --input-colour and --output-colour"
         )
     if settings.encoding != "none" and output_colour:
         raise click.UsageError(
-            f"the encoding {settings.encoding} says what the output's colours are, so "
-            "--output-colour does not go with it"
+            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
         )
     given, out = _arguments(sources, out)
     if out == PIPE and attachments != "final":
         raise click.UsageError("standard output takes final alone, without --attachments")
     work = pairs(given, out)
-    with blaming_the_call():
+    with as_wrong_use():
         for name in {f"image{Path(target).suffix}" for _, target in work}:
             checked = f"image.{pipe_format}" if out == PIPE else name
             image_writing.check_writable(checked)
@@ -198,7 +197,7 @@ def _applied(
     wanted = ["final", *names] if attachments != "all" else []
     # To know whether it is zero, unless it was turned off.
     looked_at = ["bloom"] if wanted and settings.bloom and "bloom" not in names else []
-    with blaming_the_call():
+    with as_wrong_use():
         frames = renderer.apply(
             picture.pixels, settings, attachments=[*wanted, *looked_at] or "all"
         )
@@ -253,7 +252,7 @@ def _written(
 
 
 def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
-    """Write all framebuffers but final, each into a file of its own."""
+    """Write each framebuffer except `final` to its own file."""
     written: list[Path] = []
     for name, array in frames.items():
         if name != "final":
@@ -269,6 +268,6 @@ def _result(
     final: NDArray[Any],
     encoding: Encoding,
 ) -> Picture:
-    """Return the picture with its bloom, encoded or as it came."""
+    """Return the picture with its bloom, with the encoding that its pixels now have."""
     done = picture.encoding if encoding == "none" else encoding
     return dataclasses.replace(picture, pixels=final, encoding=done)

@@ -1,4 +1,4 @@
-"""The axes of a grid and its reductions in words, as the command line and files have them."""
+"""Parse the axes, chunks and reductions of a grid from options and option files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import vkbloom
 from vkbloom import reductions
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import read
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 
 __all__ = ["REDUCTIONS", "axis_values", "chunk_counts", "named_reductions"]
 
@@ -29,7 +29,7 @@ REDUCTIONS: Final[Mapping[str, type[reductions.Reduction]]] = {
 
 _RANGE_PARTS: Final = (3, 4)
 _MOST_DIGITS: Final = 18
-# Of all axes together.
+# Number of values of all axes together.
 _MOST_VALUES: Final = 1_000_000
 
 
@@ -40,17 +40,17 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     ----------
     words : sequence of str
         ``NAME=FIRST:LAST:COUNT`` (evenly spaced, both ends included), the same with ``:log``
-        (evenly spaced ratios), or ``NAME=VALUE,VALUE,...``; with a semicolon between values that
-        hold commas.
+        (logarithmically spaced), or ``NAME=VALUE,VALUE,...``. Values that contain commas are
+        separated by semicolons.
     settings : Settings
-        Whose fields are varied.
+        The settings whose fields are varied.
 
     Raises
     ------
     click.UsageError
-        A word is none of this.
+        A word has another form, or names a field that the settings lack.
     """
-    # Without what belongs to the class: the method is the same at all points.
+    # Fields only, not class variables: all points of the grid have the same method.
     hints = typing.get_type_hints(type(settings))
     types = {field.name: hints[field.name] for field in dataclasses.fields(settings)}
     types["time"] = float
@@ -59,11 +59,9 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
         name, sign, text = word.partition("=")
         name = name.strip().replace("-", "_")
         if not sign or not text:
-            raise click.UsageError(
-                f"--axis {word}: NAME=FIRST:LAST:COUNT or NAME=A,B,... is needed"
-            )
+            raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
         if name not in types:
-            raise click.UsageError(f"--axis {name}: the method {settings.method} has no such field")
+            raise click.UsageError(f"--axis: the method {settings.method} has no field {name!r}")
         room = _MOST_VALUES - sum(map(len, found.values()))
         found[name] = _values(word, text, types[name], room)
     return found
@@ -75,9 +73,9 @@ def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any
         return _range(word, parts, room)
     values = [part for part in text.split(";" if ";" in text else ",") if part]
     if not values:
-        raise click.UsageError(f"--axis {word}: it has no values")
-    # The forms of options, one a value, so that a value is written as its option is.
-    kind = click.BOOL if annotation is bool else fields.form_of(annotation)
+        raise click.UsageError(f"--axis {word}: has no values; give at least one")
+    # The option's own type converts each value, so that axes and options have one syntax.
+    kind = click.BOOL if annotation is bool else fields.option_type(annotation)
     try:
         return [kind.convert(part.strip(), None, None) for part in values]
     except click.BadParameter as error:
@@ -92,23 +90,23 @@ def _range(word: str, parts: Sequence[str], room: int) -> Sequence[float]:
             raise ValueError
     except ValueError:
         raise click.UsageError(
-            f"--axis {word}: not FIRST:LAST:COUNT or FIRST:LAST:COUNT:log"
+            f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=FIRST:LAST:COUNT:log"
         ) from None
     if not 1 <= count <= room:
-        raise click.UsageError(f"--axis {word}: {count} values are out of range, 1 to {room}")
+        raise click.UsageError(f"--axis {word}: count {count} is not in 1..{room}")
     if is_log and not (first > 0 and last > 0):
-        raise click.UsageError(f"--axis {word}: the ends of ratios must be above 0")
+        raise click.UsageError(f"--axis {word}: FIRST and LAST are not both above 0, as :log needs")
     spread = np.geomspace if is_log else np.linspace
     return [float(value) for value in spread(first, last, count)]
 
 
 def chunk_counts(words: Sequence[str]) -> dict[str, int] | None:
-    """Return the points in a chunk by axis of each ``NAME=COUNT``, None without any."""
+    """Parse each ``NAME=COUNT`` into grid points per chunk by axis; None if there are none."""
     found = {}
     for word in words:
         name, _, count = word.partition("=")
         if not count.isdecimal() or len(count) > _MOST_DIGITS:
-            raise click.UsageError(f"--chunk {word}: NAME=COUNT is needed")
+            raise click.UsageError(f"--chunk: {word!r} is not AXIS=COUNT")
         found[name.replace("-", "_")] = int(count)
     return found or None
 
@@ -116,19 +114,19 @@ def chunk_counts(words: Sequence[str]) -> dict[str, int] | None:
 def named_reductions(
     words: Sequence[str], settings: vkbloom.Settings
 ) -> dict[str, reductions.Reduction]:
-    """Return the reduction of each ``[NAME=]KIND[:FRAMEBUFFER][@REFERENCE]``.
+    """Parse each ``[NAME=]KIND[:FRAMEBUFFER][@REFERENCE]`` into a reduction.
 
     Parameters
     ----------
     words : sequence of str
-        REFERENCE is an image file, or a point as ``AXIS=VALUE,...``.
+        REFERENCE is an image file, or a point of the grid as ``AXIS=VALUE,...``.
     settings : Settings
-        Whose fields the axes vary.
+        The settings whose fields the axes vary.
 
     Raises
     ------
     click.UsageError
-        A word is none of this.
+        A word has another form.
     OSError, ValueError
         An image file cannot be read.
     """
@@ -145,7 +143,7 @@ def named_reductions(
         arguments: dict[str, Any] = {"attachment": attachment} if attachment else {}
         is_comparing = issubclass(REDUCTIONS[kind], reductions.Comparing)
         if is_comparing != bool(reference):
-            needed = "needs @REFERENCE" if is_comparing else "has no @REFERENCE"
+            needed = "needs @REFERENCE" if is_comparing else "takes no @REFERENCE"
             raise click.UsageError(f"--reduce {word}: {kind} {needed}")
         if "=" in reference:
             values = axis_values(reference.split(","), settings)
@@ -153,8 +151,10 @@ def named_reductions(
         elif reference:
             stored = read(reference, 0)
             if len(stored.parts) > 1:
-                raise click.UsageError(f"--reduce {word}: {reference} holds several images")
+                raise click.UsageError(
+                    f"--reduce {word}: {reference} has several parts; give a file with one"
+                )
             arguments["against"] = stored.pixels
-        with blaming_the_call():
+        with as_wrong_use():
             found[name if sign else kind] = REDUCTIONS[kind](**arguments)
     return found

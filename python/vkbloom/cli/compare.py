@@ -1,4 +1,4 @@
-"""``vkbloom compare``: how much two image files differ."""
+"""``vkbloom compare``: measure the differences of two image files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rich.console import Console
 from vkbloom.checks import check_number
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import check_part_is_given, note, read, subimage_option
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 from vkbloom.io import image_writing
 from vkbloom.io.images import Picture, StoredImage
 from vkbloom.views.comparison import Comparison, compare, difference
@@ -22,10 +22,10 @@ from vkbloom.views.tolerances import Tolerances, failures
 
 
 def _limit(name: str, text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Make an option of a limit, which is a number or none."""
+    """Make the option of a limit: a number, or none."""
     return click.option(
         f"--{name.replace('_', '-')}",
-        type=fields.form_of(float | None),
+        type=fields.option_type(float | None),
         help=f"{text} [default none]",
     )
 
@@ -38,11 +38,11 @@ def tolerances_of(
     max_flip: float | None = None,
     fail_percent: float | None = None,
 ) -> Tolerances:
-    """Return what the limits of the command line mean; without any, all values must be equal."""
+    """Make `Tolerances` from the command line's limits; without a limit, values must be equal."""
     if max_error is not None:
         check_number("max_error", max_error, 0.0, math.inf)
     if fail_percent is not None:
-        # `max_error` says from which difference on a pixel counts.
+        # With `fail_percent`, `max_error` is the difference above which a pixel counts as failed.
         atol, hard_fail = max_error or 0.0, None
     else:
         atol, hard_fail = 0.0, max_error
@@ -65,36 +65,36 @@ def tolerances_of(
     "--diff",
     metavar="OUT",
     type=click.Path(),
-    help="Write a picture of the absolute differences; those of alpha are white, and what is NaN "
-    "or infinite in one image only is magenta.",
+    help="Write a picture of the absolute differences. Differences in alpha are white; pixels "
+    "that are NaN or infinite in only one image are magenta.",
 )
 @click.option(
     "--diff-scale",
     metavar="X",
     type=click.FLOAT,
-    help="What they are multiplied with [default so that the largest becomes 1]",
+    help="Factor of the differences in that picture [default: makes the largest 1]",
 )
 @click.option(
     "--allow-nan",
     is_flag=True,
-    help="Let NaN, and infinity of one sign, pass where both images have it.",
+    help="Accept NaN, and infinity of the same sign, at pixels where both images have it.",
 )
 @click.option(
     "--data-range",
     metavar="X",
     type=click.FLOAT,
-    help="Of SSIM and PSNR [default 1; of floats what they span together with 0 and 1]",
+    help="Data range for SSIM and PSNR [default 1 for integers; for floats the range of the "
+    "values, 0 and 1]",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @subimage_option
-@_limit("max_error", "Largest difference of a value that is allowed, integers counting as 0 to 1")
-@_limit("min_ssim", "Smallest structural similarity that is allowed, -1 to 1")
-@_limit("min_psnr", "Smallest peak signal-to-noise ratio that is allowed, in dB")
-@_limit("max_flip", "Largest mean FLIP that is allowed, 0 to 1")
+@_limit("max_error", "Largest allowed difference of a value; integers are scaled to 0..1")
+@_limit("min_ssim", "Smallest allowed structural similarity, -1 to 1")
+@_limit("min_psnr", "Smallest allowed peak signal-to-noise ratio, in dB")
+@_limit("max_flip", "Largest allowed mean FLIP, 0 to 1")
 @_limit(
     "fail_percent",
-    "Percentage of pixels that may differ by more than max_error (by anything without one), "
-    "0 to 100",
+    "Percentage of pixels that may differ by more than --max-error (default 0), 0 to 100",
 )
 def command(
     *,
@@ -108,31 +108,31 @@ def command(
     subimage: int,
     **limits: float | None,
 ) -> int:
-    """Compare the image files A, the reference, and B.
+    """Compare the image files A (the reference) and B.
 
-    Prints the largest error with its place and the mean error, the share of pixels that differ,
-    PSNR and SSIM (scikit-image's, over all channels) and the mean FLIP (OpenImageIO's, of the
-    colours alone: of integers, as sRGB, LDR-FLIP; of floats, as linear, HDR-FLIP). Integers
-    count as 0 to 1. Values are compared as they are stored. Of files with several parts, as
-    vkbloom render writes them, --subimage says which one is compared.
+    Prints the largest error and its position, the mean error, the percentage of pixels that
+    differ, PSNR and SSIM (scikit-image, over all channels) and the mean FLIP (OpenImageIO, of the
+    colours without alpha: LDR-FLIP of integers as sRGB, HDR-FLIP of floats as linear). Integers
+    are scaled to 0..1. Stored values are compared without decoding. For files with several parts,
+    as vkbloom render writes them, --subimage chooses the part to compare.
 
-    The exit status is 1 if a limit is exceeded, and without any limit, as of cmp, if a single
-    value differs. It is always 1 for images of different size, number of channels or kind
-    (integers against floats), for NaN and infinity in one of them, and in both at the same place
-    without --allow-nan. A figure that has a limit and cannot be computed, such as SSIM of an
-    image under 7 pixels, fails too.
+    The exit status is 1 if a limit is exceeded. Without a limit it is 1 if any value differs, as
+    with cmp. It is always 1 if the images differ in size, number of channels or type (integers
+    against floats), if one has NaN or infinity where the other has not, and, without --allow-nan,
+    if both have it. It is also 1 if a figure with a limit cannot be computed, such as the SSIM of
+    an image smaller than 7 pixels.
     """
-    with blaming_the_call():
+    with as_wrong_use():
         tolerances = tolerances_of(**limits)
         if diff is not None:
             image_writing.check_writable(diff)
     if diff is None and diff_scale is not None:
-        raise click.UsageError("--diff-scale is for --diff")
+        raise click.UsageError("--diff-scale needs --diff")
     a, b = read(first, subimage), read(second, subimage)
     check_part_is_given(first, a)
     check_part_is_given(second, b)
     # FLIP of a large picture of floats takes half a minute.
-    with blaming_the_call(), Console(stderr=True).status("Comparing"):
+    with as_wrong_use(), Console(stderr=True).status("Comparing"):
         found = compare(
             a.pixels,
             b.pixels,
@@ -144,7 +144,7 @@ def command(
     failed = tuple(reason for _, reason in failures(found, tolerances, tolerances.metrics))
     scale = None
     if diff is not None and found.max_error is None:
-        note(f"{diff} is not written: there are no differences of single values")
+        note(f"{diff} is not written: the images have no values to compare")
     elif diff is not None:
         scale = _write_difference(a, b, diff, diff_scale)
     if as_json:
@@ -158,7 +158,7 @@ def command(
 
 
 def _with_windows(found: Comparison, a: StoredImage, b: StoredImage) -> Comparison:
-    """Add a mismatch where pixels of one size have different places."""
+    """Add a mismatch if images of one size have different data or display windows."""
     windows = [(*image.origin, *image.display) for image in (a, b)]
     if a.pixels.shape[:2] != b.pixels.shape[:2] or windows[0] == windows[1]:
         return found
@@ -172,7 +172,7 @@ def _with_windows(found: Comparison, a: StoredImage, b: StoredImage) -> Comparis
 
 def _write_difference(a: StoredImage, b: StoredImage, path: str, scale: float | None) -> float:
     """Write the difference picture and return its scale."""
-    with blaming_the_call():
+    with as_wrong_use():
         picture, used = difference(a.pixels, b.pixels, scale)
     for text in image_writing.save(Picture.of_values(picture), path):
         note(text)
@@ -186,7 +186,7 @@ def _object(
     failed: tuple[str, ...],
     scale: float | None,
 ) -> dict[str, Any]:
-    """Return what --json prints; JSON has no infinity, so that it becomes None."""
+    """Return the object that --json prints. JSON has no infinity, so it becomes None."""
     figures = {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in dataclasses.asdict(found).items()
@@ -209,7 +209,7 @@ def _lines(
     found: Comparison,
     failed: tuple[str, ...],
 ) -> list[str]:
-    """Return the report for people."""
+    """Return the lines of the text report."""
     height, width = a.pixels.shape[:2]
     lines = [f"{first} and {second}"]
     lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")

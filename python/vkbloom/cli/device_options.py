@@ -21,6 +21,6 @@ def device_options(command: Callable[..., Any]) -> Callable[..., Any]:
     command = click.option(
         "--validation",
         is_flag=True,
-        help="Run with the Khronos validation layer; its first message is a failure.",
+        help="Run with the Khronos validation layer; its first error ends the command.",
     )(command)
     return adapter_option(command)

@@ -1,4 +1,4 @@
-"""``vkbloom doctor``: whether this machine can render, and if not, why."""
+"""``vkbloom doctor``: check whether this machine can render, and explain what prevents it."""
 
 from __future__ import annotations
 
@@ -42,20 +42,20 @@ def _table(findings: tuple[Finding, ...]) -> Table:
 
 def _verdict(report: Report) -> str:
     problems = sum(finding.status == "problem" for finding in report.findings)
-    able = "This machine can render." if report.can_render else "Nothing can render here."
-    return f"{able} Problems found: {problems}."
+    able = "can render" if report.can_render else "cannot render"
+    return f"This machine {able}. Problems found: {problems}."
 
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print one object with all findings.")
 def command(as_json: bool) -> int:
-    """Find out whether this machine can render, and if not, why.
+    """Check whether this machine can render, and explain what prevents it.
 
-    Looks at the Vulkan loader, its drivers and layers, the adapters, the pipeline cache and the
-    optional packages, and makes a small test render whose right result is known. Exit status 1
-    where nothing can render.
+    Examines the Vulkan loader, its drivers and layers, the adapters, the pipeline cache and the
+    optional packages. Renders a small test scene on each adapter and checks the result. The exit
+    status is 1 if no adapter renders it correctly.
     """
-    with Console(stderr=True).status("Looking around"):
+    with Console(stderr=True).status("Examining this machine"):
         report = examine()
     if as_json:
         click.echo(_json(report))

@@ -1,4 +1,4 @@
-"""``vkbloom explore``: the page of `vkbloom.explore`, without a notebook."""
+"""``vkbloom explore``: serve the explorer of `vkbloom.explore` without a notebook."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
 from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
-from vkbloom.cli.program import blaming_the_call, given
+from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.explorer.viewer import Viewer
@@ -32,8 +32,8 @@ _LARGEST_PORT: Final = 65535
     "--port",
     type=click.IntRange(0, _LARGEST_PORT),
     default=0,
-    show_default="any that is free",
-    help="Of 127.0.0.1, to listen on.",
+    show_default="any free port",
+    help="Port of 127.0.0.1 to listen on.",
 )
 @click.option("--open/--no-open", "opens", default=True, help="Whether to open a browser.")
 @click.option(
@@ -41,7 +41,7 @@ _LARGEST_PORT: Final = 65535
     type=SIZE,
     default="1280x720",
     show_default=True,
-    help="A scene's own size and aspect; it is rendered as large as it is shown.",
+    help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @subimage_option
@@ -63,14 +63,16 @@ def command(
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> None:
-    """Look at the bloom of IMAGE, or of a scene, in a browser while its settings change.
+    """Explore the bloom of IMAGE, or of a scene, in a browser with controls for all settings.
 
-    The page is served on 127.0.0.1, to whoever knows its address, until Ctrl-C. Colours of IMAGE
-    are decoded as by vkbloom apply.
+    The page is served on 127.0.0.1 until Ctrl-C, to every program that knows its address. IMAGE
+    is decoded as vkbloom apply decodes it.
     """
     import_extra("tornado", "notebook", "explore")
     if source is not None and (given("base") or given("shading") or given("size")):
-        raise click.UsageError("--scene, --shading and --size do not go with an IMAGE")
+        raise click.UsageError(
+            "--scene, --shading and --size are for a scene; leave them out with an IMAGE"
+        )
     looked_at: vkbloom.Scene | NDArray[Any] = (
         scene() if source is None else read_picture(source, subimage, None, layer=layer).pixels
     )
@@ -79,8 +81,8 @@ def command(
         def new_viewer() -> Viewer:
             return Viewer(looked_at, settings, size=size, shading=shading, renderer=renderer)
 
-        with blaming_the_call():
-            # What is wrong with the arguments is said here, not on the page.
+        with as_wrong_use():
+            # Checks the arguments, so that an error appears here and not on the page.
             new_viewer()
         click.echo(f"Rendering on {renderer.info.summary}")
         with contextlib.suppress(KeyboardInterrupt):
@@ -88,16 +90,16 @@ def command(
 
 
 async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> None:
-    # Needs tornado, whose absence `command` has explained.
+    # Imported here because it needs tornado; `command` has checked that it is installed.
     from vkbloom.explorer.server import Server  # noqa: PLC0415
 
     server = Server(new_viewer, port)
     stopped = asyncio.Event()
-    # Without a handler of its own, Ctrl-C would come between the loop's own steps.
+    # Without a handler, KeyboardInterrupt could be raised inside the event loop's own code.
     with contextlib.suppress(NotImplementedError):
         for number in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(number, stopped.set)
-    click.echo(f"{server.url}\nCtrl-C stops it.")
+    click.echo(f"{server.url}\nPress Ctrl-C to stop.")
     if opens:
         webbrowser.open(server.url)
     try:

@@ -1,4 +1,4 @@
-"""Options made from the fields of dataclasses, so that a new field needs no new option here."""
+"""Generate options from the fields of dataclasses, so that a new field needs no code here."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from vkbloom.views.descriptions import described_parameters
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Any]
 else:
-    # Generic in later versions of click only.
+    # Only later versions of click make it generic.
     _ParamType = click.ParamType
 
 
 class _Word(_ParamType):
-    """A value that is written in one word, such as 256x256."""
+    """The type of an option whose value is one word, such as 256x256."""
 
     def __init__(self, form: str, read: Callable[[str], Any]) -> None:
         self.name = form
         self._read = read
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """Return what stands for the value in the help."""
+        """Return the placeholder of the value in the help."""
         return self.name
 
     def convert(
         self, value: str, param: click.Parameter | None, ctx: click.Context | None
     ) -> object:
-        """Return what the word stands for."""
+        """Parse the word."""
         try:
             return self._read(value)
         except (ValueError, click.BadParameter):
-            self.fail(f"{value!r} is not of the form {self.name}", param, ctx)
+            self.fail(f"{value!r} is not {self.name}", param, ctx)
 
 
 def _read_size(word: str) -> tuple[int, int]:
@@ -58,7 +58,7 @@ def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
 #: The type of an option for (width, height).
 SIZE: Final = _Word("WxH", _read_size)
 
-_FORMS: Final[Mapping[object, _ParamType]] = {
+_OPTION_TYPES: Final[Mapping[object, _ParamType]] = {
     float: click.FLOAT,
     int: click.INT,
     tuple[int, int]: SIZE,
@@ -68,34 +68,34 @@ _FORMS: Final[Mapping[object, _ParamType]] = {
 }
 
 
-def form_of(annotation: object) -> _ParamType:
-    """Return the type of option that an annotation asks for.
+def option_type(annotation: object) -> _ParamType:
+    """Return the option type of a field's annotation.
 
     Raises
     ------
     TypeError
-        There is none yet.
+        The annotation has no option type.
     """
     if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
         (inner,) = (part for part in typing.get_args(annotation) if part is not types.NoneType)
-        return _or_none(form_of(inner))
+        return _or_none(option_type(inner))
     if typing.get_origin(annotation) is Literal:
         return click.Choice(typing.get_args(annotation))
-    if annotation not in _FORMS:
-        raise TypeError(f"there is no form of option for {annotation!r}")
-    return _FORMS[annotation]
+    if annotation not in _OPTION_TYPES:
+        raise TypeError(f"annotation: {annotation!r} has no option type; add one to _OPTION_TYPES")
+    return _OPTION_TYPES[annotation]
 
 
-def _or_none(form: _ParamType) -> _Word:
+def _or_none(kind: _ParamType) -> _Word:
     def read(word: str) -> object:
-        return None if word.lower() == "none" else form.convert(word, None, None)
+        return None if word.lower() == "none" else kind.convert(word, None, None)
 
-    choices = form.choices if isinstance(form, click.Choice) else [form.name]
+    choices = kind.choices if isinstance(kind, click.Choice) else [kind.name]
     return _Word("|".join([*choices, "none"]), read)
 
 
 def _spelled(value: object, separator: str = ",") -> str:
-    """Spell a default as it would be given as an option."""
+    """Write a default value in the syntax of its option."""
     match value:
         case bool():
             return "on" if value else "off"
@@ -113,7 +113,7 @@ class _Dataclass(Protocol):
 
 @dataclasses.dataclass
 class _Field:
-    """A field that becomes an option."""
+    """A field for which an option is made: its annotation and help texts."""
 
     annotation: Any
     helps: list[str]
@@ -123,7 +123,7 @@ class _Field:
 def _collect(
     kinds: Mapping[str, type[_Dataclass]], base: type[_Dataclass] | None
 ) -> dict[str, _Field]:
-    """Return the fields of some dataclasses by name, without those of their base."""
+    """Return the fields of several dataclasses by name, except those of their base."""
     inherited = {field.name for field in dataclasses.fields(base)} if base else set()
     found: dict[str, _Field] = {}
     for label, kind in kinds.items():
@@ -153,25 +153,25 @@ def options(
     base: type[_Dataclass] | None = None,
     prefix: str = "",
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that adds an option to a command for each field of some dataclasses.
+    """Return a decorator that adds an option to a command for each field of the dataclasses.
 
     Parameters
     ----------
     kinds : mapping of str to type
-        Dataclasses, by what the help calls them; "" for nothing. A field that several have becomes
-        one option, whose help has each one's text.
+        Dataclasses by their label in the help; "" for no label. A field that several dataclasses
+        have becomes one option, and its help has the text of each.
     into : str
-        The command's keyword argument that gets those given by the user: a dict of field name to
-        value.
+        The command's keyword argument that receives the options given by the user: a dict of
+        field name to value.
     base : type, optional
-        A dataclass whose fields are left out.
+        A dataclass whose fields get no options.
     prefix : str
-        Of the options' names, as in "camera-".
+        Prefix of the options' names, as in "camera-".
 
     Raises
     ------
     TypeError
-        A field's type has no form of option, or fields of one name differ in type.
+        A field's annotation has no option type, or fields of the same name differ in type.
     """
     fields = _collect(kinds, base)
     parameters = {
@@ -192,7 +192,7 @@ def options(
                 f"--{option}/--no-{option}" if is_flag else f"--{option}",
                 parameters[name],
                 default=None,
-                type=None if is_flag else form_of(field.annotation),
+                type=None if is_flag else option_type(field.annotation),
                 help=" ".join(field.helps),
             )(run)
         return run

@@ -1,4 +1,4 @@
-"""``vkbloom grid``: every combination of some values, into a Zarr store or image files."""
+"""``vkbloom grid``: render all combinations of axis values to a Zarr store or image files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from vkbloom.cli.image_files import (
     subimage_option,
 )
 from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.grid.image_files import FileForm, GridFiles
@@ -54,25 +54,29 @@ _STORE: Final = ".zarr"
     "--out",
     required=True,
     type=click.Path(),
-    help="NAME.zarr: a Zarr store, as is a URL that fsspec knows. Else a folder of image files.",
+    help="NAME.zarr or a URL that fsspec supports: a Zarr store. Anything else: a folder of image "
+    "files.",
 )
 @click.option(
     "--axis",
     "axis_words",
     metavar="NAME=VALUES",
     multiple=True,
-    help="A settings field or time, and its values: FIRST:LAST:COUNT, FIRST:LAST:COUNT:log, or "
-    "A,B,... (A;B;... where values hold commas). Several make a grid, dimensions in this order.",
+    help="A settings field, or time, and its values: FIRST:LAST:COUNT, FIRST:LAST:COUNT:log, or "
+    "A,B,... (A;B;... if values contain commas). Repeat it for more axes; the dimensions have the "
+    "order of the options.",
 )
 @click.option(
     FILE_OPTION,
     "options_file",
     metavar="FILE",
-    help="A TOML or YAML file with options: their long names; tables settings, camera, axes, "
-    "reduce and chunks; the list images. Options given here come on top of it.",
+    help="A TOML or YAML file with options by their long names; tables settings, camera, axes, "
+    "reduce and chunks; the list images. Options on the command line override it.",
 )
-@click.option("--size", type=SIZE, help="Of a scene's frames, in pixels [default 1280x720]")
-@click.option("--time", default=0.0, show_default=True, help="Of a scene's animation, in turns.")
+@click.option("--size", type=SIZE, help="Size of a scene's frames, in pixels [default 1280x720]")
+@click.option(
+    "--time", default=0.0, show_default=True, help="Time of a scene's animation; its period is 1."
+)
 @click.option("--shading", type=click.Choice(_SHADINGS), default=_SHADINGS[0], show_default=True)
 @click.option(
     "--attachments",
@@ -86,15 +90,16 @@ _STORE: Final = ".zarr"
     "reduce_words",
     metavar="[NAME=]KIND[:FRAMEBUFFER][@REFERENCE]",
     multiple=True,
-    help=f"A figure to keep: {', '.join(axis_options.REDUCTIONS)}. REFERENCE of the last three is "
-    "an image file or a point of the grid, AXIS=VALUE,...",
+    help=f"A figure to compute: {', '.join(axis_options.REDUCTIONS)}. The last three need a "
+    "REFERENCE: an image file, or a point of the grid as AXIS=VALUE,...",
 )
 @click.option(
     "--chunk",
     "chunk_words",
     metavar="AXIS=COUNT",
     multiple=True,
-    help="Points in a chunk of the store [default about 1 MiB along the fastest axes]",
+    help="Grid points per chunk of the store [default: chunks of about 1 MiB along the axes that "
+    "vary fastest]",
 )
 @click.option(
     "--image-format",
@@ -102,22 +107,26 @@ _STORE: Final = ".zarr"
     metavar="EXTENSION",
     default="png",
     show_default=True,
-    help="Of image files: png, exr, tif, ...",
+    help="Format of image files: png, exr, tif, ...",
 )
-@click.option("--resume", is_flag=True, help="Go on with what is there, and mend what is damaged.")
+@click.option(
+    "--resume", is_flag=True, help="Continue an interrupted grid, and render damaged points again."
+)
 @click.option(
     "--workers",
     metavar="N",
     type=click.IntRange(min=1),
-    help="Render in that many processes, through Dask.",
+    help="Render in N processes, through Dask.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Render on the cluster of a Dask scheduler.")
-@click.option("--sheet", metavar="FILE", type=click.Path(), help="Write a contact sheet (PNG) too.")
+@click.option(
+    "--sheet", metavar="FILE", type=click.Path(), help="Also write a contact sheet (PNG)."
+)
 @click.option(
     "--curves",
     metavar="FILE",
     type=click.Path(),
-    help="Draw the figures along the axes too: a PNG, SVG or PDF.",
+    help="Also plot the figures along the axes: a PNG, SVG or PDF.",
 )
 @input_colour_option
 @click.option("--raw", is_flag=True, help="Take the values of 8-bit files as they are.")
@@ -153,21 +162,21 @@ def command(
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> None:
-    """Render every combination of some values.
+    """Render all combinations of the axes' values.
 
-    The source is a scene, or each IMAGE, which are read as vkbloom apply reads them. Points are
-    rendered in the order that runs the fewest passes. A store can be opened while it is written;
-    what is killed goes on with --resume, and ends the same.
+    The source is a scene, or each IMAGE, read as vkbloom apply reads it. The points of the grid
+    are rendered in the order that runs the fewest passes. A store can be opened while it is
+    written. --resume continues a grid that was killed, and gives the same result.
     """
     is_store = out.endswith(_STORE) or "://" in out
     _check_combination(workers, scheduler, is_store, bool(reduce_words or chunk_words))
     if not is_store:
         if sheet or curves:
-            raise click.UsageError(f"--sheet and --curves are for a store, NAME{_STORE}")
-        with blaming_the_call():
+            raise click.UsageError(f"--sheet and --curves need a store; use --out NAME{_STORE}")
+        with as_wrong_use():
             image_writing.check_writable(f"image.{suffix.lstrip('.')}")
     if sheet and attachments == "none":
-        raise click.UsageError("--sheet shows framebuffers, and --attachments none keeps none")
+        raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
     _check_drawing("--sheet", sheet, (".png",))
     _check_drawing("--curves", curves, (".png", ".svg", ".pdf"))
     axes = axis_options.axis_values(axis_words, settings)
@@ -183,7 +192,7 @@ def command(
         "attachments": _names(attachments),
         "reduce": reduce,
     }
-    with blaming_the_call():
+    with as_wrong_use():
         grid = ask(source, settings, axes, **shared)
     if curves and max(grid.shape, default=1) < 2:
         raise click.UsageError("--curves needs an --axis of more than one value")
@@ -215,12 +224,12 @@ def command(
             ran, saved = tally.ran, tally.saved
     click.echo(f"wrote {out}, {math.prod(grid.shape)} points; passes run {ran}, saved {saved}")
     if sheet:
-        safe_writing.write_whole(Path(sheet), vkbloom.contact_sheet(dataset))
+        safe_writing.write_file(Path(sheet), vkbloom.contact_sheet(dataset))
         click.echo(f"wrote {sheet}")
     if curves:
         drawn = io.BytesIO()
         vkbloom.response_curves(dataset).savefig(drawn, format=Path(curves).suffix[1:].lower())
-        safe_writing.write_whole(Path(curves), drawn.getvalue())
+        safe_writing.write_file(Path(curves), drawn.getvalue())
         click.echo(f"wrote {curves}")
 
 
@@ -229,18 +238,18 @@ def _check_combination(
 ) -> None:
     """Raise click.UsageError for options that do not go together."""
     if workers and scheduler:
-        raise click.UsageError("--workers makes a cluster, --scheduler names one; give one of them")
+        raise click.UsageError("--workers and --scheduler exclude each other; give one of them")
     if needs_store and not is_store:
-        raise click.UsageError(f"--reduce and --chunk are for a store, NAME{_STORE}")
+        raise click.UsageError(f"--reduce and --chunk need a store; use --out NAME{_STORE}")
 
 
 def _check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:
-    """Find out before a long grid what would be in the way of a drawing of it."""
+    """Check before a long grid that the drawing can be written."""
     if file is None:
         return
     path = Path(file)
     if path.suffix.lower() not in suffixes:
-        raise click.UsageError(f"{option} {file}: its extension is none of {', '.join(suffixes)}")
+        raise click.UsageError(f"{option}: {file} does not end in {', '.join(suffixes)}")
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), file)
     if not path.absolute().parent.is_dir():
@@ -254,7 +263,7 @@ def _source(
         return scene()
     if len(images) == 1:
         return pictures[0].pixels
-    # By their files' names, or by number where a file is given twice.
+    # Labels are the file names, or numbers if a file is given twice.
     labels = images if len(set(images)) == len(images) else map(str, range(len(images)))
     return {label: picture.pixels for label, picture in zip(labels, pictures, strict=True)}
 
@@ -267,7 +276,7 @@ def _names(attachments: str) -> str | tuple[str, ...]:
 
 @contextmanager
 def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
-    """Give a client of the cluster that was asked for, None without one."""
+    """Yield a client of the requested cluster, or None if none was requested."""
     if not workers and not scheduler:
         yield None
         return
@@ -277,13 +286,13 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
             yield client
         return
     with (
-        _deaf_loop() as loop,
+        _loop_without_interrupts() as loop,
         distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
-            # None would still serve at Dask's own port, and warn where that is taken.
+            # None would still serve a dashboard on Dask's default port, and warn if it is taken.
             dashboard_address="127.0.0.1:0",
-            # What fails comes as an exception; what is cancelled is told as an error.
+            # Failures arrive as exceptions; Dask would also log cancelled tasks as errors.
             silence_logs=logging.CRITICAL,
             loop=loop,
         ) as cluster,
@@ -293,11 +302,11 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
 
 @contextmanager
-def _deaf_loop() -> Iterator[Any]:
-    """Give an event loop whose thread, and all that it starts, gets no SIGINT.
+def _loop_without_interrupts() -> Iterator[Any]:
+    """Yield an event loop whose thread and child processes get no SIGINT.
 
-    A terminal sends Ctrl-C to every process. This one ends the others in order; where they end by
-    themselves, each says how on standard error.
+    A terminal sends Ctrl-C to every process of the group. This process ends the workers in order;
+    workers that get SIGINT themselves each print a traceback.
     """
     loop_of = import_extra("tornado.ioloop", "grid", "--workers")
     started: queue.Queue[Any] = queue.Queue()
@@ -310,9 +319,9 @@ def _deaf_loop() -> Iterator[Any]:
 
         asyncio.run(serve())
 
-    # Else it is started with the first process, and lets SIGINT through for that.
+    # Start it now: starting it with the first worker process would unblock SIGINT there.
     resource_tracker.ensure_running()
-    # A thread, and a process that it starts, blocks what blocked the thread that started it.
+    # Threads and processes inherit the signal mask of the thread that starts them.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         thread = threading.Thread(target=run, name="vkbloom-cluster", daemon=True)

@@ -1,4 +1,4 @@
-"""Image files as arguments: how they are read, and what is said about them."""
+"""Read image files that are given as arguments, and print notes about them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
         type=click.IntRange(min=0),
         default=0,
         show_default=True,
-        help="Which part to read of files that have several.",
+        help="Index of the part to read from a file with several parts.",
     )(command)
 
 
@@ -61,9 +61,11 @@ def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
 
 
 def check_part_is_given(path: str, stored: StoredImage) -> None:
-    """Raise click.UsageError where a file has several parts and nobody said which is meant."""
+    """Raise click.UsageError if a file has several parts and --subimage is not given."""
     if len(stored.parts) > 1 and not given("subimage"):
-        raise click.UsageError(f"{path}: --subimage has to name one of its {_listed(stored)}")
+        raise click.UsageError(
+            f"{path}: has several parts; choose one with --subimage: {_listed(stored)}"
+        )
 
 
 def _listed(stored: StoredImage) -> str:
@@ -72,7 +74,7 @@ def _listed(stored: StoredImage) -> str:
 
 
 def note(text: str) -> None:
-    """Tell the user something that is no failure, on standard error."""
+    """Print a note that is not an error on standard error."""
     click.echo(f"vkbloom: note: {text}", err=True)
 
 
@@ -84,14 +86,14 @@ def read_picture(
     layer: str | None = None,
     raw: bool = False,
 ) -> Picture:
-    """Read an image file as what a renderer takes, and tell what the user may want to know.
+    """Read an image file, decode it for a renderer, and print notes about its contents.
 
     Raises
     ------
     click.UsageError
         `raw` is for 8-bit files, and this is none; there is no such `colour`.
     OSError, ValueError
-        The file cannot be read, or not be given bloom.
+        The file cannot be read, or a renderer cannot take its pixels.
     """
     if colour not in (None, *COLOURS):
         try:
@@ -101,7 +103,8 @@ def read_picture(
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
         raise click.UsageError(
-            f"--raw is for files of 8-bit integers; {source} holds {stored.numbers[0]}"
+            f"--raw: {source} is not a file of 8-bit integers but of {stored.numbers[0]}; leave "
+            "out --raw"
         )
     try:
         picture = image_reading.decode(stored, colour, raw=raw)
@@ -113,8 +116,8 @@ def read_picture(
     infinite = int(np.isinf(picture.values).sum())
     if nan or infinite:
         note(
-            f"{source} holds NaN {nan} times and infinity {infinite} times: 0 in the bloom, kept "
-            "at their own pixels"
+            f"{source} has {nan} NaN and {infinite} infinite values; the bloom counts them as 0, "
+            "and their own pixels keep them"
         )
     for text in picture.notes:
         note(f"{source}: {text}")
@@ -123,19 +126,19 @@ def read_picture(
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Keep the C libraries of image formats from writing to standard error.
+    """Redirect standard error to the null device while the C image libraries run.
 
-    libpng does so of damaged files, and not through OpenImageIO.
+    For damaged files, libpng prints messages itself instead of passing them to OpenImageIO.
     """
     if sys.stderr is None:
-        # It was closed before this process began: the descriptor is of something else, or of none.
+        # Closed before this process began: descriptor 2 may belong to another file.
         yield
         return
     sys.stderr.flush()
     try:
         kept = os.dup(_STANDARD_ERROR)
     except OSError:
-        # There is no standard error that could be written to.
+        # Descriptor 2 is closed, so nothing can be printed.
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)

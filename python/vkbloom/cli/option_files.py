@@ -1,4 +1,4 @@
-"""Commands whose options may stand in a TOML or YAML file."""
+"""Commands that also take their options from a TOML or YAML file."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ __all__ = ["FILE_OPTION", "CommandWithFile"]
 
 FILE_OPTION: Final = "--from"
 
-# Tables of options and what they stand for: their names are those of options as well, or of axes.
+# Tables whose keys are options, and tables whose keys are the names in a repeated option.
 _PLAIN_TABLES: Final = ("settings", "camera")
 _NAMED_TABLES: Final = {"axes": "--axis", "reduce": "--reduce", "chunks": "--chunk"}
 _ARGUMENTS: Final = "images"
-# Of a file's values: lists within lists, and letters.
+# Limits of a file's values: nesting of lists, and length when written as options.
 _MOST_DEPTH: Final = 64
 _MOST_LETTERS: Final = 1 << 22
 _MOST_BITS: Final = 64
-_TOO_MUCH: Final = "its values are too many, or hold each other"
-# Written as WIDTHxHEIGHT.
+_TOO_MUCH: Final = "its values are too many, nested too deeply, or contain themselves"
+# Options that are written as WIDTHxHEIGHT.
 _SIZES: Final = ("size", "bloom-size")
 
 
 class CommandWithFile(click.Command):
-    """A command that takes the options in a file before those of the command line.
+    """A command that reads options from a file; options on the command line override them.
 
-    The file's keys are the long options without their dashes, with ``-`` or ``_`` in them. Tables
-    group them: ``settings`` and ``camera`` hold options, ``axes``, ``reduce`` and ``chunks`` those
-    that are given several times, and the list ``images`` the arguments.
+    The file's keys are the long options without the leading dashes, written with ``-`` or ``_``.
+    The tables ``settings`` and ``camera`` contain options; ``axes``, ``reduce`` and ``chunks``
+    contain the values of repeated options; the list ``images`` contains the arguments.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the file, if one is given, and go on with its options."""
+        """Read the file, if one is given, and parse its options before the others."""
         found: list[str] = []
         rest = iter(args)
         for word in rest:
@@ -51,27 +51,27 @@ class CommandWithFile(click.Command):
                 path = value if sign else next(rest, None)
                 if path is None:
                     raise click.UsageError(f"{FILE_OPTION} needs the name of a file", ctx)
-                # Before the others, which so replace them.
+                # The file's options come first, because later options override earlier ones.
                 found = [*_words(_read(Path(path)), path, self._flags()), *found]
         return super().parse_args(ctx, found)
 
     def _flags(self) -> dict[str, bool]:
-        """Return the flags by name, and whether there is another one that turns it off."""
+        """Return the flags by name, and whether each has a ``--no-`` form."""
         flags = (one for one in self.params if isinstance(one, click.Option) and one.is_flag)
         return {name: bool(flag.secondary_opts) for flag in flags for name in flag.opts}
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Return what a file holds.
+    """Read and check an option file.
 
     Raises
     ------
     OSError, ValueError
-        It cannot be read; names the file.
+        The file cannot be read or its content is wrong; the message names the file.
     """
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".yaml", ".yml"):
-        raise ValueError(f"{path}: its extension is none of .toml, .yaml, .yml")
+        raise ValueError(f"{path}: its extension is not .toml, .yaml or .yml")
     content = path.read_bytes()
     try:
         found = _toml(content) if suffix == ".toml" else _yaml(content)
@@ -81,7 +81,7 @@ def _read(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
     if not isinstance(found, dict):
-        raise ValueError(f"{path}: names and values are needed")
+        raise ValueError(f"{path}: its content is not a mapping of option names to values")
     return found
 
 
@@ -101,23 +101,24 @@ def _yaml(content: bytes) -> object:
 
 
 def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, int]:
-    """Return about as many letters as a value takes when it is spelled, and its lists in lists.
+    """Return about how long a value is when it is written as options, and how deeply it nests.
 
-    What a YAML file names several times is there once until then, and is looked at once here.
+    A YAML alias refers to a value without copying it; each value is measured once here, before
+    writing it out could multiply it.
 
     Raises
     ------
     ValueError
-        Either is too much, or a number has too many digits to be spelled.
+        A limit is exceeded, or an integer is too large to be written.
     """
     if isinstance(value, str | bytes):
         return len(value), 0
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:
-        raise ValueError(f"a whole number of over {_MOST_BITS} bits is in it")
+        raise ValueError(f"it contains an integer of more than {_MOST_BITS} bits")
     if not isinstance(value, dict | list | tuple | set):
         return 1, 0
     if id(value) not in known:
-        # What holds itself is met again before it is known.
+        # A value that contains itself finds this entry, whose depth exceeds the limit.
         known[id(value)] = 0, _MOST_DEPTH
         inner = [*value, *value.values()] if isinstance(value, dict) else value
         found = [_check_size(part, known) for part in inner]
@@ -130,7 +131,7 @@ def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, 
 
 
 def _words(content: Mapping[str, Any], path: str, flags: Mapping[str, bool]) -> list[str]:
-    """Return what would stand on the command line."""
+    """Return a file's content as words of a command line."""
     words: list[str] = []
     arguments: list[str] = []
     for key, value in content.items():
@@ -144,10 +145,10 @@ def _words(content: Mapping[str, Any], path: str, flags: Mapping[str, bool]) -> 
         elif key == _ARGUMENTS:
             listed = [value] if isinstance(value, str) else value
             if not isinstance(listed, list):
-                raise ValueError(f"{path}: {key} must be a list")
+                raise ValueError(f"{path}: {key} is not a list")
             arguments += [str(part) for part in listed]
         elif f"--{key}" == FILE_OPTION:
-            raise ValueError(f"{path}: {key} cannot stand in a file")
+            raise ValueError(f"{path}: {key} cannot be used inside a file")
         else:
             words += _option(_named(key, "", path), value, path, flags)
     return [*words, *arguments]
@@ -155,14 +156,14 @@ def _words(content: Mapping[str, Any], path: str, flags: Mapping[str, bool]) -> 
 
 def _table(value: object, key: str, path: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ValueError(f"{path}: {key} must be a table")
+        raise ValueError(f"{path}: {key} is not a table")
     return value
 
 
 def _named(key: object, prefix: str, path: str) -> str:
-    # Others would be taken for a value, or for the end of the options.
+    # Any other name would be parsed as a value, or as the end of the options.
     if not re.fullmatch(r"[\w-]+", str(key)):
-        raise ValueError(f"{path}: {key!r} cannot name an option")
+        raise ValueError(f"{path}: {key!r} is not the name of an option")
     return f"{prefix}{key}"
 
 
@@ -174,13 +175,13 @@ def _option(name: str, value: Any, path: str, flags: Mapping[str, bool]) -> list
     if isinstance(value, bool):
         return [f"--{option}" if value else f"--no-{option}"]
     if is_flag:
-        # What follows a flag is taken for an image.
-        raise ValueError(f"{path}: {name} must be true or false, not {value!r}")
+        # A word after a flag would be parsed as an image.
+        raise ValueError(f"{path}: {name}: {value!r} is not true or false")
     return [f"--{option}", _spelled(value, "x" if option in _SIZES else ",:")]
 
 
 def _values(name: str, value: Any) -> str:
-    """Spell the values of an axis; those that hold commas are parted by semicolons."""
+    """Write the values of an axis; values that contain commas are separated by semicolons."""
     if not isinstance(value, list) or not any(isinstance(part, list) for part in value):
         return _spelled(value, ",")
     inner = "x" if name.replace("_", "-") in _SIZES else ",:"
@@ -188,7 +189,7 @@ def _values(name: str, value: Any) -> str:
 
 
 def _spelled(value: Any, separators: str) -> str:
-    """Spell a value as it would be on the command line, lists in lists with further separators."""
+    """Write a value in the syntax of the command line; each list level has its own separator."""
     if isinstance(value, list):
         return separators[:1].join(_spelled(part, separators[1:]) for part in value)
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""The program: its commands, and how whatever goes wrong becomes one line and an exit status."""
+"""The program: its commands, and the conversion of errors to one line and an exit status."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from click.core import ParameterSource
 
 import vkbloom
 
-#: Each is a module of this package with a click command called `command`.
+#: Names of the modules of this package that have a click command called `command`.
 COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", "doctor")
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
 
 class Program(click.Group):
-    """A group whose commands are imported when they are called, and whose errors are one line.
+    """A group that imports a command when it is called, and prints an error as one line.
 
-    The value that a command returns is the exit status, None being 0.
+    A command's return value is the exit status; None is 0.
     """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -30,7 +30,7 @@ class Program(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a command, None where there is no such command."""
+        """Import and return a command; None if there is no such command."""
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = importlib.import_module(f"vkbloom.cli.{cmd_name}").command
@@ -39,7 +39,7 @@ class Program(click.Group):
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **options: Any
     ) -> NoReturn:
-        """Run the program and exit: 0, 1 where it failed, 2 where it was used wrongly."""
+        """Run the program and exit with 0 (done), 1 (failed) or 2 (wrong use)."""
         options["standalone_mode"] = False
         try:
             status = super().main(args, prog_name, **options)
@@ -51,7 +51,7 @@ class Program(click.Group):
         except click.Abort:
             _exit(1, "interrupted")
         except Exception as error:
-            if _is_of_an_interrupt(error):
+            if _is_from_interrupt(error):
                 _exit(1, "interrupted")
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))
@@ -59,8 +59,8 @@ class Program(click.Group):
         sys.exit(status)
 
 
-def _is_of_an_interrupt(error: BaseException | None) -> bool:
-    """Whether an error came while Ctrl-C was ending something, such as a cluster that starts."""
+def _is_from_interrupt(error: BaseException | None) -> bool:
+    """Return whether Ctrl-C caused an error, as when it ends a cluster that is starting."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return error is not None
@@ -78,8 +78,8 @@ def _exit(status: int, message: str) -> NoReturn:
 
 
 @contextmanager
-def blaming_the_call() -> Iterator[None]:
-    """Turn a TypeError or ValueError of an argument into wrong use, which is exit status 2."""
+def as_wrong_use() -> Iterator[None]:
+    """Convert a TypeError or ValueError of an argument to click.UsageError, exit status 2."""
     try:
         yield
     except (TypeError, ValueError) as error:
@@ -87,17 +87,17 @@ def blaming_the_call() -> Iterator[None]:
 
 
 def given(name: str) -> bool:
-    """Return whether a parameter of the running command is set by the user, not by default."""
+    """Return whether the user set a parameter of the running command."""
     source = click.get_current_context().get_parameter_source(name)
     return source not in (None, ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
 
 
 @click.group(
     cls=Program,
-    # Without a command, an error of one line as for all wrong use, and not the whole help.
+    # A call without a command is wrong use: one line, not the help text.
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.version_option(package_name="vkbloom", message="%(prog)s %(version)s")
 def program() -> None:
-    """Render bloom and look at every framebuffer of it."""
+    """Render bloom and inspect each of its framebuffers."""

@@ -1,4 +1,4 @@
-"""``vkbloom render``: a scene, once or as an animation, into image files."""
+"""``vkbloom render``: render a scene or its animation to image files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.cli.terminal import show
@@ -32,28 +32,28 @@ _SHADINGS: Final = typing.get_args(Shading)
     "--out",
     required=True,
     type=click.Path(),
-    help="The file, or the folder, to write to. NAME.exr: one file with all framebuffers; NAME.png "
-    "and others: a file for each; no extension: a folder of PNG files. What a format cannot hold "
-    "becomes an .exr beside it.",
+    help="The file or folder to write to. NAME.exr: one file with all framebuffers; NAME.png and "
+    "others: a file for each; no extension: a folder of PNG files. A framebuffer that the format "
+    "cannot hold is written as .exr.",
 )
 @click.option(
-    "--size", type=SIZE, default="1280x720", show_default=True, help="Of the frame, in pixels."
+    "--size", type=SIZE, default="1280x720", show_default=True, help="Size of the frame, in pixels."
 )
 @click.option(
-    "--time", default=0.0, show_default=True, help="Of the animation, in turns: 1 is 0 again."
+    "--time", default=0.0, show_default=True, help="Time of the animation; its period is 1."
 )
 @click.option(
     "--frames",
     "count",
     metavar="N",
     type=click.IntRange(min=1),
-    help="Render this many frames of one whole turn, from --time on, into numbered files.",
+    help="Render N frames of one period of the animation, starting at --time, to numbered files.",
 )
 @click.option("--shading", type=click.Choice(_SHADINGS), default=_SHADINGS[0], show_default=True)
 @click.option(
     "--attachments",
     metavar="all|NAME,...",
-    help="The framebuffers wanted [default all, of an animation final]",
+    help="The framebuffers to write [default all; final for an animation]",
 )
 @device_options
 @scene_options
@@ -78,11 +78,11 @@ def command(
     seconds: dict[str, list[float]] = {}
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
         click.echo(f"Rendering on {renderer.info.summary}")
-        # None: shown where standard error is a terminal.
+        # None: tqdm shows the bar if standard error is a terminal.
         disable = True if count is None or sys.stderr is None else None
         turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
         for index in turn:
-            with blaming_the_call():
+            with as_wrong_use():
                 frames = renderer.render(
                     loaded,
                     settings,
@@ -101,7 +101,7 @@ def command(
 
 
 def _numbered(out: str, index: int, count: int) -> Path:
-    """Return the file of one frame of an animation; makes the folder where `out` is one."""
+    """Return the file of one frame of an animation; create the folder if `out` is a folder."""
     target = Path(out)
     number = f"{index:0{max(4, len(str(count - 1)))}}"
     if target.is_dir() or not target.suffix or out.endswith(("/", os.sep)):
@@ -111,7 +111,7 @@ def _numbered(out: str, index: int, count: int) -> Path:
 
 
 def _times(seconds: dict[str, list[float]], device: str) -> Table:
-    """Return a table of the time of each pass, the mean of the frames in which it ran."""
+    """Return a table of each pass's mean time over the frames in which it ran."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("pass")
     table.add_column(f"ms on the {device}", justify="right")

@@ -1,4 +1,4 @@
-"""The options that choose a scene: its files and its camera."""
+"""The options of a scene: its files and its camera."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import click
 
 from vkbloom import Camera, Scene
 from vkbloom.cli import fields
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 from vkbloom.scene import gltf, skybox
 
 _BUILT_IN: Final = "ufo"
@@ -19,10 +19,10 @@ _FACES: Final = 6
 
 
 def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of a scene to a command, which gets a function that loads it as `scene`.
+    """Add the options of a scene to a command; its argument `scene` is a function that loads it.
 
-    The function raises OSError or ValueError for files that do not load, and click.UsageError for
-    options out of range.
+    The function raises OSError or ValueError if a file does not load, and click.UsageError if an
+    option is out of range.
     """
 
     @click.option(
@@ -30,16 +30,16 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "base",
         default=_BUILT_IN,
         metavar="ufo|PATH",
-        help=f"The mesh that is lit: a glTF file, or the built-in saucer [default {_BUILT_IN}]",
+        help=f"The lit mesh: a glTF file, or the built-in saucer [default {_BUILT_IN}]",
     )
-    @click.option("--glow", type=click.Path(), help="The mesh that glows: a glTF file.")
+    @click.option("--glow", type=click.Path(), help="The glowing mesh: a glTF file.")
     @click.option(
         "--skybox",
         "sky",
         type=click.Path(),
         multiple=True,
-        help="Once: a KTX 1 cubemap or an equirectangular image. Six times: the images of the "
-        "faces +x, -x, +y, -y, +z, -z.",
+        help="Given once: a KTX 1 cubemap or an equirectangular image. Given six times: the "
+        "images of the faces +x, -x, +y, -y, +z, -z.",
     )
     @click.option(
         "--glow-intensity",
@@ -59,7 +59,7 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
         **rest: object,
     ) -> object:
         if len(sky) not in (0, 1, _FACES):
-            raise click.UsageError(f"--skybox is given {len(sky)} times; once or six times it is")
+            raise click.UsageError(f"--skybox: given {len(sky)} times; give it once or six times")
         return command(scene=lambda: _load(base, glow, sky, glow_intensity, camera), **rest)
 
     return run
@@ -78,6 +78,6 @@ def _load(
         changes["glow"] = gltf.load_mesh(glow)
     if sky:
         changes["skybox"] = skybox.load(sky[0] if len(sky) == 1 else list(sky))
-    with blaming_the_call():
+    with as_wrong_use():
         changes["camera"] = dataclasses.replace(scene.camera, **camera)
         return dataclasses.replace(scene, **changes)

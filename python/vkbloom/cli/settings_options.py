@@ -1,4 +1,4 @@
-"""The options that choose a bloom: ``--method``, ``--preset``, and each field of the settings."""
+"""The options of the settings: ``--method``, ``--preset``, and one for each field."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import click
 
 import vkbloom
 from vkbloom.cli import fields
-from vkbloom.cli.program import blaming_the_call
+from vkbloom.cli.program import as_wrong_use
 
-#: The settings of each method, by its name.
+#: Settings class of each method, by the method's name.
 METHODS: Final[dict[str, type[vkbloom.Settings]]] = {
     kind.method: kind for kind in vkbloom.Settings.__subclasses__()
 }
@@ -25,7 +25,7 @@ _IMAGES: Final = ("source", "sources", "images")
 
 
 def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of the settings to a command, which gets them as `settings`."""
+    """Add the options of the settings to a command; its argument `settings` has the result."""
 
     @click.option(
         "--preset",
@@ -93,5 +93,5 @@ def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settin
             f"the method {begun.method} has no {names}; "
             + (f"give --method {having}" if having else "no method has all of them")
         )
-    with blaming_the_call():
+    with as_wrong_use():
         return begun.replace(**changes)

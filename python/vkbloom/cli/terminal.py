@@ -1,4 +1,4 @@
-"""Tables and sentences on standard output."""
+"""Tables and text on standard output."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Final
 import click
 from rich.console import Console, RenderableType
 
-# Of output that goes to a file or another program, where lines are not to be broken.
+# Console width for output to a file or another program, where lines must not be wrapped.
 _UNBROKEN: Final = 4096
 
 
 def show(renderable: RenderableType) -> None:
-    """Print what rich can render: as wide as the terminal, or unbroken where there is none.
+    """Print a rich renderable: wrapped to the terminal's width, or unwrapped without a terminal.
 
     Parameters
     ----------
     renderable
-        Text is printed as it is, without rich's markup.
+        Text, printed without interpreting rich's markup, or a table.
     """
     console = Console(markup=False, highlight=False, emoji=False)
     if console.is_terminal:
@@ -26,6 +26,6 @@ def show(renderable: RenderableType) -> None:
     console.width = _UNBROKEN
     with console.capture() as captured:
         console.print(renderable)
-    # Cells are filled with blanks to the width of their column, also in the last one.
+    # rich pads every cell to the width of its column; strip the padding of the last column.
     for line in captured.get().splitlines():
         click.echo(line.rstrip())

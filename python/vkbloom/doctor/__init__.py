@@ -1,8 +1,8 @@
-"""Find out whether this machine can render, and if not, why.
+"""Check whether this machine can render, and explain what prevents it.
 
-Nothing here raises for what is wrong with the machine: each thing looked at becomes a `Finding`.
-Whatever opens a driver happens in a process of its own (`vkbloom.doctor.child`), so that a driver
-that crashes becomes a finding as well.
+A fault of the machine raises no exception here: each check returns a `Finding`. Code that opens a
+driver runs in a child process (`vkbloom.doctor.child`), so that a driver's crash becomes a finding
+too.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _VALIDATION_LAYER: Final = "VK_LAYER_KHRONOS_validation"
 #: Versions of Mesa whose lavapipe the package is tested with.
 TESTED_MESA: Final = ("22.3.6", "25.0.7")
 
-# A loader that finds much to complain about repeats itself.
+# Number of loader messages to quote; a loader with many problems repeats its messages.
 _MESSAGES: Final = 6
 
 _INSTALL_LOADER: Final = (
@@ -32,20 +32,20 @@ _INSTALL_LOADER: Final = (
     "vulkan-loader; Arch: pacman -S vulkan-icd-loader), and a driver as well."
 )
 _INSTALL_LAYER: Final = (
-    "Where validation=True is wanted: apt install vulkan-validationlayers (Debian, Ubuntu), "
+    "To use validation=True: apt install vulkan-validationlayers (Debian, Ubuntu), "
     "dnf install vulkan-validation-layers (Fedora), pacman -S vulkan-validation-layers (Arch)."
 )
 
 
 @dataclass(frozen=True)
 class Report:
-    """All that the doctor found.
+    """The findings of one examination.
 
     Attributes
     ----------
     findings : tuple of Finding
     can_render : bool
-        Whether the test render came out right on one adapter at least.
+        Whether the test render was correct on at least one adapter.
     """
 
     findings: tuple[Finding, ...]
@@ -53,7 +53,7 @@ class Report:
 
 
 def examine() -> Report:
-    """Look at everything that rendering needs, and make a test render on each adapter.
+    """Examine everything that rendering needs, and make a test render on each adapter.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def examine() -> Report:
 
     Notes
     -----
-    Takes some seconds. The test render fills the pipeline cache, as any render does.
+    Takes some seconds. The test render adds to the pipeline cache, as every render does.
     """
     loader = child.ask("loader")
     version, layers = _facts(loader)
@@ -102,7 +102,7 @@ def examine() -> Report:
 
 
 def _facts(loader: child.Answer) -> tuple[tuple[int, ...] | None, Mapping[str, str] | None]:
-    """Return version and layers of the loader, None where they are not known."""
+    """Return the loader's version and layers; None if they are not known."""
     if loader.value is None:
         return None, None
     return tuple(map(int, loader.value["version"].split("."))), loader.value["layers"]
@@ -116,21 +116,21 @@ def _loader(loader: child.Answer) -> Finding:
         return Finding(
             "Vulkan loader",
             "problem",
-            f"Vulkan {version}, {file}; 1.1 is needed",
+            f"Vulkan {version}, {file}; at least 1.1 is needed",
             "Install a newer Vulkan loader.",
         )
     return Finding("Vulkan loader", "ok", f"Vulkan {version}, {file}")
 
 
 def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
-    """Judge the list of adapters; `has_problem`: something below it does not work."""
+    """Judge the list of adapters; `has_problem`: the loader or a driver has a problem."""
     if listed.value and listed.value["adapters"]:
         names = [
             f"{entry['name']} ({entry['type']}{', bundled' if entry['bundled'] else ''})"
             for entry in listed.value["adapters"]
         ]
         return Finding("adapters", "ok", ", ".join(names))
-    reason = listed.failure or "every driver was asked, and none has a device with Vulkan 1.1"
+    reason = listed.failure or "no driver has a device with Vulkan 1.1"
     said = (
         f"; the loader says: {' / '.join(listed.messages[:_MESSAGES])}" if listed.messages else ""
     )
@@ -138,7 +138,7 @@ def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
         "adapters",
         "problem",
         f"none: {reason}{said}",
-        "See to the problems above first." if has_problem else drivers.INSTALL_DRIVER,
+        "Solve the problems above first." if has_problem else drivers.INSTALL_DRIVER,
     )
 
 
@@ -151,8 +151,8 @@ def _software(adapters: list[Mapping[str, Any]]) -> Finding:
         return Finding(
             topic,
             "note",
-            'there is no software adapter, so adapter="software" will not work',
-            "Where that is wanted: install the package vkbloom-lavapipe, or apt install "
+            'no software adapter was found; adapter="software" fails',
+            "To use it: install the package vkbloom-lavapipe, or apt install "
             "mesa-vulkan-drivers (Debian, Ubuntu).",
         )
     described = found[0]["driver_info"] or "no version"
@@ -164,8 +164,8 @@ def _software(adapters: list[Mapping[str, Any]]) -> Finding:
     return Finding(
         topic,
         "note",
-        f"{described}; tested are {tested}, others are expected to work",
-        "Trust the test render below.",
+        f"{described} is not one of the tested versions ({tested}), but should work",
+        "Check the test render below.",
     )
 
 
@@ -173,13 +173,13 @@ def _chosen(chosen: child.Answer) -> Finding:
     topic = "chosen adapter"
     wanted = os.environ.get("VKBLOOM_ADAPTER")
     if wanted:
-        reason = f'VKBLOOM_ADAPTER is {wanted!r}, which takes the place of "auto"'
+        reason = f'VKBLOOM_ADAPTER is {wanted!r} and replaces "auto"'
         advice = "Correct or unset VKBLOOM_ADAPTER."
     else:
-        reason = '"auto" takes discrete before integrated before virtual before cpu'
-        advice = 'Choose another one: VKBLOOM_ADAPTER=software, "hardware" or a part of its name.'
+        reason = '"auto" prefers discrete, integrated, virtual, cpu, in that order'
+        advice = "Set VKBLOOM_ADAPTER to software, hardware, or a part of another adapter's name."
     if chosen.value is None:
-        return Finding(topic, "problem", f"{reason}, and fails: {chosen.failure}", advice)
+        return Finding(topic, "problem", f"{reason}; it fails: {chosen.failure}", advice)
     return Finding(topic, "ok", f"{chosen.value['summary']}; {reason}")
 
 
@@ -196,24 +196,24 @@ def _test_render(name: str, answer: child.Answer) -> Finding:
         return Finding(
             topic,
             "problem",
-            f"{name} renders wrong: {'; '.join(answer.value['differences'])}",
-            "Update its driver, or use another adapter; its framebuffers can't be trusted.",
+            f"{name} renders wrong values: {'; '.join(answer.value['differences'])}",
+            "Update its driver, or use another adapter. Do not trust its framebuffers.",
         )
     milliseconds = 1e3 * sum(answer.value["timings"].values())
     passes = f"{milliseconds:.2f} ms in its passes"
     if math.isnan(milliseconds):
-        passes = "it does not time its passes"
-    whole = 1e3 * answer.value["seconds"]
+        passes = "the device does not time its passes"
+    total = 1e3 * answer.value["seconds"]
     return Finding(
         topic,
         "ok",
-        f"{name} renders right: its framebuffers agree with the figures that they must have "
-        f"({passes}, {whole:.0f} ms with setting up)",
+        f"{name} renders correctly: all framebuffers are within tolerance of the expected values "
+        f"({passes}, {total:.0f} ms with setup)",
     )
 
 
 def _validation(layers: Mapping[str, str] | None, adapter: str | None) -> Iterator[Finding]:
-    """Judge the validation layer, by a test render on an adapter that works without it."""
+    """Check the validation layer by a test render on an adapter that works without it."""
     topic = "validation layer"
     if layers is None:
         return
@@ -222,7 +222,7 @@ def _validation(layers: Mapping[str, str] | None, adapter: str | None) -> Iterat
         return
     version = layers[_VALIDATION_LAYER]
     if adapter is None:
-        yield Finding(topic, "ok", f"installed, version {version}; not tried, as nothing renders")
+        yield Finding(topic, "ok", f"installed, version {version}; not tried: no adapter renders")
         return
     answer = child.ask("render", adapter, "validated")
     if answer.value is None:
@@ -230,7 +230,7 @@ def _validation(layers: Mapping[str, str] | None, adapter: str | None) -> Iterat
             topic,
             "problem",
             f"version {version} is installed, but the test render fails with it: {answer.failure}",
-            "Install the layer again, in the version of the loader; or do without validation.",
+            "Install the layer again, in the loader's version, or do not use validation=True.",
         )
     else:
-        yield Finding(topic, "ok", f"version {version}; the test render passes it")
+        yield Finding(topic, "ok", f"version {version}; the test render has no validation errors")

@@ -1,7 +1,7 @@
-"""Run what may crash, such as a broken driver, in a process of its own, and bring back its answer.
+"""Run code that may crash, such as a broken driver, in a child process and return its answer.
 
-A driver is native code from elsewhere: it can end the process that opens it, print to its standard
-output, or never return. In a child each of these becomes a sentence.
+A driver is native code of another project: it can end the process that opens it, print to standard
+output, or never return. In a child process each of these becomes an error message.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 TIMEOUT: Final = 60.0
-#: What the line with a probe's answer begins with: drivers and layers print on stdout as well.
+#: Prefix of the line with a probe's answer: drivers and layers may print on stdout as well.
 ANSWER_MARK: Final = "vkbloom-probe "
 _OPEN_DRIVER: Final = "import ctypes, sys; ctypes.CDLL(sys.argv[1]).vk_icdGetInstanceProcAddr"
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a child process found.
+    """The answer of a child process.
 
     Attributes
     ----------
     value : mapping or None
-        Its findings; None where it failed.
+        The findings; None if the process failed.
     failure : str
-        Why it failed, in one sentence; "" where it did not.
+        Why the process failed, in one sentence; "" if it did not.
     messages : tuple of str
-        What it wrote to its standard error, line by line.
+        The lines that the process wrote to standard error.
     """
 
     value: Mapping[str, Any] | None
@@ -41,14 +41,14 @@ class Answer:
 
 
 def ask(*question: str, environment: Mapping[str, str] | None = None) -> Answer:
-    """Run `vkbloom.doctor.probe` with arguments and return what it found.
+    """Run `vkbloom.doctor.probe` with arguments and return its answer.
 
     Parameters
     ----------
     *question : str
         The arguments.
     environment : mapping of str to str, optional
-        Variables to set on top of this process's own.
+        Environment variables to add to those of this process.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def ask(*question: str, environment: Mapping[str, str] | None = None) -> Answer:
         return Answer(None, _ending(ended), messages)
     answers = [line for line in ended.stdout.splitlines() if line.startswith(ANSWER_MARK)]
     if not answers:
-        return Answer(None, "the process that tried it ended without an answer", messages)
+        return Answer(None, "the probe process ended without an answer", messages)
     value: dict[str, Any] = json.loads(answers[0].removeprefix(ANSWER_MARK))
     if "failure" in value:
         return Answer(None, value["failure"], messages)
@@ -80,7 +80,7 @@ def why_driver_does_not_open(library: str) -> str:
     Returns
     -------
     str
-        Why it cannot be used, in one sentence; "" where it can.
+        Why it cannot be used, in one sentence; "" if it can.
     """
     ended = _run(["-c", _OPEN_DRIVER, library], None)
     if isinstance(ended, str):
@@ -91,9 +91,9 @@ def why_driver_does_not_open(library: str) -> str:
 def _run(
     arguments: list[str], environment: Mapping[str, str] | None
 ) -> subprocess.CompletedProcess[str] | str:
-    """Return the ended process, or why there is none."""
+    """Return the finished process, or the reason why it did not finish."""
     if not sys.executable:
-        return "this Python does not know its own executable, so no process was started"
+        return "sys.executable is empty, so no probe process was started"
     try:
         return subprocess.run(
             [sys.executable, *arguments],
@@ -112,13 +112,13 @@ def _run(
 
 
 def _ending(ended: subprocess.CompletedProcess[str]) -> str:
-    """Say how a process ended that did not end well."""
+    """Describe how a failed process ended."""
     if ended.returncode < 0:
         try:
             name = signal.Signals(-ended.returncode).name
         except ValueError:
             name = "unnamed"
-        return f"the process that tried it was ended by signal {-ended.returncode} ({name})"
+        return f"the probe process was ended by signal {-ended.returncode} ({name})"
     lines = ended.stderr.strip().splitlines()
     # The last line of a Python traceback is "<type>: <message>".
     return lines[-1].partition(": ")[2] or lines[-1] if lines else f"exit {ended.returncode}"

@@ -1,6 +1,6 @@
-"""The driver manifests that the Vulkan loader reads, and whether their libraries open.
+"""Find the driver manifests that the Vulkan loader reads, and check whether their libraries open.
 
-Sources: the Vulkan loader's documentation, LoaderDriverInterface.md for the search order and the
+Sources: the Vulkan loader's documentation: LoaderDriverInterface.md for the search order and the
 manifests, LoaderInterfaceArchitecture.md for the environment variables.
 """
 
@@ -22,14 +22,14 @@ INSTALL_DRIVER: Final = (
     "install mesa-vulkan-drivers; Fedora: dnf install mesa-vulkan-drivers; Arch: pacman -S "
     "vulkan-swrast), or the Vulkan driver of the GPU's vendor."
 )
-# Loaders before this one know VK_ICD_FILENAMES only.
+# First loader version that reads VK_DRIVER_FILES; earlier ones read VK_ICD_FILENAMES only.
 _FIRST_WITH_DRIVER_FILES: Final = (1, 3, 207)
 _FOLDER: Final = "vulkan/icd.d"
 
 
 @dataclass(frozen=True)
 class _Listed:
-    """A manifest, and what made the loader look there."""
+    """A manifest, and the folder or variable in which the loader finds it."""
 
     path: Path
     origin: str
@@ -40,7 +40,7 @@ def _split(value: str) -> list[Path]:
 
 
 def _set_to(variable: str, default: str) -> list[Path]:
-    """Return the paths of an environment variable, the default where it is empty or not set."""
+    """Return the paths of an environment variable, or the default if it is empty or not set."""
     return _split(os.environ.get(variable) or default)
 
 
@@ -49,7 +49,7 @@ def _standard_folders() -> list[Path]:
     bases = [
         *_set_to("XDG_CONFIG_HOME", f"{home}/.config"),
         *_set_to("XDG_CONFIG_DIRS", "/etc/xdg"),
-        # What loaders are built with as SYSCONFDIR and EXTRASYSCONFDIR.
+        # The usual values of SYSCONFDIR and EXTRASYSCONFDIR in loader builds.
         Path("/usr/local/etc"),
         Path("/etc"),
         *_set_to("XDG_DATA_HOME", f"{home}/.local/share"),
@@ -59,7 +59,7 @@ def _standard_folders() -> list[Path]:
 
 
 def _replacing_variable(loader_version: tuple[int, ...] | None) -> str | None:
-    """Return the variable that stands in place of the standard folders, None where none does."""
+    """Return the name of the set variable that replaces the standard folders, or None."""
     knows_new_name = loader_version is None or loader_version >= _FIRST_WITH_DRIVER_FILES
     if knows_new_name and "VK_DRIVER_FILES" in os.environ:
         return "VK_DRIVER_FILES"
@@ -67,7 +67,7 @@ def _replacing_variable(loader_version: tuple[int, ...] | None) -> str | None:
 
 
 def _from_variable(name: str) -> Iterator[_Listed]:
-    """List the manifests of a variable; of a folder in it, the manifests in that folder."""
+    """List the manifests of a variable, which may name files and folders of manifests."""
     for path in _split(os.environ.get(name, "")):
         manifests = _manifests(path)
         yield from (_Listed(manifest, name) for manifest in manifests or [path])
@@ -94,21 +94,21 @@ def _listed(replacing: str | None) -> list[_Listed]:
 
 
 def examine(loader_version: tuple[int, ...] | None) -> list[Finding]:
-    """Look at every driver manifest, in the order in which the loader does.
+    """Examine every driver manifest, in the loader's order.
 
     Parameters
     ----------
     loader_version : tuple of int or None
-        Of the Vulkan loader, as far as it is known.
+        Version of the Vulkan loader; None if it is not known.
 
     Returns
     -------
     list of Finding
-        One on the search, then one for each manifest.
+        A finding about the search, then one for each manifest.
     """
     if sys.platform == "win32":
         return [
-            Finding("drivers", "note", "the loader finds its drivers in the registry; not examined")
+            Finding("drivers", "note", "not examined: on Windows the registry lists the drivers")
         ]
     replacing = _replacing_variable(loader_version)
     listed = _listed(replacing)
@@ -119,7 +119,7 @@ def examine(loader_version: tuple[int, ...] | None) -> list[Finding]:
             Finding(
                 "drivers",
                 "note",
-                f"VK_DRIVER_FILES is set, but the loader {version} does not know it yet",
+                f"VK_DRIVER_FILES is set, but the loader {version} ignores it",
                 "Set VK_ICD_FILENAMES to the same value.",
             )
         )
@@ -138,7 +138,7 @@ def _search(replacing: str | None, listed: list[_Listed]) -> Finding:
         return Finding(
             "drivers",
             "problem",
-            f"no manifest of a Vulkan driver; looked in {', '.join(folders)}",
+            f"no manifest of a Vulkan driver was found in {', '.join(folders)}",
             INSTALL_DRIVER,
         )
     value = os.environ[replacing]
@@ -146,18 +146,18 @@ def _search(replacing: str | None, listed: list[_Listed]) -> Finding:
         return Finding(
             "drivers",
             "note",
-            f"{replacing} is set, so the loader uses its {count} and no other driver",
+            f"{replacing} is set: the loader uses its {count} and no other driver",
         )
     return Finding(
         "drivers",
         "problem",
-        f"{replacing} is set to {value!r}, so the loader looks nowhere else and finds no driver",
+        f"{replacing} is {value!r}: the loader finds no driver there and searches nowhere else",
         f"Unset {replacing}, or set it to the full path of a driver's manifest.",
     )
 
 
 def _manifest(entry: _Listed) -> Finding:
-    """Judge one manifest."""
+    """Examine one manifest."""
     path = entry.path
     topic = f"driver {path.name}"
     try:
@@ -166,25 +166,25 @@ def _manifest(entry: _Listed) -> Finding:
         return Finding(
             topic,
             "problem",
-            f"{path}, of {entry.origin}, cannot be read: {error.strerror}",
-            "Name a manifest there that this user may read, or none.",
+            f"{path}, from {entry.origin}, cannot be read: {error.strerror}",
+            "Make the manifest readable, or remove it from there.",
         )
     except ValueError as error:
         return Finding(
             topic,
             "problem",
-            f"{path} is damaged: {error}; some loaders then find no driver at all, and call it "
+            f"{path} is damaged: {error}; some loaders then find no driver at all and report "
             "VK_ERROR_OUT_OF_HOST_MEMORY",
             "Remove the file, or install its driver again.",
         )
     pointer_bits = "64" if sys.maxsize > 2**32 else "32"
     if arch not in ("", pointer_bits):
-        return Finding(topic, "note", f"{path} is for {arch}-bit programs; passed over")
+        return Finding(topic, "note", f"{path} is for {arch}-bit programs; ignored")
     failure = child.why_driver_does_not_open(library)
     if not failure:
         return Finding(topic, "ok", f"{path}: {library} opens")
     if "wrong ELF class" in failure:
-        return Finding(topic, "note", f"{path} is for another kind of program; passed over")
+        return Finding(topic, "note", f"{path} is for another architecture; ignored")
     return Finding(
         topic,
         "problem",
@@ -194,21 +194,21 @@ def _manifest(entry: _Listed) -> Finding:
 
 
 def _read(path: Path) -> tuple[str, str]:
-    """Return library and architecture of a manifest, the library as it is handed to the system.
+    """Return the library, as a path or name to open, and the architecture of a manifest.
 
     Raises
     ------
     OSError
-        The file is not there or cannot be read.
+        The file does not exist or cannot be read.
     ValueError
-        The file is no manifest; says why.
+        The file is not a manifest; the message says why.
     """
     try:
         content: Any = json.loads(path.read_bytes())
     except UnicodeDecodeError:
-        raise ValueError("it is no text") from None
+        raise ValueError("it is not text") from None
     except json.JSONDecodeError as error:
-        raise ValueError(f"no JSON in line {error.lineno} ({error.msg})") from None
+        raise ValueError(f"line {error.lineno} is not JSON ({error.msg})") from None
     except RecursionError:
         raise ValueError("its JSON is nested too deeply") from None
     driver = content.get("ICD") if isinstance(content, dict) else None
@@ -217,7 +217,7 @@ def _read(path: Path) -> tuple[str, str]:
     library = driver.get("library_path")
     if not isinstance(library, str) or not library or "\0" in library:
         raise ValueError('its "ICD" has no "library_path"')
-    # A bare file name is searched for by the system, a relative path starts at the manifest.
+    # The system searches for a bare file name; a relative path starts at the manifest's folder.
     if "/" in library:
         library = str(path.parent / library)
     return library, str(driver.get("library_arch", ""))

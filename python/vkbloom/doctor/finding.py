@@ -1,4 +1,4 @@
-"""What the doctor says about one thing."""
+"""The result of one check."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ Status = Literal["ok", "note", "problem"]
 
 @dataclass(frozen=True)
 class Finding:
-    """What the doctor says about one thing.
+    """The result of one check.
 
     Attributes
     ----------
     topic : str
-        What was looked at, in a word or two.
+        What was checked, in one or two words.
     status : {"ok", "note", "problem"}
-        "ok": as it should be; "note": worth knowing, nothing is broken; "problem": to be repaired.
+        "ok": correct; "note": information, nothing is broken; "problem": must be repaired.
     found : str
-        What is there, and what it means.
+        What was found, and what it means.
     advice : str
-        What to do about it; "" where there is nothing to do.
+        What to do; "" if nothing has to be done.
     """
 
     topic: str

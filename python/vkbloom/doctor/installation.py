@@ -1,4 +1,4 @@
-"""What belongs to this package and the machine it is on: cache, optional packages, GPU nodes."""
+"""Check the installation: environment variables, pipeline cache, extras and GPU device files."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ import numpy as np
 from vkbloom.doctor.finding import Finding, Status
 from vkbloom.io import pipeline_cache
 
-# What each extra of the package is for; which distributions it needs is read from the metadata.
+# Purpose of each extra; the distributions that it needs are read from the metadata.
 _EXTRAS: Final = {
     "images": "image files: Frames.save, apply on files",
-    "scenes": "glTF scenes and skyboxes, the built-in saucer too",
+    "scenes": "glTF scenes and skyboxes, including the built-in saucer",
     "grid": "to_xarray and grids of settings",
     "cli": "the command line",
     "quality": "quality figures such as SSIM",
-    "notebook": "the explorer, in notebooks and on its own page",
+    "notebook": "the explorer, in notebooks and as a web page",
     "pytest": "frame_regression in tests",
 }
-# Variables of the loader, of Mesa and of this package that change what is rendered, or where.
-_TELLING_VARIABLES: Final = re.compile(
+# Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
+_RELEVANT_VARIABLES: Final = re.compile(
     r"(VK|VKBLOOM|LP|MESA|GALLIVM|LIBGL|NODEVICE|DISABLE_LAYER|ENABLE_LAYER)_\w+"
 )
 
 
 def package() -> Finding:
-    """Return the versions of the package and of what it runs on."""
+    """Return the versions of vkbloom, Python, NumPy and the platform."""
     return Finding(
         "vkbloom",
         "ok",
@@ -44,11 +44,11 @@ def package() -> Finding:
 
 
 def environment() -> list[Finding]:
-    """Return the environment variables that change what Vulkan does, if any is set."""
+    """Report the set environment variables that change the rendering or choose the device."""
     settings = [
         f"{name}={value}"
         for name, value in sorted(os.environ.items())
-        if _TELLING_VARIABLES.fullmatch(name)
+        if _RELEVANT_VARIABLES.fullmatch(name)
     ]
     if not settings:
         return []
@@ -56,20 +56,20 @@ def environment() -> list[Finding]:
         Finding(
             "environment",
             "note",
-            f"set, and of influence on what is rendered or where: {', '.join(settings)}",
+            f"these variables change the rendering or choose the device: {', '.join(settings)}",
         )
     ]
 
 
 def _why_not_writable(folder: Path) -> str:
-    """Return why no file can be made in a folder, "" where one can."""
+    """Return why no file can be created in a folder; "" if one can."""
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
     if not existing.is_dir():
-        return f"{existing} is no folder"
+        return f"{existing} is not a folder"
     if existing != folder:
-        # It is made when the first file is written; trying it would leave it behind.
+        # The folder is created with its first file; creating it here would leave it behind.
         return "" if os.access(existing, os.W_OK | os.X_OK) else f"{existing} is not writable"
     try:
         with tempfile.TemporaryFile(dir=folder):
@@ -84,7 +84,7 @@ def cache(driver_uuids: Collection[str]) -> Finding:
     Parameters
     ----------
     driver_uuids : collection of str
-        Of the drivers that are there, in hexadecimal.
+        UUIDs of the installed drivers, in hexadecimal.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def cache(driver_uuids: Collection[str]) -> Finding:
     try:
         folder = pipeline_cache.folder()
         if folder is None:
-            return Finding(topic, "note", "off, as VKBLOOM_CACHE_DIR is set to nothing")
+            return Finding(topic, "note", "off: VKBLOOM_CACHE_DIR is empty")
         reason = _why_not_writable(folder)
         files = sorted(folder.glob("pipelines-*.bin")) if folder.is_dir() else []
         states = [_cache_file(file, driver_uuids) for file in files]
@@ -103,22 +103,23 @@ def cache(driver_uuids: Collection[str]) -> Finding:
             topic,
             "note",
             f"cannot be examined: {error}",
-            "Set VKBLOOM_CACHE_DIR to a folder that can be read and written.",
+            "Set VKBLOOM_CACHE_DIR to a readable and writable folder.",
         )
     found = "; ".join([str(folder), *states] if states else [str(folder), "no file yet"])
     if reason:
         return Finding(
             topic,
             "note",
-            f"{found}; not writable ({reason}), so every new process compiles its pipelines again",
-            "Set VKBLOOM_CACHE_DIR to a folder that can be written, or to nothing for no cache.",
+            f"{found}; not writable ({reason}): every new process compiles its pipelines again",
+            "Set VKBLOOM_CACHE_DIR to a writable folder, or to an empty value for no cache.",
         )
     if any("damaged" in state for state in states):
         return Finding(
             topic,
             "note",
             found,
-            "Nothing: a damaged file is not used, and replaced at the next render of its driver.",
+            "Nothing to do: a damaged file is ignored, and the next render of its driver replaces "
+            "it.",
         )
     return Finding(topic, "ok", found)
 
@@ -127,13 +128,13 @@ def _cache_file(file: Path, driver_uuids: Collection[str]) -> str:
     """Describe one cache file."""
     uuid = file.stem.removeprefix("pipelines-")
     try:
-        whole = pipeline_cache.read(bytes.fromhex(uuid)) is not None
+        is_complete = pipeline_cache.read(bytes.fromhex(uuid)) is not None
     except ValueError:
-        return f"{file.name} is not of vkbloom"
-    if not whole:
+        return f"{file.name} is not a file of vkbloom"
+    if not is_complete:
         return f"{file.name} is damaged or cannot be read"
-    whose = "of a driver that is here" if uuid in driver_uuids else "of a driver that is not here"
-    return f"{file.name} ({file.stat().st_size} bytes, whole, {whose})"
+    whose = "an installed driver" if uuid in driver_uuids else "a driver that is not installed"
+    return f"{file.name} ({file.stat().st_size} bytes, intact, of {whose})"
 
 
 def extras() -> list[Finding]:
@@ -162,8 +163,8 @@ def _extra(name: str, purpose: str, required: list[str]) -> Finding:
         return Finding(
             f"extra {name}",
             "note",
-            f"missing: {', '.join(missing)}; for {purpose}",
-            f"Where that is wanted: pip install vkbloom[{name}]",
+            f"missing: {', '.join(missing)}; needed for {purpose}",
+            f"To use it: pip install vkbloom[{name}]",
         )
     return Finding(f"extra {name}", "ok", f"{', '.join(present)}; for {purpose}")
 
@@ -174,12 +175,12 @@ def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
     Parameters
     ----------
     has_gpu_adapter : bool
-        Whether Vulkan lists an adapter that is no CPU.
+        Whether Vulkan lists an adapter that is not a CPU.
 
     Returns
     -------
     list of Finding
-        None where no GPU shows itself.
+        Empty if there are no device files.
     """
     if not sys.platform.startswith("linux"):
         return []
@@ -195,7 +196,7 @@ def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
                 "GPU",
                 status if has_gpu_adapter else "problem",
                 f"{', '.join(map(str, closed))} cannot be opened by this user",
-                'Join the group that owns it, often "render" or "video".',
+                'Add the user to the group that owns it, often "render" or "video".',
             )
         ]
     if has_gpu_adapter:
@@ -205,6 +206,6 @@ def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
             "GPU",
             "note",
             f"{names}, but no Vulkan adapter that uses it",
-            "Install the Vulkan driver of the GPU's vendor; a container may need it mounted.",
+            "Install the Vulkan driver of the GPU's vendor. In a container, mount the driver.",
         )
     ]

@@ -1,6 +1,6 @@
-"""What the doctor runs in processes of their own: ``python -m vkbloom.doctor.probe <what>``.
+"""The probes that the doctor runs in child processes: ``python -m vkbloom.doctor.probe <name>``.
 
-Prints one line of JSON behind `ANSWER_MARK`; ``{"failure": ...}`` where what was tried failed.
+Prints one line: `ANSWER_MARK`, then the answer as JSON, or ``{"failure": ...}``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from vkbloom.adapter import bundled_driver
 from vkbloom.doctor import trial
 from vkbloom.doctor.child import ANSWER_MARK
 
-# As the core looks for it.
+# The names that the core tries, in its order.
 _LOADER_NAMES: Final = {
     "win32": ("vulkan-1.dll",),
     "darwin": ("libvulkan.dylib", "libvulkan.1.dylib", "libMoltenVK.dylib"),
@@ -64,7 +64,7 @@ def _open_loader() -> ctypes.CDLL:
 
 
 def _file_of(library: ctypes.CDLL) -> str:
-    """Return the file that a library was opened from, "" where the system does not tell."""
+    """Return the file that a library was opened from; "" if the system does not tell."""
     if sys.platform == "win32":
         return ""
     symbol = _Symbol()
@@ -91,7 +91,7 @@ def loader() -> dict[str, Any]:
     """Return the Vulkan loader's file and version, and the versions of the layers by name."""
     library = _open_loader()
     version = ctypes.c_uint32(1 << 22)
-    # Vulkan 1.0 has no such function.
+    # Loaders of Vulkan 1.0 lack this function.
     if hasattr(library, "vkEnumerateInstanceVersion"):
         library.vkEnumerateInstanceVersion(ctypes.byref(version))
     return {
@@ -109,7 +109,7 @@ def adapters() -> dict[str, Any]:
         try:
             listed = _core.adapters(driver)
         except vkbloom.AdapterNotFoundError as error:
-            reasons.append(_told(error))
+            reasons.append(_one_line(error))
             continue
         found += [
             {
@@ -127,7 +127,7 @@ def adapters() -> dict[str, Any]:
 
 
 def render(adapter: str, validation: str) -> dict[str, Any]:
-    """Make the test render; with the validation layer where `validation` is "validated"."""
+    """Make the test render, with the validation layer if `validation` is "validated"."""
     with vkbloom.Renderer(adapter, validation=validation == "validated") as renderer:
         start = time.perf_counter()
         frames = trial.render(renderer)
@@ -147,11 +147,11 @@ _QUESTIONS: Final[Mapping[str, Callable[..., dict[str, Any]]]] = {
 }
 
 
-def _told(error: Exception) -> str:
-    """Tell what went wrong in one line."""
+def _one_line(error: Exception) -> str:
+    """Return the message of an error in one line."""
     text = " ".join(str(error).split())
     if isinstance(error, vkbloom.AdapterNotFoundError):
-        # What follows says what to install and to ask the doctor, who is speaking already.
+        # The rest of the message advises to run the doctor, which is running.
         return text.partition(". ")[0]
     if text and isinstance(error, (vkbloom.Error, OSError)):
         return text
@@ -159,14 +159,14 @@ def _told(error: Exception) -> str:
 
 
 def main() -> None:
-    """Answer what the command line asks."""
+    """Run the probe that the command line names and print its answer."""
     what, *arguments = sys.argv[1:]
     try:
         value = _QUESTIONS[what](*arguments)
     except Exception as error:
-        # Whatever it is, it is what the doctor shall report.
-        value = {"failure": _told(error)}
-    # A driver may have left an unfinished line.
+        # The doctor reports every error as a finding.
+        value = {"failure": _one_line(error)}
+    # Start a new line: a driver may have printed without one.
     print(f"\n{ANSWER_MARK}{json.dumps(value)}", flush=True)
 
 

@@ -1,6 +1,6 @@
-"""A test render whose right result is known: four framebuffers checked against figures.
+"""A test render with known framebuffers, against which the result is checked.
 
-The scene is made of two rectangles in code, so no file and no optional package is needed.
+The scene is two rectangles built in code, so it needs no file and no optional package.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ _BODY: Final = (0.5, 0.25, 0.125)
 _CAMERA: Final = Camera(
     position=(0.0, 0.0, -10.0), rotation=(0.0, 0.0, 0.0), fov=90.0, near=1.0, far=100.0
 )
-# At time 0 the animation moves a model by (0, -1, 0.25) and does not turn it; so these give a
-# rectangle at z = 0, whose side lies at y = 0.
+# At time 0 the animation translates a model by (0, -1, 0.25) and does not rotate it. These offsets
+# put a rectangle at z = 0 with one side at y = 0.
 _LIFT, _BACK = 1.0, -0.25
-# Far outside of the picture, whose half height is 10 where the rectangles are.
+# Far outside the picture: its half height at the rectangles' distance is 10.
 _BEYOND = 100.0
 # Perspective depth 0..1 of the distance d = 10: far / (far - near) * (1 - near / d).
 _DEPTH: Final = 100 / 99 * (1 - 1 / 10)
 
-# Levels of 255. Half a level from rounding blur_vertical, times the gain 1.39 of the next pass,
-# half a level from rounding that, and 1/256 in the weights of a device's bilinear filter, which
-# is another level where black meets white.
+# In levels of 255: half a level from rounding blur_vertical, times the gain 1.39 of the next pass;
+# half a level from rounding its result; and one level at an edge from black to white, because the
+# weights of a device's bilinear filter are accurate to 1/256.
 _BLUR_TOLERANCE: Final = 3.0
 _GLOW_TOLERANCE: Final = 1.0
-# A rasterizer's interpolation of depth; lavapipe is within 4e-7.
+# Accuracy of a rasterizer's depth interpolation; lavapipe's error is below 4e-7.
 _DEPTH_TOLERANCE: Final = 1e-4
 
 
@@ -46,13 +46,13 @@ def _rectangle(
 ) -> Mesh:
     corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
     vertices = [(a, b, _BACK, 0.0, 0.0, 1.0, *colour) for a, b in corners]
-    # Both windings: one of them is the front.
+    # Both windings, so that one of them is front-facing.
     indices = [0, 1, 2, 0, 2, 3, 0, 2, 1, 0, 3, 2]
     return Mesh(np.array(vertices, np.float32), np.array(indices, np.uint32))
 
 
 def render(renderer: Renderer) -> Frames:
-    """Render the test scene: a body on the upper half, a glow on the left one.
+    """Render the test scene: a body in the upper half, a glow in the left half.
 
     Parameters
     ----------
@@ -72,10 +72,10 @@ def render(renderer: Renderer) -> Frames:
 
 
 def differences(frames: Frames) -> list[str]:
-    """Compare the framebuffers of `render` with what they must hold.
+    """Compare the framebuffers of `render` with their expected values.
 
-    `glow` and `depth` are compared with figures that follow from the geometry, `blur_vertical`,
-    `bloom` and `final` with `vkbloom.reference`.
+    The expected values of `glow` and `depth` follow from the geometry, those of `blur_vertical`,
+    `bloom` and `final` come from `vkbloom.reference`.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def differences(frames: Frames) -> list[str]:
     Returns
     -------
     list of str
-        A sentence for each framebuffer that is wrong; empty where all are right.
+        A sentence for each wrong framebuffer; empty if all are right.
     """
     glow = np.zeros_like(frames["glow"])
     glow[:, : glow.shape[1] // 2, :3] = np.round(255 * np.array(_GLOW))
@@ -105,9 +105,9 @@ def differences(frames: Frames) -> list[str]:
         ),
     ]
     return [
-        f"{name} is up to {difference:.3g} off, {tolerance:g} is allowed"
+        f"{name} differs by up to {difference:.3g}; {tolerance:g} is allowed"
         for name, difference, tolerance in rows
-        # So written, NaN is off as well.
+        # Written this way, NaN counts as a difference.
         if not difference <= tolerance
     ]
 

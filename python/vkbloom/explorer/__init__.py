@@ -1,9 +1,9 @@
-"""Bloom looked at while its settings change: in a notebook, or on a page of its own.
+"""The explorer: controls for all settings and a live picture, in a notebook or on a web page.
 
 ==================== ====================================================================
-`controls`           what can be set, for the page to make controls of; settings as code
-`viewer`             one viewer: messages of the page in, pictures and values out
-`shown`              framebuffers as PNG, quickly
+`controls`           the fields of the settings as descriptions of controls; settings as code
+`viewer`             one viewer: takes the page's messages, returns pictures and values
+`shown`              framebuffers as PNG, optimized for speed
 `widget`             the page in a notebook (anywidget)
 `server`             the page on 127.0.0.1 (tornado), for ``vkbloom explore``
 ``page.js``, ``.css`` the page itself, the same for both
@@ -36,35 +36,35 @@ def explore(
     shading: Shading = "forward",
     renderer: Renderer | None = None,
 ) -> Explorer:
-    """Look at a bloom in a notebook while its settings change.
+    """Explore a bloom in a notebook, with controls for all settings.
 
-    Every change gives a new picture, rendered at the size that it is shown at; while one is on
-    its way, only the newest change is kept. A second settings, B, can be compared by a wipe.
-    Under the pointer the framebuffer's own values are shown, not those of the picture.
+    Every change renders a new picture at the size at which it is shown. While a picture is being
+    rendered, only the newest change is kept. A wipe compares the settings with a second one, B.
+    Values under the pointer are those of the framebuffer, not of the picture.
 
     Parameters
     ----------
     source : Scene or ndarray
-        What blooms. An image is as `Renderer.apply` takes it; where it is larger than it is shown,
-        its pixels are averaged first, unless its own size is chosen on the page.
+        The scene, or an image as `Renderer.apply` takes it. An image that is larger than it is
+        shown is reduced first by averaging, unless the page selects its own size.
     settings : Settings, optional
         To begin with; by default ``presets["bevy_natural"]`` for an image and
         ``presets["tutorial"]`` for a scene.
     against : Settings, optional
-        What B begins with; by default `settings` without bloom.
+        The initial settings of B. Default: `settings` without bloom.
     size : (int, int)
-        Width and height of a scene's frame: its aspect, and its size where that is chosen on the
-        page. Without meaning for an image.
+        Width and height of a scene's frame: its aspect, and its size if the page selects that.
+        Not used for an image.
     shading : {"forward", "deferred"}
-        Of a scene.
+        Shading of a scene.
     renderer : Renderer, optional
-        By default one of its own, which `Explorer.close` closes.
+        Default: a new renderer, which `Explorer.close` closes.
 
     Returns
     -------
     Explorer
-        A widget, which the notebook shows. ``.settings``, ``.against`` and ``.frames`` are what
-        the page shows now; the first two can be set.
+        A widget, which the notebook shows. ``.settings``, ``.against`` and ``.frames`` are those
+        of the page; the first two can be set.
 
     Raises
     ------
@@ -75,10 +75,24 @@ def explore(
     ModuleNotFoundError
         anywidget is not installed: ``pip install vkbloom[notebook]``.
 
+    See Also
+    --------
+    Renderer.grid : Many settings at once.
+
     Notes
     -----
-    ``vkbloom explore`` shows the same page without a notebook. A bloom whose reach is given in
-    texels looks wider in a reduced frame than in a larger one.
+    ``vkbloom explore`` shows the same page without a notebook. A bloom whose width is given in
+    texels looks wider in a reduced frame.
+
+    Examples
+    --------
+    >>> image = np.full((32, 32, 4), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     explorer = vkbloom.explore(image, vkbloom.Pyramid(levels=3), renderer=renderer)
+    ...     explorer.settings = explorer.settings.replace(radius=2.0)
+    ...     print(explorer.settings.radius)
+    ...     explorer.close()
+    2.0
     """
     import_extra("anywidget", "notebook", "explore")
     from vkbloom.explorer.viewer import Viewer  # noqa: PLC0415  needs the renderer's module

@@ -1,20 +1,20 @@
-"""Grids of settings: every combination of some values, in memory, on disk, or over many machines.
+"""Grids: render all combinations of the axes' values, in memory, on disk or on a cluster.
 
 ========================== ========================================================================
 module                     job
 ========================== ========================================================================
-axes, sources              what varies, and what it is rendered from
-order                      the order of visiting, and blocks of points
-passes                     passes counted: the cost of a step, the cost of a point alone
-plan                       the grid as asked for, and what a renderer says of it
-filling, reductions        blocks of points rendered into arrays, and figures of frames
+axes, sources              the axes, and the scene or images
+order                      the order of the points, and blocks of points
+passes                     the number of passes of a step, and of a point rendered alone
+plan                       the requested grid, and its layout: variables, shapes, dtypes
+filling, reductions        render blocks of points into arrays; figures of frames
 memory                     the grid as one Dataset
 zarr_grid                  the grid as a Zarr store
-store, keys, identity      what is in the store, its bytes, and whether it is the same grid again
+store, keys, identity      the store's arrays, its keys as bytes, and the identity of its grid
 image_files                the grid as image files
-checking                   a store looked through
-rendering                  a whole grid into whatever keeps it
-running, cluster           blocks rendered in this process, or by the workers of a Dask cluster
+checking                   check a store for missing and damaged data
+rendering                  render a grid into a store or a folder
+running, cluster           render blocks in this process, or on the workers of a Dask cluster
 sheet, curves, views       contact sheets and curves of a Dataset
 progress                   the progress bar
 ========================== ========================================================================

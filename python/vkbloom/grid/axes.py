@@ -1,4 +1,4 @@
-"""The axes of a grid: what varies, over which values, and how that is written down."""
+"""The axes of a grid: a settings field, time or images, with their values and attributes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Axis", "image_axis", "read_axes", "unit_and_description"]
 
 Kind = Literal["settings", "time", "image"]
 
-_TIME_DESCRIPTION = "Time of the animation; 0 and 1 are the same place"
+_TIME_DESCRIPTION = "Time of the animation; its period is 1"
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class Axis:
     name : str
         A settings field, "time" or "image".
     values : tuple
-        As the settings hold them; floats for "time", the images' labels for "image".
+        The values as the settings store them; floats for "time", labels for "image".
     kind : {"settings", "time", "image"}
     unit : str
-        "1" for what has none.
+        "1" for a number without a unit.
     description : str
     """
 
@@ -69,21 +69,21 @@ class Axis:
         return np.array([_text(value) for value in self.values])
 
     def find(self, value: Any) -> int:
-        """Return the place of a value among those of the axis.
+        """Return the index of a value on the axis.
 
         Raises
         ------
         ValueError
-            It is not among them.
+            The axis does not have the value.
         """
         known = tuple(value) if isinstance(value, list) else value
         if known not in self.values:
             held = ", ".join(map(_text, self.values[:8])) + ", ..." * (len(self.values) > 8)
-            raise ValueError(f"{self.name}: {value!r} is not a value of the grid: {held}")
+            raise ValueError(f"{self.name}: {value!r} is not a value of the axis; it has {held}")
         return self.values.index(known)
 
     def label(self, place: int) -> str:
-        """Return a value in short, for people."""
+        """Return a value as a short text."""
         value = self.values[place]
         return f"{value:.4g}" if isinstance(value, float) else _text(value)
 
@@ -106,20 +106,20 @@ def unit_and_description(settings: Settings, name: str) -> tuple[str, str]:
 
 def _sequence(name: str, values: object) -> list[Any]:
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
-        raise TypeError(f"axes: {name} needs a sequence of values, not {values!r}")
+        raise TypeError(f"axes: {name}: {values!r} is not a sequence of values")
     listed = list(values)
     if not listed:
-        raise ValueError(f"axes: {name} has no values, one at least is needed")
+        raise ValueError(f"axes: {name} has no values; give at least one")
     return listed
 
 
 def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) -> tuple[Axis, ...]:
-    """Check the axes that were asked for.
+    """Check the requested axes.
 
     Parameters
     ----------
     settings : Settings
-        What the axes vary.
+        The settings that the axes vary.
     axes : mapping of str to sequence
         Values by settings field or "time".
     has_time : bool
@@ -133,10 +133,10 @@ def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) ->
     Raises
     ------
     TypeError, ValueError
-        A name is no field of these settings, or a value is none that the field can have.
+        A name is not a field of these settings, or a value is out of the field's range.
     """
     if not isinstance(axes, Mapping):
-        raise TypeError(f"axes: a mapping of fields to values is needed, not {axes!r}")
+        raise TypeError(f"axes: {axes!r} is not a mapping of field names to values")
     fields = [field.name for field in dataclasses.fields(settings)]
     found: list[Axis] = []
     for name, values in axes.items():
@@ -149,7 +149,7 @@ def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) ->
                 f"axes: {name!r} is not a field of the method {settings.method}"
                 f"{' or time' if has_time else ''}: {', '.join(fields)}"
             )
-        # Through the settings, so that each value is checked and stored as they store it.
+        # `replace` checks each value and converts it to the type that the settings store.
         own = tuple(
             getattr(settings.replace(**{name: value}), name) for value in _sequence(name, values)
         )
@@ -159,4 +159,4 @@ def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) ->
 
 def image_axis(labels: tuple[Any, ...]) -> Axis:
     """Return the axis of a list of images."""
-    return Axis("image", labels, "image", "", "The image that is given bloom")
+    return Axis("image", labels, "image", "", "The image that bloom is added to")

@@ -1,4 +1,4 @@
-"""A grid's store looked through: what is there, what is missing, what is damaged."""
+"""Check a grid's store for missing and damaged data."""
 
 from __future__ import annotations
 
@@ -33,25 +33,37 @@ from vkbloom.grid.store import (
 __all__ = ["GridReport", "check_grid"]
 
 _PURPOSE: Final = "Grids on disk"
-# Each is a byte of memory, whatever the file's size.
+# The marks take one byte of memory per point, even if the compressed file is small.
 _MOST_POINTS: Final = 1 << 28
-# Of a chunk, before it is compressed.
+# Largest size of an uncompressed chunk.
 _MOST_BYTES: Final = 1 << 40
 _DAMAGE: Final = (ValueError, OSError)
 
 
 @dataclass(frozen=True)
 class GridReport:
-    """What `check_grid` found.
+    """The result of `check_grid`.
 
     Parameters
     ----------
     points : int
-        Of the grid; 0 where that cannot be told.
+        Number of points of the grid; 0 if it is not known.
     done : int
-        Points that are marked as done, the damaged ones among them.
+        Number of points that are marked as done, including damaged ones.
     problems : tuple of str
-        What is damaged or missing that should be there, with the points that it holds.
+        Each damaged or missing key, with the points that it contains.
+
+    See Also
+    --------
+    check_grid : Returns it.
+
+    Examples
+    --------
+    >>> report = vkbloom.GridReport(points=4, done=3, problems=())
+    >>> report.complete
+    False
+    >>> print(report)
+    3 of 4 points are done
     """
 
     points: int
@@ -60,7 +72,7 @@ class GridReport:
 
     @property
     def complete(self) -> bool:
-        """Whether all points are there, undamaged."""
+        """Whether all points are done and nothing is damaged."""
         return self.points == self.done and not self.problems
 
     def __str__(self) -> str:
@@ -68,7 +80,7 @@ class GridReport:
 
 
 def check_grid(store: Any) -> GridReport:
-    """Look through a grid's store; nothing in it is changed.
+    """Check a grid's store for missing and damaged data, without changing it.
 
     Parameters
     ----------
@@ -78,56 +90,68 @@ def check_grid(store: Any) -> GridReport:
     Returns
     -------
     GridReport
-        All chunks of points that are marked as done have been read.
+        Every chunk that has points marked as done is read.
 
     Raises
     ------
     FileNotFoundError
-        There is nothing.
+        The store does not exist or is empty.
     ValueError
-        There is something else than a grid, one in another format, or one of over 2**28 points.
+        The store is not a grid, has another format version, or has over 2**28 points.
     ModuleNotFoundError
         zarr is missing.
 
-    Notes
-    -----
-    ``grid_to_zarr`` with the arguments that the store was made with mends what it reports.
+    See Also
+    --------
+    grid_to_zarr : Renders a grid, and repairs one: call it with the arguments of the first call.
+
+    Examples
+    --------
+    >>> import zarr
+    >>> image = np.zeros((16, 16, 4), np.uint8)
+    >>> store = zarr.storage.MemoryStore()
+    >>> grid = vkbloom.grid_to_zarr(
+    ...     image, None, {"intensity": [0.5, 1.0]}, store, adapter="software"
+    ... )
+    >>> print(vkbloom.check_grid(store))
+    2 of 2 points are done
     """
     keys = open_keys(store)
     held = keys.all()
     if not held:
-        raise FileNotFoundError(f"{keys.name}: there is nothing")
+        raise FileNotFoundError(f"{keys.name}: the store does not exist or is empty")
     content = keys.read(ROOT)
     root = read_json(content)
     if root is None:
         if not any(key.startswith(f"{DONE}/") for key in held):
-            raise ValueError(f"{keys.name}: there is no grid in it")
-        return GridReport(0, 0, (f"{_told(ROOT, content)}: it says what the grid is",))
+            raise ValueError(f"{keys.name}: its content is not a grid of vkbloom")
+        return GridReport(0, 0, (f"{_state_of(ROOT, content)}, which describes the grid",))
     own = stored_identity(root)
     if own is None:
-        raise ValueError(f"{keys.name}: there is no grid in it, but something else")
+        raise ValueError(f"{keys.name}: its content is not a grid of vkbloom")
     if own.get("format") != FORMAT:
         raise ValueError(
-            f"{keys.name}: its format is {short(own.get('format'))}, {FORMAT} is known"
+            f"{keys.name}: its format version {short(own.get('format'))} is not {FORMAT}"
         )
     try:
         stored = _read_stored(own, root)
     except (KeyError, TypeError, AttributeError, ValueError):
-        return GridReport(0, 0, (f"{_told(ROOT, b'')}: it says what the grid is",))
+        return GridReport(0, 0, (f"{_state_of(ROOT, b'')}, which describes the grid",))
     if math.prod(stored.shape) > _MOST_POINTS:
         raise ValueError(
-            f"{keys.name}: {math.prod(stored.shape)} points are over the most, {_MOST_POINTS}"
+            f"{keys.name}: the number of points, {math.prod(stored.shape)}, is not within "
+            f"{_MOST_POINTS}"
         )
-    return _looked_through(keys, held, stored)
+    return _checked(keys, held, stored)
 
 
-def _told(key: str, content: bytes | None) -> str:
+def _state_of(key: str, content: bytes | None) -> str:
     return f"{key} is {'missing' if content is None else 'damaged'}"
 
 
 @dataclass(frozen=True)
 class _Stored:
-    """What the group's metadata tell of a grid: axes, a block, variables, digests by key."""
+    """A grid as the group's metadata describe it: axes, chunk, variables, digests by key."""
 
     axes: tuple[Axis, ...]
     chunk: Index
@@ -140,7 +164,13 @@ class _Stored:
 
 
 def _read_stored(own: Mapping[str, Any], root: Mapping[str, Any]) -> _Stored:
-    """Read an identity; KeyError, TypeError, AttributeError or ValueError if it is none."""
+    """Parse a stored identity.
+
+    Raises
+    ------
+    KeyError, TypeError, AttributeError, ValueError
+        It is damaged.
+    """
     axes = tuple(
         Axis(name, tuple(own["axes"][name]), "settings", "", "") for name in own["order of axes"]
     )
@@ -157,7 +187,7 @@ def _read_stored(own: Mapping[str, Any], root: Mapping[str, Any]) -> _Stored:
         variables[name] = Variable(("",) * len(shape), shape, dtype, {})
     digests = root["attributes"][DIGESTS]
     names = [DONE, *variables, *(axis.name for axis in axes)]
-    # Keys are paths.
+    # Keys become paths in a local store, so they must not leave its folder.
     if not all(re.fullmatch(r"\w[\w.-]*/[\w.]+", key) for key in digests):
         raise ValueError
     if not all(f"{name}/{ROOT}" in digests for name in names):
@@ -165,19 +195,19 @@ def _read_stored(own: Mapping[str, Any], root: Mapping[str, Any]) -> _Stored:
     return _Stored(axes, chunk, variables, digests)
 
 
-def _looked_through(keys: Keys, held: set[str], stored: _Stored) -> GridReport:
+def _checked(keys: Keys, held: set[str], stored: _Stored) -> GridReport:
     problems: list[str] = []
     damaged = set()
     for key, expected in stored.digests.items():
         name, _, rest = key.partition("/")
-        # The marks change; their own checksum covers them.
+        # The marks change while the grid is rendered; their own checksums cover them.
         if name == DONE and rest != ROOT:
             continue
         content = keys.read(key)
         if digest(key, content) == expected:
             continue
         damaged.add(name)
-        problems.append(f"{_told(key, content)}, of all points")
+        problems.append(f"{_state_of(key, content)}, of all points")
     done = np.zeros(stored.shape, np.bool_)
     if DONE not in damaged:
         try:

@@ -1,4 +1,4 @@
-"""Chunks as they lie in a store, checked before Zarr allocates what they say of their size."""
+"""Check the chunks of a store before Zarr allocates the size that their headers claim."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["check_summed"]
 
 _PURPOSE: Final = "Grids on disk"
 _SUM_BYTES: Final = 4
-# What Zstandard can make out of a block, the smallest of which has four bytes (RFC 8878, 3.1.1.2).
+# Largest decompressed and smallest compressed size of a Zstandard block (RFC 8878, 3.1.1.2).
 _MOST_OF_BLOCK: Final = 1 << 17
 _LEAST_BLOCK: Final = 4
 
@@ -23,9 +23,9 @@ def check_summed(content: bytes, size: int) -> None:
     Parameters
     ----------
     content : bytes
-        As in the store: Zstandard, then CRC-32C.
+        The stored bytes: Zstandard data, then its CRC-32C.
     size : int
-        Bytes of the numbers.
+        Expected size of the decompressed chunk in bytes.
     """
     crc32c = import_extra("google_crc32c", "grid", _PURPOSE)
     content, kept = content[:-_SUM_BYTES], content[-_SUM_BYTES:]
@@ -34,16 +34,17 @@ def check_summed(content: bytes, size: int) -> None:
     if not size:
         return
     if size > (len(content) // _LEAST_BLOCK + 1) * _MOST_OF_BLOCK:
-        raise ValueError("it is too short for what it should hold")
-    # A chunk that holds less fits into less room.
+        raise ValueError(f"it is too short for {size} bytes")
+    # A chunk that decompresses to fewer bytes fits into a smaller buffer too.
     if not _fits(content, size) or _fits(content, size - 1):
         raise ValueError(f"it does not hold {size} bytes")
 
 
 def _fits(content: bytes, room: int) -> bool:
-    """Tell whether Zstandard decodes a chunk into so many bytes.
+    """Return whether a chunk decompresses into a buffer of `room` bytes.
 
-    Without the room, the frame's own header decides how much is allocated.
+    The buffer is given because the frame's own header would otherwise decide how much memory is
+    allocated.
     """
     zstd = import_extra("numcodecs.zstd", "grid", _PURPOSE)
     try:

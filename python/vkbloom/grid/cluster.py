@@ -1,8 +1,8 @@
-"""Blocks of points rendered by the workers of a Dask cluster.
+"""Render blocks of points on the workers of a Dask cluster.
 
-Workers write what they render; only counts come back. Tasks are runs of neighbouring blocks, so
-that a run's points share passes, and no more of them are handed to the scheduler at a time than
-keep all workers at work.
+Workers write the frames that they render and return only tallies. A task is a run of neighbouring
+blocks, so that its points share passes. The scheduler gets only as many tasks at a time as keep
+all workers busy.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ __all__ = ["check_client", "lay_out_there", "run_there"]
 
 _PURPOSE: Final = "A grid on a Dask cluster"
 _PLUGIN: Final = "vkbloom-renderers"
-# Runs under way for each worker: one at work, one waiting.
+# Submitted runs per worker: one that runs, one that waits.
 _AHEAD: Final = 2
-# A run is short enough to share the work out and to lose, and long enough to be worth a task.
+# A run is short enough to balance the workers and to render again, long enough to amortize a task.
 _RUN_POINTS: Final = 4096
 _RUN_BYTES: Final = 64 << 20
 _RUNS_A_WORKER: Final = 8
 _RETRIES: Final = 2
 
-# A renderer a process and choice of adapter, with the lock of whoever uses it.
+# The renderer of this process for each choice of adapter, with a lock held while a run uses it.
 _held: dict[tuple[str, bool], tuple[Renderer, threading.Lock]] = {}
 _held_lock = threading.Lock()
 
@@ -56,7 +56,7 @@ def _renderer(adapter: str, validation: bool) -> tuple[Renderer, threading.Lock]
 
 
 def close_renderers() -> None:
-    """Close the renderers of this process, each when its run is at its end."""
+    """Close the renderers of this process, each after its current run."""
     with _held_lock:
         for renderer, lock in _held.values():
             with lock:
@@ -68,12 +68,12 @@ def _plugin() -> Any:
     distributed = import_extra("distributed", "grid", _PURPOSE)
 
     class Renderers(distributed.WorkerPlugin):  # type: ignore[misc, name-defined]
-        """Closes a worker's renderers when the grid or the worker is at its end."""
+        """Closes a worker's renderers when the grid or the worker ends."""
 
         name = _PLUGIN
 
         async def teardown(self, worker: Any) -> None:
-            # A run may still be at work, and the worker has to stay reachable.
+            # Closing waits for the current run; in a thread the worker stays responsive.
             await asyncio.to_thread(close_renderers)
 
     return Renderers()
@@ -81,7 +81,7 @@ def _plugin() -> Any:
 
 @dataclass(frozen=True)
 class _Run:
-    """What a task needs beside the grid."""
+    """The arguments of a task other than the grid."""
 
     layout: Layout
     writer: Writer
@@ -90,7 +90,7 @@ class _Run:
     validation: bool
 
 
-def _same(pickled: bytes) -> Grid:
+def _unpickled(pickled: bytes) -> Grid:
     grid: Grid = pickle.loads(pickled)
     return grid
 
@@ -102,13 +102,14 @@ def _lay_out(grid: Grid, adapter: str, validation: bool) -> Layout:
 
 
 def _render(grid: Grid, run: _Run) -> Tally:
-    """Render and write a run's blocks; in a worker."""
+    """Render and write a run's blocks; called in a worker."""
     renderer, lock = _renderer(run.adapter, run.validation)
     with lock:
         if renderer.info.name != run.layout.adapter:
             raise ValueError(
-                f"adapter: this worker has {renderer.info.name}, the grid was begun on "
-                f"{run.layout.adapter}; their pictures would differ"
+                f"adapter: the worker's {renderer.info.name} is not the grid's "
+                f"{run.layout.adapter}; their pictures may differ, so name an adapter that all "
+                "workers have"
             )
         total = Tally()
         try:
@@ -116,25 +117,25 @@ def _render(grid: Grid, run: _Run) -> Tally:
             blocks = written_behind(filler, run.writer, run.blocks, run.layout, total.add)
             run.writer.flush(list(blocks))
         except DeviceLostError:
-            # The next try gets a new device.
+            # Close it, so that the next attempt creates a new device.
             renderer.close()
             raise
         return total
 
 
 def check_client(client: Any) -> None:
-    """Raise TypeError unless a client can be used from here."""
+    """Raise TypeError unless the argument is a synchronous client."""
     distributed = import_extra("distributed", "grid", _PURPOSE)
     if not isinstance(client, distributed.Client):
-        raise TypeError(f"client: a dask.distributed.Client is needed, not {client!r}")
+        raise TypeError(f"client: {client!r} is not a dask.distributed.Client")
     if client.asynchronous:
-        raise TypeError("client: one that waits is needed, not an asynchronous one")
+        raise TypeError("client: it is asynchronous; pass one made with asynchronous=False")
 
 
 class _Shared:
-    """A grid's source, held by the cluster as the result of a task.
+    """A grid, kept by the cluster as the result of a task.
 
-    Other than scattered data, it is made again when the worker that held it dies.
+    Unlike scattered data, the result is computed again if the worker that holds it dies.
     """
 
     def __init__(self, client: Client, grid: Grid) -> None:
@@ -142,12 +143,12 @@ class _Shared:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Sending large graph", category=UserWarning)
             self.future = client.submit(
-                _same, cloudpickle.dumps(grid), pure=False, retries=_RETRIES
+                _unpickled, cloudpickle.dumps(grid), pure=False, retries=_RETRIES
             )
 
 
 def lay_out_there(client: Client, grid: Grid, adapter: str, validation: bool) -> Layout:
-    """Ask a worker's renderer for a grid's layout; the client's machine may have none."""
+    """Lay out a grid on a worker's renderer: the client's machine may have no adapter."""
     shared = _Shared(client, grid)
     layout: Layout = client.submit(
         _lay_out, shared.future, adapter, validation, pure=False, retries=_RETRIES
@@ -156,7 +157,7 @@ def lay_out_there(client: Client, grid: Grid, adapter: str, validation: bool) ->
 
 
 def _runs(todo: Iterable[Block], layout: Layout, points: int) -> Iterator[tuple[Block, ...]]:
-    """Yield neighbouring blocks, together about as many points as asked for."""
+    """Yield runs of neighbouring blocks, each of about `points` points."""
     most = max(1, min(points, _RUN_POINTS, _RUN_BYTES // max(layout.point_size, 1)))
     found: list[Block] = []
     for block in todo:
@@ -188,20 +189,20 @@ def run_there(
     grid : Grid
     layout : Layout
     sink : Sink
-        Its writer goes to the workers, its marks are made here.
+        Its writer is sent to the workers; this process makes the marks.
     todo : iterable of Block
     progress : Progress
     missing : int
-        Points of these blocks.
+        Number of points in these blocks.
     adapter, validation
-        Of the workers' renderers.
+        Arguments of the workers' renderers.
 
     Raises
     ------
     Error
-        Every worker that took a run died.
+        Every worker that started a run died.
     Exception
-        What a run failed with after some more tries; other runs that were done are kept.
+        A run's exception after all retries; completed runs are kept.
     """
     distributed = import_extra("distributed", "grid", _PURPOSE)
     workers = max(1, len(client.nthreads()))
@@ -227,20 +228,20 @@ def run_there(
         submit(_AHEAD * workers)
         for future in finished:
             take(future)
-            # Workers may come and go.
+            # The number of workers may have changed.
             submit(_AHEAD * max(1, len(client.nthreads())) - len(under_way))
     except BaseException as error:
         _stop(client, under_way, take)
         if isinstance(error, distributed.KilledWorker):
-            raise Error(f"too many workers died: {error}") from error
+            raise Error(f"client: too many workers died: {error}") from error
         raise
     finally:
         client.unregister_worker_plugin(_PLUGIN)
 
 
 def _stop(client: Client, under_way: dict[Any, tuple[Block, ...]], take: Any) -> None:
-    """Keep the runs that are done, and call the others off."""
-    # What has stopped the grid, such as a full disk, may keep these from being marked, too.
+    """Mark the runs that are done, and cancel the others."""
+    # The cause of the failure, such as a full disk, may also prevent the marks.
     with contextlib.suppress(OSError):
         for future in list(under_way):
             if future.status == "finished":

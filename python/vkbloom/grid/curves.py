@@ -1,4 +1,4 @@
-"""Curves of a grid: how figures change along one axis, a line for each value of another."""
+"""Plot figures of a grid along one axis, with a line for each value of another."""
 
 from __future__ import annotations
 
@@ -28,52 +28,71 @@ def response_curves(
     at: Mapping[str, Any] | None = None,
     most: int = 8,
 ) -> Figure:
-    """Draw how figures change along an axis.
+    """Plot figures of a grid along an axis.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        From `vkbloom.Renderer.grid`, `vkbloom.grid_to_zarr`, or the latter's store opened by
-        xarray; also a part of it.
+        A grid from `vkbloom.Renderer.grid` or `vkbloom.grid_to_zarr`, a store opened by xarray, or
+        a selection of one.
     axis : str, optional
-        Goes across. By default the axis of numbers with the most values.
+        The horizontal axis. Default: the numeric axis with the most values.
     lines : str, optional
-        Has a line for each of its values. By default the next axis with more than one value, or
-        for a figure that is an array, such as an encircled energy, its own dimension.
+        The axis with a line for each of its values. Default: the next axis with more than one
+        value, or the dimension of a figure that is an array, such as an encircled energy.
     variables : sequence of str, optional
-        A diagram each. By default all figures that are no framebuffers; where there are none, the
-        mean of red, green and blue of every framebuffer.
+        The variables to plot, one diagram each. Default: all variables that are not framebuffers;
+        if there are none, the mean of red, green and blue of each framebuffer.
     at : mapping of str to object, optional
-        Where to stand along the other axes (the nearest number, or that text); by default at their
-        first value.
+        Values of the other axes: the nearest number is selected, or an equal text. Default: their
+        first values.
     most : int
-        Lines of a diagram; of more values as many are shown, evenly spread.
+        Largest number of lines in a diagram; of more values, evenly spaced ones are shown.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Has ``savefig``, and shows itself in a notebook. Points that are not done are left out.
+        Save it with ``savefig``; a notebook shows it. Points that are not done are left out.
 
     Raises
     ------
     TypeError, ValueError
-        The Dataset is no grid, or an argument is wrong.
+        The Dataset is not a grid, or an argument is wrong.
     ModuleNotFoundError
         matplotlib is missing.
+
+    See Also
+    --------
+    contact_sheet : Pictures instead of figures.
+    vkbloom.grid.reductions : Figures that a grid can compute.
+
+    Examples
+    --------
+    >>> from vkbloom.grid.reductions import Mean
+    >>> image = np.full((16, 16, 4), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     grid = renderer.grid(
+    ...         image, axes={"intensity": [0.5, 1.0]}, attachments=(), reduce={"mean": Mean()}
+    ...     )
+    >>> figure = vkbloom.response_curves(grid)
+    >>> [diagram.get_xlabel() for diagram in figure.axes]
+    ['intensity']
     """
     figure_module = import_extra("matplotlib.figure", "grid", "response_curves")
     axes = views.axes_of(dataset)
     for field, chosen in (("axis", axis), ("lines", lines)):
         if chosen is not None and chosen not in axes:
-            raise ValueError(f"{field}: {chosen!r} is not an axis of the grid: {', '.join(axes)}")
+            raise ValueError(
+                f"{field}: {chosen!r} is not an axis of the grid; it has {', '.join(axes)}"
+            )
     if axis is None:
         long = [name for name in axes if name != lines and dataset.sizes[name] > 1]
         if not long:
             raise ValueError("dataset: no axis of the grid has more than one value")
-        # The numbers first; among them the longest.
+        # Numeric axes first; among them the longest.
         axis = max(long, key=lambda name: (_is_number(dataset, name), dataset.sizes[name]))
     if axis == lines:
-        raise ValueError(f"lines: {lines!r} goes across already")
+        raise ValueError(f"lines: {lines!r} is already the horizontal axis; name another")
     figures = _figures(dataset, variables, axes)
     figure: Figure = figure_module.Figure(
         figsize=(_WIDTH, _HEIGHT * len(figures)), layout="constrained"
@@ -91,7 +110,7 @@ def _is_number(dataset: xarray.Dataset, name: str) -> bool:
 def _figures(
     dataset: xarray.Dataset, variables: Sequence[str] | None, axes: Sequence[str]
 ) -> dict[str, xarray.DataArray]:
-    """Return the figures to draw, by what they are called."""
+    """Return the figures to plot, by their labels."""
     frames = list(views.framebuffers_of(dataset))
     others = [str(name) for name in dataset.data_vars if name not in (*frames, "done")]
     chosen = list(others or frames) if variables is None else list(variables)
@@ -106,7 +125,7 @@ def _figures(
             colours = array.isel({dim: slice(0, 3) for dim in channel})
             kept = [dim for dim in array.dims if dim not in axes]
             array = colours.mean(kept, dtype=np.float64) / scale
-            name = f"mean of {name}"  # noqa: PLW2901  what it is from here on
+            name = f"mean of {name}"  # noqa: PLW2901  the label of the figure
         if "done" in dataset:
             array = array.where(dataset["done"])
         array.attrs = dict(dataset[name].attrs) if name in others else {}
@@ -125,12 +144,12 @@ def _draw(
     at, most = chosen
     own = [str(dim) for dim in values.dims if dim not in views.axes_of(dataset)]
     if len(own) > 1:
-        raise ValueError(f"variables: {values.name} has {len(own)} dimensions of its own")
+        raise ValueError(f"variables: {values.name} has {len(own)} dimensions besides the axes")
     if lines is None and not own:
         free = [d for d in views.axes_of(dataset) if d not in (axis, *(at or {}))]
         lines = next((name for name in reversed(free) if dataset.sizes[name] > 1), None)
     across = own[0] if lines is None and own else lines
-    # As a Dataset, which keeps where it stands along the other axes.
+    # A Dataset keeps the coordinates of the axes that are not shown.
     table = dataset.drop_vars(list(dataset.data_vars)).assign(value=values)
     shown = [name for name in (axis, lines) if name is not None]
     part = views.select(table, at, shown)
@@ -152,5 +171,5 @@ def _draw(
     diagram.set_title(views.caption(part), fontsize="small")
     diagram.grid(alpha=0.3)
     if across:
-        # Beside the diagram, where no line is hidden.
+        # Beside the diagram, so that it hides no line.
         diagram.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1, 1))

@@ -1,4 +1,4 @@
-"""Blocks of points, rendered and reduced into arrays."""
+"""Render blocks of points, and reduce their frames, into arrays."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ __all__ = ["Filler", "Tally"]
 
 @dataclass
 class Tally:
-    """Passes counted over some points.
+    """Number of points, and of their passes.
 
     Parameters
     ----------
     points : int
     ran : int
-        Passes that ran, those for points to compare with included.
+        Passes that ran, including those of reference frames.
     alone : int
-        Passes of the same points, each rendered alone and no form standing for several passes.
+        Passes that the same points need if each is rendered alone, without fused passes.
     """
 
     points: int = 0
@@ -42,7 +42,7 @@ class Tally:
         return self.alone - self.ran
 
     def add(self, other: Tally) -> None:
-        """Count what another counted."""
+        """Add another tally."""
         self.points += other.points
         self.ran += other.ran
         self.alone += other.alone
@@ -78,10 +78,10 @@ class Filler:
         ----------
         block : Block
         arrays : mapping of str to ndarray
-            By variable, of the block's shape and then the variable's; they are filled.
+            By variable; the block's shape, then the variable's. They are filled.
         on_point : callable
-            Called with the count of each point when it is there, and with that of the frames to
-            compare with.
+            Called with the tally of each rendered point, and with the tally of the reference
+            frames.
 
         Returns
         -------
@@ -90,14 +90,15 @@ class Filler:
         Raises
         ------
         ValueError
-            A point has another shape or dtype than the first; the message names it.
+            A point's variable has another shape or dtype than the first point's; the message names
+            the point.
         """
         grid, total = self._grid, Tally()
         order = list(points(block, self._layout.ranking))
         if self._references:
             total.add(Tally(ran=self._hold_references(order)))
             on_point(total)
-        # Before the points, as a renderer may be at work on some ahead of those it has given.
+        # Counted before rendering starts, because the renderer may run ahead of the results.
         alone = [self._counter.alone(index) for index in order]
         path = (grid.point(index) for index in order)
         found = visit(self._renderer, grid.source, path, grid.wanted)
@@ -126,18 +127,18 @@ class Filler:
             value.dtype, variable.dtype, "same_kind"
         ):
             raise ValueError(
-                f"{name}: {value.shape} {value.dtype} at {self._grid.named(index)}, but "
-                f"{variable.shape} {variable.dtype} at the grid's first point"
+                f"{name}: {value.shape} {value.dtype} at {self._grid.named(index)} is not "
+                f"{variable.shape} {variable.dtype} as at the grid's first point"
             )
         array[place] = value
 
     def _reference(self, name: str, index: Index) -> Index:
-        """Return the point that a reduction compares the one at an index with."""
+        """Return the point whose frame is a reduction's reference for the point at an index."""
         fixed = self._references[name]
         return tuple(fixed.get(number, place) for number, place in enumerate(index))
 
     def _hold_references(self, order: list[Index]) -> int:
-        """Render what the points are compared with, and return the passes that ran."""
+        """Render the reference frames of the points, and return the number of passes that ran."""
         needed: dict[tuple[str, Index], None] = {}
         for name in self._references:
             attachment = self._grid.reduce[name].attachment  # type: ignore[attr-defined]

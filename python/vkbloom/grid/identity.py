@@ -1,4 +1,4 @@
-"""What makes a grid that is kept the same grid again, and what differs where it is not."""
+"""The identity of a stored grid, and the differences between two identities."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from vkbloom.grid.sources import digest
 
 __all__ = ["FORMAT", "chunk_in", "differences", "identity", "short"]
 
-#: Of the stores' own layout; another number cannot be read.
+#: Version of the store's layout. A store with another version cannot be read.
 FORMAT: Final = 2
 
-_LONGEST: Final = 60  # letters of a value in a message
+_LONGEST: Final = 60  # characters of a value in a message
 
 
 def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
-    """Return all that decides what a grid's arrays hold, as plain values.
+    """Return everything that determines the contents of a grid's arrays, as JSON values.
 
     Parameters
     ----------
@@ -51,20 +51,20 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
         "reduce": {name: _reduction(reduction) for name, reduction in grid.reduce.items()},
         "chunk": chunk,
     }
-    # As it comes back from the store: tuples are lists there.
+    # The same conversion as by storing it in JSON, which turns tuples into lists.
     plain: dict[str, Any] = json.loads(json.dumps(found))
     return plain
 
 
 def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
-    """Return the points of a block by axis that an identity tells, None where it tells none.
+    """Return the chunk that a stored identity has; None if it has no valid one.
 
     Parameters
     ----------
     stored : mapping
-        From a store, which may hold anything there.
+        The identity from a store. It may be damaged, so any value is possible.
     shape : tuple of int
-        Of the grid; a block that is larger is none.
+        Shape of the grid; a larger chunk is not valid.
     """
     held = stored.get("chunk")
     if stored.get("format") != FORMAT or not isinstance(held, list) or len(held) != len(shape):
@@ -88,7 +88,7 @@ def _reduction(reduction: Any) -> str:
 
 
 def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
-    """Tell what differs between the grid in a store and the one asked for.
+    """List the differences between the grid in a store and the requested one.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str
     Returns
     -------
     list of str
-        One phrase each; empty where they are the same.
+        One phrase per difference; empty if there are none.
     """
     return list(_differences("", stored, asked))
 
@@ -108,21 +108,21 @@ def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
         for key in dict.fromkeys((*stored, *asked)):
             inner = f"{name}.{key}" if name else key
             if key not in stored:
-                yield f"{inner}: not in the store, {short(asked[key])} asked for"
+                yield f"{inner}: not in the store, {short(asked[key])} requested"
             elif key not in asked:
-                yield f"{inner}: {short(stored[key])} in the store, not asked for"
+                yield f"{inner}: {short(stored[key])} in the store, not requested"
             else:
                 yield from _differences(inner, stored[key], asked[key])
     elif stored != asked:
-        yield f"{name}: {short(stored)} in the store, {short(asked)} asked for"
+        yield f"{name}: {short(stored)} in the store, {short(asked)} requested"
 
 
 def short(value: Any) -> str:
-    """Return a value of a store for a message, whatever it is."""
+    """Return any JSON value as a short text for a message."""
     try:
         text = json.dumps(value)
     except RecursionError:
-        text = "lists in lists"
+        text = "nested lists"
     if len(text) <= _LONGEST:
         return text
     return f"{text[: _LONGEST - 20]} ... {text[-12:]}"

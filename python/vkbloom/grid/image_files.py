@@ -1,4 +1,4 @@
-"""A grid as image files, one or several a point."""
+"""A grid as image files, one per framebuffer of each point."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _INDEX: Final = "grid.json"
 
 @dataclass(frozen=True)
 class FileForm:
-    """What the files of an image's `final` hold, as `vkbloom.io.images.Picture` has it."""
+    """Encoding and number type of an image's `final` files, as in `vkbloom.io.images.Picture`."""
 
     encoding: Encoding | None
     numbers: str
@@ -37,7 +37,7 @@ class FileForm:
 
 @dataclass(frozen=True)
 class _FileWriter:
-    """Writes the files of points, in whatever process renders them."""
+    """Writes the files of points; it can be sent to the process that renders them."""
 
     folder: Path
     suffix: str
@@ -58,7 +58,7 @@ class _FileWriter:
         }
 
     def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Write the files of a block's points, each when it is whole."""
+        """Write the files of a block's points, each atomically."""
         for index in points(block, self.layout.ranking):
             place = tuple(i - start for i, start in zip(index, block.start, strict=True))
             for name, path in self.paths(index).items():
@@ -79,18 +79,18 @@ class _FileWriter:
             return
         info = {"adapter": self.layout.adapter, "driver": self.layout.driver}
         frames = Frames({name: array}, timings={}, settings=point.settings, info=info)
-        # What the format cannot hold becomes an OpenEXR file beside it.
+        # A framebuffer that the format cannot hold is written as an OpenEXR file.
         frames.save(path)
 
     def is_there(self, index: Index) -> bool:
-        """Return whether all files of a point are there."""
+        """Return whether all files of a point exist."""
         return all(
             path.exists() or path.with_suffix(".exr").exists()
             for path in self.paths(index).values()
         )
 
     def flush(self, written: Iterable[Block]) -> None:
-        """Do nothing: a file has its name when it is whole."""
+        """Do nothing: each file is renamed to its final name when it is complete."""
 
 
 class GridFiles:
@@ -100,13 +100,13 @@ class GridFiles:
     ----------
     folder : Path
     suffix : str
-        Of the image files, such as ".png". A framebuffer that the format cannot hold as it is
-        becomes an ``.exr``.
+        Extension of the image files, such as ".png". A framebuffer that the format cannot hold
+        without conversion is written as ``.exr``.
     grid : Grid
-        Without reductions.
+        A grid without reductions.
     layout : Layout
     forms : sequence of FileForm
-        How `final` is written, by image; empty: as it is.
+        How `final` is written, by image; empty: without conversion.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class GridFiles:
     ) -> None:
         image_writing.check_writable(f"image{suffix}")
         check_name(folder)
-        # Writers are sent with every task, and need not know the pixels.
+        # The writer is sent with every task and does not need the pixels.
         light = replace(grid, source=ImageSource(()))
         self._files = _FileWriter(folder.absolute(), suffix, light, layout, tuple(forms))
         self._identity = {**identity(grid, layout, ()), "suffix": suffix}
@@ -128,7 +128,7 @@ class GridFiles:
 
     @property
     def writer(self) -> Writer:
-        """What writes files, in any process."""
+        """The writer of files, which can be sent to other processes."""
         return self._files
 
     def _blocks(self) -> Iterable[Block]:
@@ -136,50 +136,50 @@ class GridFiles:
         return blocks(files.grid.shape, self._chunk, files.layout.ranking)
 
     def missing(self) -> Iterable[Block]:
-        """Return the blocks that are not done, in the order of visiting."""
+        """Return the blocks that are not done, in the order in which they are rendered."""
         return (block for block in self._blocks() if not self.done[block.slices].all())
 
     def mark(self, written: Iterable[Block]) -> None:
-        """Count points as done."""
+        """Mark points as done."""
         for block in written:
             self.done[block.slices] = True
 
     def prepare(self, *, resume: bool) -> None:
-        """Make the folder, or find out what is in it.
+        """Create the folder, or examine an existing one.
 
         Parameters
         ----------
         resume : bool
-            Whether a folder with a grid may be gone on with.
+            Whether to continue an existing grid.
 
         Raises
         ------
         FileExistsError
-            There is a grid and `resume` is False.
+            The folder has a grid and `resume` is False.
         ValueError
-            There is something else, or a grid that differs. Nothing was written.
+            The folder contains other files or another grid. Nothing is written.
         """
         files = self._files
         index = files.folder / _INDEX
         own = self._identity
         if not files.folder.exists() or not any(files.folder.iterdir()):
             files.folder.mkdir(parents=True, exist_ok=True)
-            safe_writing.write_whole(index, json.dumps(own, indent=1).encode())
+            safe_writing.write_file(index, json.dumps(own, indent=1).encode())
             return
         try:
             stored = json.loads(index.read_text())
         except FileNotFoundError:
             raise ValueError(
-                f"{files.folder}: there is no grid in it, but something else"
+                f"{files.folder}: the folder is not empty, and its content is not a grid of vkbloom"
             ) from None
         except (ValueError, RecursionError) as error:
             raise ValueError(f"{index}: damaged, {error}") from error
         if not resume:
             raise FileExistsError(
-                f"{files.folder}: there is a grid already; resume it, or name another folder"
+                f"{files.folder}: the folder already has a grid; resume it, or name another folder"
             )
         found = differences(stored, own)
         if found:
-            raise ValueError(f"{files.folder}: another grid is there; {'; '.join(found)}")
+            raise ValueError(f"{files.folder}: contains another grid; {'; '.join(found)}")
         for place in np.ndindex(files.grid.shape):
             self.done[place] = files.is_there(place)

@@ -1,4 +1,4 @@
-"""The keys of a Zarr store as bytes: read, written, and brought safely to the disk."""
+"""Read and write the keys of a Zarr store as bytes, and flush them to the disk."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _buffers() -> Any:
 
 @functools.cache
 def _event_loop(process: int) -> asyncio.AbstractEventLoop:
-    """Return a loop that runs in a thread: the caller's may be running, as in a notebook."""
+    """Return a loop that runs in a thread: in a notebook the caller's loop is already running."""
     del process
     loop = asyncio.new_event_loop()
     threading.Thread(target=loop.run_forever, name="vkbloom-grid", daemon=True).start()
@@ -36,12 +36,12 @@ def _event_loop(process: int) -> asyncio.AbstractEventLoop:
 
 
 def _run(coroutine: Coroutine[Any, Any, _T]) -> _T:
-    # One loop per process, because a forked child has no threads of its parent.
+    # One loop per process, because a forked child does not have its parent's threads.
     return asyncio.run_coroutine_threadsafe(coroutine, _event_loop(os.getpid())).result()
 
 
 def _for_own_loop(store: Store) -> Store:
-    """Return the store, with connections of its own where they belong to an event loop."""
+    """Return a store whose connections may be used on this module's event loop."""
     zarr = import_extra("zarr", "grid", _PURPOSE)
     if not isinstance(store, zarr.storage.FsspecStore) or hasattr(store.fs, "sync_fs"):
         return store
@@ -61,18 +61,18 @@ class Keys:
 
     def __init__(self, store: Store) -> None:
         self.store = store
-        # Zarr runs a store's coroutines on a loop of its own, which it does not make public.
+        # Zarr runs a store's coroutines on an event loop of its own, which is not public.
         self._coroutines = _for_own_loop(store)
 
     @property
     def _root(self) -> Path | None:
-        """The folder of a store on this machine."""
+        """The folder of a local store; None for other stores."""
         root = getattr(self.store, "root", None)
         return root if isinstance(root, Path) else None
 
     @property
     def name(self) -> str:
-        """What the store is called in messages."""
+        """The store's name in messages."""
         return str(self._root or self.store)
 
     @property
@@ -82,18 +82,18 @@ class Keys:
         return not isinstance(self.store, zarr.storage.MemoryStore)
 
     def read(self, key: str) -> bytes | None:
-        """Return the bytes of a key, None where there is none."""
+        """Return the bytes of a key; None if the key does not exist."""
         found = _run(self._coroutines.get(key, _buffers()))
         return None if found is None else bytes(found.to_bytes())
 
     def write(self, key: str, content: bytes) -> None:
-        """Write a key; on disk another reader sees all of it or what was there before."""
+        """Write a key. On disk, a reader sees either the old content or the complete new one."""
         with self.named(key):
             _run(self._coroutines.set(key, _buffers().buffer.from_bytes(content)))
 
     @contextmanager
     def named(self, key: str) -> Iterator[None]:
-        """Name what was written in an OSError that does not, as of a full disk."""
+        """Add the key to an OSError that names no file, as when the disk is full."""
         try:
             yield
         except OSError as error:
@@ -110,9 +110,9 @@ class Keys:
         return _run(listed())
 
     def flush(self, keys: Iterable[str]) -> None:
-        """Wait until keys that were written are on the disk.
+        """Flush keys that were written to the disk.
 
-        Stores elsewhere answer for that themselves.
+        Does nothing for stores that are not local: they are durable when the write returns.
         """
         root = self._root
         if root is None:
@@ -127,7 +127,7 @@ class Keys:
                 _flush(folder)
 
     def remove_leftovers(self) -> None:
-        """Remove the temporary files of a process that was killed while it wrote."""
+        """Remove the temporary files of a process that was killed while writing."""
         root = self._root
         for path in root.glob("**/*.partial") if root else ():
             path.unlink(missing_ok=True)
@@ -142,12 +142,12 @@ def _flush(path: Path) -> None:
 
 
 def open_keys(store: Any) -> Keys:
-    """Open a store for its keys.
+    """Open the keys of a store.
 
     Parameters
     ----------
     store : str, path-like or zarr.abc.store.Store
-        A folder, which need not be there, a URL that fsspec knows, or a store.
+        A folder, which need not exist, a URL that fsspec supports, or a store.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def open_keys(store: Any) -> Keys:
     Raises
     ------
     TypeError
-        It is something else.
+        The store is something else.
     """
     zarr = import_extra("zarr", "grid", _PURPOSE)
     if isinstance(store, zarr.abc.store.Store):
@@ -166,8 +166,8 @@ def open_keys(store: Any) -> Keys:
         local = import_extra("fsspec.implementations.local", "grid", _PURPOSE)
         if not isinstance(system, local.LocalFileSystem):
             return Keys(zarr.storage.FsspecStore.from_url(store))
-        # A folder of this machine: what is promised of those holds for it, too.
+        # A local folder: use LocalStore, which writes each key atomically.
         store = path
     if isinstance(store, str | os.PathLike):
         return Keys(zarr.storage.LocalStore(Path(store).absolute()))
-    raise TypeError(f"store: a folder, a URL or a Zarr store is needed, not {store!r}")
+    raise TypeError(f"store: {store!r} is not a folder, a URL or a Zarr store")

@@ -1,4 +1,4 @@
-"""A grid in memory, as one Dataset."""
+"""Render a grid in memory, as one Dataset."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 __all__ = ["BLOCK_BYTES", "BLOCK_POINTS", "chunk_of", "in_memory"]
 
-#: What a block may hold: enough for a file that is worth its name, little enough to lose.
+#: Limits of a block: large enough for an efficient file, small enough to render again if lost.
 BLOCK_BYTES = 1 << 20
 BLOCK_POINTS = 1024
-# Frames to compare with may take more than what is stored of a point.
+# Reference frames may need more memory than the stored variables of a point.
 _REFERENCE_BYTES = 64 << 20
 
 
 def chunk_of(grid: Grid, layout: Layout) -> tuple[int, ...]:
-    """Return the number of a block's points along each axis."""
+    """Return the number of points per block along each axis."""
     stored = layout.point_size - layout.reference_size
     most = min(
         BLOCK_POINTS,
@@ -51,7 +51,7 @@ def in_memory(grid: Grid, renderer: FrameRenderer, progress: bool | None) -> xar
     Returns
     -------
     xarray.Dataset
-        As `vkbloom.Renderer.grid` describes it.
+        The Dataset that `vkbloom.Renderer.grid` documents.
     """
     xr = import_extra("xarray", "grid", "Renderer.grid")
     layout = lay_out(grid, renderer)

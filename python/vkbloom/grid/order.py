@@ -1,13 +1,12 @@
-"""The order in which the points of a grid are visited, and the blocks that they come in.
+"""The order in which the points of a grid are rendered, and their division into blocks.
 
-One step changes one axis only, as in a reflected (Gray) counting: the last value of a fast axis is
-followed by the same value at the next value of a slower one, and the fast axis then runs backwards.
-A step so costs what its own axis puts out of date, nothing more.
+Each step changes one axis only, as in reflected Gray code: after the last value of a fast axis, a
+slower axis moves to its next value and the fast axis runs backwards. A step then runs only the
+passes that depend on the axis that changed.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,7 +25,7 @@ class Block:
     start, stop : tuple of int
         The box, by axis.
     backwards : tuple of bool
-        By axis, whether it begins with the box's last value.
+        By axis, whether the visit begins with the box's last value.
     """
 
     start: Index
@@ -45,12 +44,12 @@ class Block:
 
     @property
     def slices(self) -> tuple[slice, ...]:
-        """Select the box from an array with one dimension an axis."""
+        """Slices that select the box from an array with one dimension per axis."""
         return tuple(slice(*ends) for ends in zip(self.start, self.stop, strict=True))
 
 
 def _reflected(position: int, radices: Sequence[int]) -> Iterator[int]:
-    """Yield the digits of a position in reflected counting, the slowest first."""
+    """Yield the digits of a position in reflected Gray code, the slowest first."""
     for place in range(len(radices)):
         sweeps, digit = divmod(position // math.prod(radices[place + 1 :]), radices[place])
         yield radices[place] - 1 - digit if sweeps % 2 else digit
@@ -64,14 +63,14 @@ def blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block
     shape : tuple of int
         Number of values by axis.
     chunk : tuple of int
-        Number of a block's values by axis; the last block of an axis may have fewer.
+        Number of values per block by axis; the last block of an axis may have fewer.
     ranking : sequence of int
         The axes from the slowest to the fastest.
 
     Yields
     ------
     Block
-        The last point of each and the first of the next differ along one axis.
+        The last point of a block and the first of the next differ along one axis.
     """
     counts = [-(-shape[axis] // chunk[axis]) for axis in ranking]
     backwards = [False] * len(shape)
@@ -101,9 +100,8 @@ def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
     Yields
     ------
     tuple of int
-        The place along each axis, in the grid's order of axes.
+        The index along each axis, in the grid's order of axes.
     """
-    shape = block.shape
     index = list(block.start)
 
     def sweep(depth: int, backwards: list[bool]) -> Iterator[Index]:
@@ -117,12 +115,11 @@ def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
             yield from sweep(depth + 1, backwards)
         backwards[axis] ^= True
 
-    # Along an axis of one value there is no direction to turn.
-    return itertools.islice(sweep(0, list(block.backwards)), math.prod(shape))
+    return sweep(0, list(block.backwards))
 
 
 def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
-    """Return a chunk of whole fast axes, as far as it stays within a number of points.
+    """Return a chunk that spans complete fast axes, within a number of points.
 
     Parameters
     ----------
@@ -131,12 +128,13 @@ def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
     ranking : sequence of int
         The axes from the slowest to the fastest.
     most : int
-        Points of a chunk, 1 or more.
+        Largest number of points of a chunk, 1 or more.
 
     Returns
     -------
     tuple of int
-        Visiting block by block is then visiting in the order of a grid without blocks.
+        Number of values per chunk by axis. Visiting block by block then has the same order as
+        visiting a grid without blocks.
     """
     chunk = [1] * len(shape)
     for axis in reversed(ranking):

@@ -1,4 +1,4 @@
-"""A grid as it was asked for, and what a renderer says of it before anything is rendered."""
+"""A requested grid, and its layout: variables, shapes and dtypes, before anything is rendered."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ _CHANNELS: Final = ("r", "g", "b", "a")
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A grid as it was asked for.
+    """A requested grid, with checked arguments.
 
     Parameters
     ----------
     source : Source
     settings : Settings
-        What the axes vary.
+        The settings that the axes vary.
     axes : tuple of Axis
-        In the order of the result's dimensions.
+        The axes, in the order of the result's dimensions.
     attachments : "all" or tuple of str
         The framebuffers to keep.
     reduce : mapping of str to callable
@@ -84,7 +84,7 @@ class Grid:
         return Point(index, self.settings.replace(**changes) if changes else self.settings, place)
 
     def named(self, index: Index) -> str:
-        """Return a point in words, for messages."""
+        """Return a point's axis values as text for messages."""
         values = (f"{axis.name}={axis.label(i)}" for axis, i in zip(self.axes, index, strict=True))
         return ", ".join(values) or "the only point"
 
@@ -95,7 +95,7 @@ class Grid:
         return {k: v for k, v in self.settings.to_dict().items() if k not in varied}
 
     def references(self) -> dict[str, dict[int, int]]:
-        """Return the points that reductions compare with, as places by number of the axis."""
+        """Return the reference points of reductions: by name, indices by number of the axis."""
         found: dict[str, dict[int, int]] = {}
         for name, reduction in self.reduce.items():
             against = getattr(reduction, "against", None)
@@ -104,14 +104,16 @@ class Grid:
                 for key, value in against.items():
                     numbers = [i for i, axis in enumerate(self.axes) if axis.name == key]
                     if not numbers:
-                        raise ValueError(f"against: {key!r} is not an axis of the grid")
+                        raise ValueError(
+                            f"against: {key!r} is not an axis of the grid; use one of its axes"
+                        )
                     found[name][numbers[0]] = self.axes[numbers[0]].find(value)
         return found
 
 
 @dataclass(frozen=True)
 class Variable:
-    """What is kept of every point under one name."""
+    """A variable of the Dataset: a framebuffer or a figure of every point."""
 
     dims: tuple[str, ...]
     shape: tuple[int, ...]
@@ -126,7 +128,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a renderer says of a grid.
+    """The layout of a grid on a renderer.
 
     Parameters
     ----------
@@ -134,13 +136,13 @@ class Layout:
         The axes from the slowest to the fastest.
     variables : mapping of str to Variable
     coordinates : mapping of str to (array, attributes)
-        Of dimensions that are no axes.
+        Coordinates of dimensions that are not axes.
     reference_size : int
-        Bytes of the frames that one point is compared with.
+        Bytes of the reference frames of one point.
     structural : tuple of int
-        The axes that change the passes or the framebuffers that there are.
+        The axes that change which passes or framebuffers exist.
     ran : int
-        Passes that ran to find out what the reductions return.
+        Passes that ran to learn the shapes and dtypes of the reductions.
     adapter, driver, version : str
     """
 
@@ -156,7 +158,7 @@ class Layout:
 
     @property
     def point_size(self) -> int:
-        """Bytes that a point takes in memory."""
+        """Bytes of memory per point."""
         return sum(variable.size for variable in self.variables.values()) + self.reference_size
 
 
@@ -197,11 +199,11 @@ def ask(
     taken = {"y", "x", "channel", "done", *(axis.name for axis in found), *(names or ())}
     for name, reduction in reductions.items():
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
-            raise ValueError(f"reduce: {name!r} cannot name a variable of this grid")
+            raise ValueError(f"reduce: {name!r} is not a possible name of a variable of this grid")
         if not callable(reduction):
-            raise TypeError(f"reduce: {name} must be callable, not {reduction!r}")
+            raise TypeError(f"reduce: {name}: {reduction!r} is not callable")
     if names == () and not reductions:
-        raise ValueError("attachments: nothing is asked for, neither framebuffers nor reductions")
+        raise ValueError("attachments: empty, and there are no reductions; request one of them")
     grid = Grid(checked, settings, found, "all" if names is None else names, reductions)
     grid.references()
     return grid
@@ -419,7 +421,7 @@ def _sample(grid: Grid, renderer: FrameRenderer) -> Frames:
 
 
 def _reduced(grid: Grid, name: str, frames: Frames) -> NDArray[Any]:
-    """Return what a reduction makes of frames, compared with themselves where it compares."""
+    """Return a reduction of frames. A comparing reduction compares them with themselves."""
     reduction = grid.reduce[name]
     if name in grid.references() and isinstance(reduction, Comparing):
         reduction = dataclasses.replace(reduction, against=frames[reduction.attachment])
@@ -427,17 +429,17 @@ def _reduced(grid: Grid, name: str, frames: Frames) -> NDArray[Any]:
 
 
 def checked_value(name: str, value: Any) -> NDArray[Any]:
-    """Return the value of a reduction as an array of numbers.
+    """Convert the value of a reduction to an array of numbers.
 
     Raises
     ------
     ValueError
-        It is none.
+        The value is something else.
     """
     array = np.asarray(value)
     if array.dtype.kind not in "biuf":
-        raise ValueError(f"reduce: {name} gave {value!r}; numbers are needed")
-    # Python's numbers, and whatever has their precision, by one type each.
+        raise ValueError(f"reduce: {name}: {value!r} is not a number or an array of numbers")
+    # One dtype per kind of number, so that all points of a variable have the same.
     widest = {"b": np.bool_, "i": np.int64, "u": np.uint64, "f": np.float64}[array.dtype.kind]
     return array.astype(widest)
 
@@ -459,7 +461,7 @@ def _reduction_variable(
 
 
 def attributes_of(grid: Grid, layout: Layout) -> dict[str, Any]:
-    """Return the attributes that a Dataset of the grid has."""
+    """Return the attributes of the grid's Dataset."""
     facts = {key: value for key, value in grid.source.description.items() if key != "images"}
     return {
         "adapter": layout.adapter,

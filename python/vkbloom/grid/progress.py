@@ -1,4 +1,4 @@
-"""A progress bar with what a grid's owner wants to know: rate, remaining time, passes."""
+"""A progress bar of a grid: rate, remaining time, and passes run and saved."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Progress"]
 
 
 def _is_watched() -> bool:
-    """Return whether there is a terminal or a notebook to draw in."""
+    """Return whether standard error is a terminal, or this process a notebook's kernel."""
     if sys.stderr is not None and sys.stderr.isatty():
         return True
     kernel = sys.modules.get("IPython")
@@ -23,14 +23,14 @@ def _is_watched() -> bool:
 
 
 class Progress:
-    """Counts points and passes, and shows them.
+    """Count points and passes, and show them as a progress bar.
 
     Parameters
     ----------
     total : int
-        Points of the grid.
+        Number of points of the grid.
     done : int
-        Of which that many were there before.
+        Number of points that were done before.
     shown : bool or None
         True: in a terminal or a notebook, silent elsewhere. None: the same, if tqdm is installed.
         False: silent.
@@ -40,7 +40,7 @@ class Progress:
         self.tally = Tally()
         self._bar: Any = None
         if shown is not None and not isinstance(shown, bool):
-            raise TypeError(f"progress: True, False or None is needed, not {shown!r}")
+            raise TypeError(f"progress: {shown!r} is not True, False or None")
         if shown is False or (shown is None and find_spec("tqdm") is None):
             return
         tqdm = import_extra("tqdm.auto", "grid", "A progress bar").tqdm
@@ -48,7 +48,7 @@ class Progress:
             self._bar = tqdm(total=total, initial=done, unit="point", mininterval=0.2)
 
     def add(self, tally: Tally) -> None:
-        """Count points that are done."""
+        """Add points and passes that are done."""
         self.tally.add(tally)
         if self._bar is not None:
             self._bar.set_postfix_str(

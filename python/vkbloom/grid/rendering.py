@@ -1,4 +1,4 @@
-"""A whole grid rendered into whatever keeps it, here or on a cluster."""
+"""Render a grid into a sink, in this process or on a cluster."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ def render_grid(
     validation: bool,
     progress: bool | None,
 ) -> Tally:
-    """Render the points of a grid that are not there yet.
+    """Render the points of a grid that are not done.
 
     Parameters
     ----------
     grid : Grid
     prepared : callable
-        Gives what keeps the grid, ready to be written to, for the layout that a renderer found.
+        Takes the layout and returns a sink that is ready to be written to.
     client : distributed.Client or None
         None: this process renders.
     adapter, validation
-        Of the renderers.
+        Arguments of the renderers.
     progress : bool or None
         As for `vkbloom.Renderer.grid`.
 
     Returns
     -------
     Tally
-        Of what was rendered now.
+        The points and passes of this call.
     """
     with ExitStack() as stack:
         renderer: Renderer | None = None
@@ -78,7 +78,7 @@ def render_grid(
 
 @contextmanager
 def _opened(adapter: str, validation: bool) -> Iterator[Renderer]:
-    """Open a renderer, and close it without a wait where a signal ends the grid."""
+    """Open a renderer; if a signal ends the grid, close it without waiting for the device."""
     renderer = Renderer(adapter, validation=validation)
     try:
         yield renderer
@@ -86,7 +86,7 @@ def _opened(adapter: str, validation: bool) -> Iterator[Renderer]:
         renderer.close()
         raise
     except BaseException:
-        # The device goes on with what it has, which may be points of many seconds.
+        # The device finishes its submissions first, which may take many seconds.
         threading.Thread(target=renderer.close, name="vkbloom-close").start()
         raise
     else:

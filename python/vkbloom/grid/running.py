@@ -1,4 +1,4 @@
-"""Blocks of points rendered in this process and handed to whatever keeps them."""
+"""Render blocks of points in this process and write them to a sink."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ if TYPE_CHECKING:
 
 __all__ = ["Sink", "Writer", "empty_arrays", "run_here", "written_behind"]
 
-# How long and how much may be rendered before it is brought to the disk and marked.
+# Blocks are flushed and marked as done after this time, or this number of blocks.
 _COMMIT_SECONDS: Final = 2.0
 _COMMIT_BLOCKS: Final = 64
 
 
 class Writer(Protocol):
-    """Writes blocks in whatever process renders them."""
+    """Writes blocks; it can be sent to the process that renders them."""
 
     def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write a block's variables."""
 
     def flush(self, written: Iterable[Block]) -> None:
-        """Wait until blocks are on the disk."""
+        """Flush blocks to the disk."""
 
 
 class Sink(Protocol):
-    """What keeps a grid."""
+    """The storage of a grid: a Zarr store or a folder of image files."""
 
     @property
     def done(self) -> NDArray[np.bool_]:
-        """The points that are there, in the grid's shape."""
+        """Whether each point is done, in the grid's shape."""
 
     @property
     def writer(self) -> Writer:
-        """What can be sent to other processes."""
+        """The writer, which can be sent to other processes."""
 
     def missing(self) -> Iterable[Block]:
         """Return the blocks that are not done, in the order of visiting."""
 
     def mark(self, written: Iterable[Block]) -> None:
-        """Mark points as done; their data are on the disk."""
+        """Mark points as done; their data must be on the disk."""
 
 
 def empty_arrays(layout: Layout, block: Block) -> dict[str, NDArray[Any]]:
@@ -72,7 +72,7 @@ def run_here(
 ) -> None:
     """Render blocks one after the other.
 
-    Whatever ends it, blocks that were written are marked as done.
+    Blocks that were written are marked as done, also when an exception ends the call.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def run_here(
     Raises
     ------
     OSError
-        A block cannot be written; those before it are kept.
+        A block cannot be written; the blocks before it are kept.
     """
     filler = Filler(grid, layout, renderer)
     pending: list[Block] = []
@@ -117,7 +117,7 @@ def written_behind(
     layout: Layout,
     on_point: Callable[[Tally], object],
 ) -> Iterator[Block]:
-    """Render blocks, each written while the next is rendered.
+    """Render blocks, and write each while the next one is rendered.
 
     Parameters
     ----------
@@ -126,12 +126,13 @@ def written_behind(
     todo : iterable of Block
     layout : Layout
     on_point : callable
-        Called with the count of each point that is rendered.
+        Called with the `Tally` of each rendered point.
 
     Yields
     ------
     Block
-        That is written; when rendering fails, the one before it still is.
+        A block that was written. If rendering a block fails, the block before it is still
+        written and yielded.
     """
     with ThreadPoolExecutor(1, "vkbloom-grid") as pool:
         behind: tuple[Block, Future[None]] | None = None
@@ -158,5 +159,5 @@ def _commit_after(error: BaseException, commit: Callable[[], None]) -> None:
     try:
         commit()
     except OSError as second:
-        # On a full disk the marks may not fit either. Blocks that are whole are found again.
-        error.add_note(f"the last points that were written are not marked as done: {second}")
+        # On a full disk the marks may not fit either. A resumed grid finds complete blocks.
+        error.add_note(f"the last written points could not be marked as done: {second}")

@@ -1,4 +1,4 @@
-"""A contact sheet of a grid: a picture a point, in rows and columns by axis."""
+"""A contact sheet of a grid: one picture per point, in rows and columns by axis."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["contact_sheet"]
 
 _BACKGROUND: Final = 24
 _CELL: Final = 40
-# Of the letters' size; those of OpenImageIO's font are about half as wide as high.
+# Width of a character relative to the font size; OpenImageIO's font is about half as wide as high.
 _LETTER_WIDTH: Final = 0.6
 
 
@@ -34,38 +34,52 @@ def contact_sheet(
     width: int = 160,
     most: int = 12,
 ) -> bytes:
-    """Return a labelled contact sheet of a grid as PNG.
+    """Return a labelled contact sheet of a grid as a PNG file.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        From `vkbloom.Renderer.grid`, `vkbloom.grid_to_zarr`, or the latter's store opened by
-        xarray; also a part of it. Points that are not done yet are left empty.
+        A grid from `vkbloom.Renderer.grid` or `vkbloom.grid_to_zarr`, a store opened by xarray, or
+        a selection of one. Points that are not done are shown as empty cells.
     rows, columns : str, optional
-        The axes that go down and across. By default the last two that have more than one value,
-        the last going across.
+        The vertical and the horizontal axis. Default: the last two axes that have more than one
+        value, the last one horizontal.
     attachment : str, optional
-        The framebuffer to show, by default ``final`` or else the last image.
+        The framebuffer to show. Default: ``final``, or else the last framebuffer.
     at : mapping of str to object, optional
-        Where to stand along the other axes (the nearest number, or that text); by default at their
-        first value. The sheet's first line tells.
+        Values of the other axes: the nearest number is selected, or an equal text. Default: their
+        first values. The sheet's title lists them.
     width : int
-        Of a picture, in pixels, 48 to 4096. Pictures are made smaller by averaging, and larger
-        with hard pixels.
+        Width of a picture in pixels, 48 to 4096. Pictures are reduced by averaging, and enlarged
+        by repeating pixels.
     most : int
-        Pictures in a row and in a column, 1 to 64; of longer axes as many values are shown,
-        evenly spread.
+        Largest number of pictures in a row or column, 1 to 64; of a longer axis, evenly spaced
+        values are shown.
 
     Returns
     -------
     bytes
-        An 8-bit RGB PNG file. 8-bit frames are shown as they are, float ones clipped to 0..1 with
-        the sRGB curve, unless the settings have an encoding.
+        An 8-bit RGB PNG file. 8-bit frames are shown unchanged. Float frames are clipped to 0..1
+        and encoded to sRGB, unless the settings have an encoding.
 
     Raises
     ------
     TypeError, ValueError
-        The Dataset is no grid or holds no framebuffers, or an argument is wrong.
+        The Dataset is not a grid or has no framebuffers, or an argument is wrong.
+
+    See Also
+    --------
+    response_curves : Figures instead of pictures.
+
+    Examples
+    --------
+    >>> image = np.zeros((16, 16, 4), np.uint8)
+    >>> image[8, 8] = 255
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     grid = renderer.grid(image, axes={"blur_scale": [1.0, 2.0], "loops": [1, 2]})
+    >>> sheet = vkbloom.contact_sheet(grid, width=64)
+    >>> sheet[1:4]
+    b'PNG'
     """
     width = check_index("width", width, 48, 4096)
     most = check_index("most", most, 1, 64)
@@ -97,7 +111,7 @@ def contact_sheet(
     headings = [_heading(part, columns, column) for column in across]
     title = [name, views.caption(part)]
     if max(map(len, headings)) * _LETTER_WIDTH * letter > size[0]:
-        # Narrow columns have room for the values only.
+        # Narrow columns show the values only; the title names the axis.
         headings = [text.partition("=")[2] for text in headings]
         title.insert(1, f"{columns} across")
     texts.append((gap, letter + gap, ", ".join(filter(None, title))))
@@ -116,13 +130,15 @@ def contact_sheet(
 def _shown(
     dataset: xarray.Dataset, rows: str | None, columns: str | None
 ) -> tuple[str | None, str | None]:
-    """Return the axes that go down and across."""
+    """Return the vertical and the horizontal axis."""
     axes = views.axes_of(dataset)
     for field, name in (("rows", rows), ("columns", columns)):
         if name is not None and name not in axes:
-            raise ValueError(f"{field}: {name!r} is not an axis of the grid: {', '.join(axes)}")
+            raise ValueError(
+                f"{field}: {name!r} is not an axis of the grid; it has {', '.join(axes)}"
+            )
     if rows is not None and rows == columns:
-        raise ValueError(f"rows: {rows!r} goes across already")
+        raise ValueError(f"rows: {rows!r} is already the horizontal axis; name another")
     free = [name for name in axes if dataset.sizes[name] > 1 and name not in (rows, columns)]
     if columns is None:
         columns = free.pop() if free else None
@@ -135,7 +151,7 @@ def _attachment(dataset: xarray.Dataset, attachment: str | None) -> str:
     """Return the framebuffer to show."""
     found = {name: np.empty((0,) * dims) for name, dims in views.framebuffers_of(dataset).items()}
     if not found:
-        raise ValueError("dataset: the grid holds no framebuffers")
+        raise ValueError("dataset: the grid has no framebuffers to show")
     if attachment is None:
         return leading(found)
     if attachment not in found:

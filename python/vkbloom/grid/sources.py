@@ -1,4 +1,4 @@
-"""What a grid is made of: a scene, an image or several images, driven through a renderer."""
+"""The source of a grid: a scene, an image or several images."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class FrameRenderer(Protocol):
         *,
         attachments: str | Sequence[str],
     ) -> Iterator[Frames]:
-        """Give an image bloom with one settings after the other."""
+        """Add bloom to an image with each of the settings."""
 
     def render_many(
         self,
@@ -90,20 +90,20 @@ def visit(
     points: Iterable[Point],
     attachments: str | Sequence[str],
 ) -> Iterator[tuple[Index, Frames]]:
-    """Render points in their order.
+    """Render points in the given order.
 
     Parameters
     ----------
     renderer : FrameRenderer
     source : Source
     points : iterable of Point
-        Drawn as they are needed, some ahead.
+        Consumed as needed, with some read-ahead.
     attachments : "all" or sequence of str
 
     Yields
     ------
     (tuple of int, Frames)
-        The index of each point, and its frames.
+        Index and frames of each point.
     """
     for place, group in itertools.groupby(points, key=lambda point: point.place):
         drawn: deque[Index] = deque()
@@ -112,7 +112,7 @@ def visit(
 
 
 def _noted(points: Iterable[Point], drawn: deque[Index]) -> Iterator[Settings]:
-    """Yield the settings of points, whose indices are noted as they are drawn."""
+    """Yield the settings of points, and append the index of each to `drawn`."""
     for point in points:
         drawn.append(point.index)
         yield point.settings
@@ -214,18 +214,18 @@ Source: TypeAlias = ImageSource | SceneSource
 
 
 def read_source(source: object, size: tuple[int, int] | None, shading: str, time: float) -> Source:
-    """Check what a grid shall be made of.
+    """Check the source of a grid.
 
     Parameters
     ----------
     source : Scene, ndarray, or list or mapping of ndarray
         A mapping gives the images' labels.
     size : (int, int), optional
-        Of a scene's frame, by default (1280, 720). Images have their own.
+        Size of a scene's frame; default (1280, 720). Images have their own size.
     shading : {"forward", "deferred"}
-        Of a scene.
+        Shading of a scene.
     time : float
-        Of a scene, in turns.
+        Time of a scene's animation; its period is 1.
 
     Returns
     -------
@@ -234,7 +234,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     Raises
     ------
     TypeError, ValueError
-        The source is none of these, or an argument does not belong to it.
+        The source is something else, or an argument does not apply to it.
     """
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
@@ -259,7 +259,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         images, labels = list(source), list(range(len(source)))
     else:
         raise TypeError(
-            f"source: a Scene, an image or a list of images is needed, not {type(source).__name__}"
+            f"source: {type(source).__name__} is not a Scene, an image or a list of images"
         )
     if not images:
         raise ValueError("source: the list of images is empty")
@@ -267,7 +267,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
 
 
 def digest(value: object) -> str:
-    """Return a SHA-256 of plain values, arrays, and dataclasses of such."""
+    """Return the SHA-256 of plain values, arrays, and dataclasses and sequences of them."""
     found = hashlib.sha256()
 
     def add(part: object) -> None:
@@ -276,7 +276,7 @@ def digest(value: object) -> str:
             found.update(np.ascontiguousarray(part).data)
         elif dataclasses.is_dataclass(part):
             for field in dataclasses.fields(part):
-                # Fields that are no arguments, such as a serial number, say nothing.
+                # Fields that are not arguments, such as a serial number, are not content.
                 if field.init:
                     found.update(f"{field.name}:".encode())
                     add(getattr(part, field.name))

@@ -1,12 +1,12 @@
-"""A grid in a Zarr store that xarray opens, complete or not.
+"""A grid in a Zarr store, which xarray can open at any time.
 
-Order of events, so that a process may be killed at any time:
+The process may be killed at any time, because it writes in this order:
 
-1. The group's metadata, with the identity of the grid in it and a copy of all other metadata.
+1. The group's metadata, which contain the identity of the grid and a copy of all other metadata.
 2. The metadata of the arrays, and the coordinates.
-3. Blocks of points, each whole: a chunk of each variable, with a checksum. Zarr's LocalStore
-   writes a key under another name first and renames it.
-4. When blocks are on the disk, their points' marks in ``done``.
+3. Blocks of points: a complete chunk of each variable, with a checksum. Zarr's LocalStore writes
+   a key to a temporary file first and renames it.
+4. The marks in ``done``, after the blocks have been flushed to the disk.
 """
 
 from __future__ import annotations
@@ -56,24 +56,24 @@ DONE: Final = "done"
 
 _PURPOSE: Final = "Grids on disk"
 _DONE_POINTS: Final = 1 << 20
-# Fast, and little worse than higher levels on pictures with noise.
+# Level 1 is fast; on noisy pictures higher levels compress little better.
 _ZSTD_LEVEL: Final = 1
-# One folder for all chunks of an array, not one an axis.
+# The separator "." puts all chunks of an array in one folder; "/" would nest a folder per axis.
 _KEYS: Final = {"name": "default", "separator": "."}
 
 
 def chunk_key(name: str, block: Block, chunk: Index, trailing: int) -> str:
-    """Return the key of a variable's chunk that holds a block.
+    """Return the key of the chunk that contains a block of a variable.
 
     Parameters
     ----------
     name : str
-        Of the variable.
+        Name of the variable.
     block : Block
     chunk : tuple of int
-        Number of a block's values by axis.
+        Number of values per block by axis.
     trailing : int
-        Dimensions of the variable beside the axes, which no chunk divides.
+        Number of the variable's dimensions that are not axes; chunks do not divide them.
     """
     places = (start // size for start, size in zip(block.start, chunk, strict=True))
     # An array without dimensions has the key "c".
@@ -81,7 +81,7 @@ def chunk_key(name: str, block: Block, chunk: Index, trailing: int) -> str:
 
 
 def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
-    """Return all that a store holds before its first block, the group's metadata first.
+    """Return the contents of a store before its first block, the group's metadata first.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     _add_array(
         group,
         DONE,
-        Variable((), (), np.dtype(np.bool_), {"description": "Whether the point is there", **mark}),
+        Variable((), (), np.dtype(np.bool_), {"description": "Whether the point is done", **mark}),
         (dims, grid.shape, done_chunk(grid.shape)),
     )
     for name, variable in layout.variables.items():
@@ -118,7 +118,7 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     keys = Keys(memory)
     group.attrs[DIGESTS] = {key: digest(key, keys.read(key)) for key in sorted(keys.all() - {ROOT})}
     with warnings.catch_warnings():
-        # Format 3 does not define consolidated metadata yet, and xarray wants it all the same.
+        # Zarr warns because format 3 does not define consolidated metadata; xarray reads them.
         warnings.filterwarnings("ignore", message="Consolidated metadata")
         zarr.consolidate_metadata(memory)
     names = sorted(keys.all(), key=lambda key: (key != ROOT, key))
@@ -126,16 +126,16 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
 
 
 def digest(key: str, content: bytes | None) -> str | None:
-    """Return the SHA-256 of what a key holds, None where it is missing or damaged.
+    """Return the SHA-256 of a key's content; None if it is missing or damaged.
 
-    JSON counts by its values: spaces and the order of its names make no difference.
+    JSON is hashed in a normal form: white space and the order of names make no difference.
     """
     if content is None:
         return None
     if key.endswith(ROOT):
         found = read_json(content)
         try:
-            # As text: 3.0 and true are equal to numbers that they cannot stand for.
+            # Compared as text, because in Python 3.0 == 3 and True == 1.
             content = None if found is None else json.dumps(found, sort_keys=True).encode()
         except RecursionError:
             content = None
@@ -143,14 +143,14 @@ def digest(key: str, content: bytes | None) -> str | None:
 
 
 def done_chunk(shape: Index) -> Index:
-    """Return the points in a chunk of the marks by axis."""
+    """Return the grid points per chunk of ``done``, by axis."""
     return default_chunk(shape, range(len(shape)), _DONE_POINTS)
 
 
 def _add_coordinate(
     group: Any, name: str, values: NDArray[Any], attributes: Mapping[str, str]
 ) -> None:
-    """Add an array of one chunk, the values along a dimension, to a Zarr group."""
+    """Add the coordinate of a dimension to a Zarr group, as an array with one chunk."""
     is_text = values.dtype.kind == "U"
     array = group.create_array(
         name,
@@ -170,7 +170,7 @@ def _add_array(
 ) -> None:
     """Add a variable without its chunks to a Zarr group.
 
-    `lattice` is the names of the axes, their lengths, and a block's.
+    `lattice` has the names of the axes, their lengths, and the lengths of a block.
     """
     codecs = import_extra("zarr.codecs", "grid", _PURPOSE)
     dims, shape, chunk = lattice
@@ -182,7 +182,7 @@ def _add_array(
         dimension_names=[*dims, *variable.dims],
         attributes=dict(variable.attributes),
         chunk_key_encoding=_KEYS,
-        # The checksum comes last, so that it covers what is on the disk.
+        # The checksum is the last codec, so that it covers the compressed bytes.
         compressors=[codecs.ZstdCodec(level=_ZSTD_LEVEL), codecs.Crc32cCodec()],
         fill_value=math.nan if variable.dtype.kind == "f" else 0,
     )
@@ -190,13 +190,13 @@ def _add_array(
 
 @dataclass
 class GridWriter:
-    """Writes blocks into a store, in whatever process renders them.
+    """Writes blocks to a store; it can be sent to the process that renders them.
 
     Parameters
     ----------
     keys : Keys
     trailing : mapping of str to int
-        Number of dimensions beside the axes, by variable.
+        Number of dimensions that are not axes, by variable.
     chunk : tuple of int
     """
 
@@ -207,7 +207,7 @@ class GridWriter:
     def _array(self, name: str) -> Any:
         zarr = import_extra("zarr", "grid", _PURPOSE)
         array = zarr.open_array(self.keys.store, path=name, mode="r+")
-        # Black is a picture too: without its file nobody could tell that it is there.
+        # Also write chunks of zeros: a missing key would look like a missing point.
         return array.with_config({"write_empty_chunks": True})
 
     def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -217,16 +217,16 @@ class GridWriter:
                 self._array(name)[block.slices] = values
 
     def keys_of(self, block: Block) -> list[str]:
-        """Return the keys that hold a block."""
+        """Return the keys of a block's chunks."""
         return [chunk_key(name, block, self.chunk, n) for name, n in self.trailing.items()]
 
     def flush(self, written: Iterable[Block]) -> None:
-        """Wait until blocks are on the disk."""
+        """Flush blocks to the disk."""
         self.keys.flush(itertools.chain.from_iterable(map(self.keys_of, written)))
 
 
 class GridStore:
-    """A grid's store, with the marks of its points.
+    """The Zarr store of a grid, with its marks of completed points.
 
     Parameters
     ----------
@@ -234,12 +234,12 @@ class GridStore:
     grid : Grid
     layout : Layout
     chunk : tuple of int
-        Number of a block's values by axis.
+        Number of values per block by axis.
 
     Attributes
     ----------
     done : ndarray of bool, shape of the grid
-        The points that are safely there.
+        The points that are completely on the disk.
     writer : Writer
     """
 
@@ -255,39 +255,39 @@ class GridStore:
 
     @property
     def writer(self) -> Writer:
-        """What writes blocks, in any process."""
+        """The writer of blocks, which can be sent to other processes."""
         return self._chunks
 
     def blocks(self) -> Iterable[Block]:
-        """Return all blocks in the order of visiting."""
+        """Return all blocks in the order in which they are rendered."""
         return blocks(self.grid.shape, self.chunk, self.layout.ranking)
 
     def missing(self) -> Iterable[Block]:
-        """Return the blocks that are not done, in the order of visiting."""
+        """Return the blocks that are not done, in the order in which they are rendered."""
         return (block for block in self.blocks() if not self.done[block.slices].all())
 
     def prepare(self, *, resume: bool, verify: bool) -> list[str]:
-        """Make the store, or find out what is in it and mend what is damaged.
+        """Create the store, or examine an existing one and replace damaged metadata.
 
         Parameters
         ----------
         resume : bool
-            Whether a store that is there may be gone on with.
+            Whether to continue an existing store.
         verify : bool
-            Whether to read all that is there.
+            Whether to read all existing chunks.
 
         Returns
         -------
         list of str
-            What was mended, one phrase each.
+            A phrase for each damaged or missing key.
 
         Raises
         ------
         FileExistsError
-            There is a store and `resume` is False.
+            The store exists and `resume` is False.
         ValueError
-            There is something else, or a grid that differs; the message tells what. Nothing was
-            written.
+            The store contains other data or another grid; the message lists the differences.
+            Nothing is written.
         """
         expected = expected_keys(self.grid, self.layout, self.chunk)
         held = self.keys.all()
@@ -298,7 +298,7 @@ class GridStore:
             return []
         if not resume:
             raise FileExistsError(
-                f"{self.keys.name}: there is a grid already; resume it, or name another store"
+                f"{self.keys.name}: the store already has a grid; resume it, or name another store"
             )
         self._check_identity(held, expected)
         self.keys.remove_leftovers()
@@ -306,27 +306,27 @@ class GridStore:
         return mended + self._find_done(held, verify=verify)
 
     def _check_identity(self, held: set[str], expected: Mapping[str, bytes]) -> None:
-        """Raise ValueError unless what is there is this grid."""
+        """Raise ValueError unless the store contains this grid."""
         asked = identity(self.grid, self.layout, self.chunk)
         root = read_json(self.keys.read(ROOT))
         if root is not None:
             stored = stored_identity(root)
             if stored is None:
-                raise ValueError(f"{self.keys.name}: there is no grid in it, but something else")
+                raise ValueError(f"{self.keys.name}: its content is not a grid of vkbloom")
             if stored.get("format") != FORMAT:
                 raise ValueError(
-                    f"{self.keys.name}: its format is {short(stored.get('format'))}, "
-                    f"{FORMAT} is known"
+                    f"{self.keys.name}: its format version {short(stored.get('format'))} is not "
+                    f"{FORMAT}"
                 )
             found = differences(stored, asked)
             if found:
-                raise ValueError(f"{self.keys.name}: another grid is there; {'; '.join(found)}")
-        # The arrays tell which grid they belong to. A process that was killed early left none.
+                raise ValueError(f"{self.keys.name}: contains another grid; {'; '.join(found)}")
+        # The arrays name their grid too. A process that was killed early may have written none.
         marks = {_mark(self.keys.read(key)) for key in held if key.endswith(f"/{ROOT}")} - {None}
         own = _mark(expected[f"{DONE}/{ROOT}"])
         is_other = marks != {own} if root is None else bool(marks) and own not in marks
         if is_other:
-            what = "another grid is there" if marks else "there is no grid in it"
+            what = "contains another grid" if marks else "its content is not a grid of vkbloom"
             raise ValueError(f"{self.keys.name}: {what}, and its {ROOT} is missing or damaged")
 
     def _mend_metadata(self, expected: Mapping[str, bytes]) -> list[str]:
@@ -340,7 +340,7 @@ class GridStore:
         return mended
 
     def _find_done(self, held: set[str], *, verify: bool) -> list[str]:
-        """Find the points that are there; take the marks of damaged ones away."""
+        """Find the completed points, and clear the marks of damaged ones."""
         mended: list[str] = []
         try:
             marked = read_marks(self.keys, self.grid.shape)
@@ -352,7 +352,7 @@ class GridStore:
             if not is_marked and not verify:
                 continue
             problem = self._problem(block, held, verify=verify)
-            # A block that is whole but not marked was written just before the end.
+            # A complete block without a mark was written just before the process ended.
             self.done[block.slices] = problem is None
             if is_marked and problem is not None:
                 mended.append(f"{problem}, of {describe(self.grid.axes, block)}")
@@ -381,7 +381,7 @@ class GridStore:
         self._write_marks(touched)
 
     def _write_marks(self, touched: NDArray[np.bool_]) -> None:
-        """Write the chunks of ``done`` in which a point was touched, each at once."""
+        """Write each chunk of ``done`` that contains a touched point, in one write."""
         zarr = import_extra("zarr", "grid", _PURPOSE)
         array = zarr.open_array(self.keys.store, path=DONE, mode="r+")
         array = array.with_config({"write_empty_chunks": True})
@@ -411,18 +411,18 @@ def read_marks(keys: Keys, shape: Index) -> NDArray[np.bool_]:
     try:
         array = zarr.open_array(keys.store, path=DONE, mode="r")
         if (array.shape, array.chunks, array.dtype) != (shape, chunk, np.bool_):
-            raise ValueError("the array has another shape or type")
+            raise ValueError("the array has another shape, chunk or dtype")
         marks: NDArray[np.bool_] = array[...]
     except (MemoryError, OSError):
         raise
     except Exception as error:
-        # Zarr documents no class for metadata that it cannot use.
+        # Zarr does not document the exceptions that damaged metadata raise.
         raise ValueError(reason(error)) from error
     return marks
 
 
 def describe(axes: Iterable[Axis], block: Block) -> str:
-    """Return the points of a block in words: the values along each axis, or the first and last."""
+    """Return the points of a block as text: the value, or first and last value, of each axis."""
     parts = []
     for axis, start, stop in zip(axes, block.start, block.stop, strict=True):
         labels = [axis.label(start)] + [axis.label(stop - 1)] * (stop - start > 1)
@@ -431,12 +431,12 @@ def describe(axes: Iterable[Axis], block: Block) -> str:
 
 
 def reason(error: Exception) -> str:
-    """Return the first sentence of why a chunk cannot be read."""
+    """Return the first sentence of an error's message."""
     return str(error).partition(". ")[0].removesuffix(".") or type(error).__name__
 
 
 def read_json(content: bytes | None) -> dict[str, Any] | None:
-    """Return the object that a key holds, None where it is missing or damaged."""
+    """Parse the JSON object of a key; None if it is missing or damaged."""
     try:
         found = None if content is None else json.loads(content)
     except (ValueError, RecursionError):
@@ -445,7 +445,7 @@ def read_json(content: bytes | None) -> dict[str, Any] | None:
 
 
 def stored_identity(root: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return what the group's metadata say of the grid, None where that is nothing."""
+    """Return the grid's identity from the group's metadata; None if there is none."""
     found = _attributes(root).get(IDENTITY)
     return found if isinstance(found, dict) else None
 
@@ -456,6 +456,6 @@ def _attributes(metadata: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _mark(content: bytes | None) -> str | None:
-    """Return the grid that an array's metadata name."""
+    """Return the hash of the grid that an array's metadata name; None if there is none."""
     found = _attributes(read_json(content) or {}).get("grid")
     return found if isinstance(found, str) else None

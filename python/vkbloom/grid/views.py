@@ -1,4 +1,4 @@
-"""Parts of a grid that fit on a page: which axes are shown, and where the others stand."""
+"""Select a part of a grid to show: the shown axes, and one value of each other axis."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ __all__ = [
 
 
 def axes_of(dataset: xarray.Dataset) -> list[str]:
-    """Return the axes of a grid that are dimensions still.
+    """Return the axes of a grid that are still dimensions of the Dataset.
 
     Raises
     ------
     TypeError, ValueError
-        It is no Dataset of a grid.
+        The argument is not a Dataset of a grid.
     """
     if not hasattr(dataset, "data_vars"):
-        raise TypeError(f"dataset: a Dataset is needed, not {type(dataset).__name__}")
+        raise TypeError(f"dataset: {type(dataset).__name__} is not an xarray.Dataset")
     if "axes" not in dataset.attrs:
-        raise ValueError("dataset: not a grid, its attributes name no axes")
+        raise ValueError("dataset: its attributes have no 'axes', so it is not a grid of vkbloom")
     return [name for name in json.loads(dataset.attrs["axes"]) if name in dataset.dims]
 
 
 def framebuffers_of(dataset: xarray.Dataset) -> dict[str, int]:
-    """Return the framebuffers of a grid, with the number of dimensions that a point has."""
+    """Return the framebuffers of a grid, with the number of dimensions of a frame."""
     found = {}
     for name, array in dataset.data_vars.items():
         own = [str(dim).rpartition("_")[2] for dim in array.dims]
@@ -54,32 +54,32 @@ def framebuffers_of(dataset: xarray.Dataset) -> dict[str, int]:
 def select(
     dataset: xarray.Dataset, at: Mapping[str, Any] | None, shown: Sequence[str]
 ) -> xarray.Dataset:
-    """Reduce a grid to the axes that are shown.
+    """Reduce a grid to the shown axes.
 
     Parameters
     ----------
     dataset : xarray.Dataset
     at : mapping of str to object, optional
-        Where to stand along other axes: the nearest number, or that text. None is a value that
-        was None.
+        Values along other axes: the nearest number is selected, or an equal text. None selects
+        the value None.
     shown : sequence of str
 
     Returns
     -------
     xarray.Dataset
-        Along axes that are neither shown nor in `at`, the first value is taken.
+        Along an axis that is neither shown nor in `at`, the first value is selected.
 
     Raises
     ------
     ValueError
-        `at` names no axis, or a value that is not there.
+        `at` names something else than an axis, or a value that the axis does not have.
     """
     axes = axes_of(dataset)
     for name in at or {}:
         if name not in axes:
-            raise ValueError(f"at: {name!r} is not an axis of the grid: {', '.join(axes)}")
+            raise ValueError(f"at: {name!r} is not an axis of the grid; it has {', '.join(axes)}")
         if name in shown:
-            raise ValueError(f"at: {name!r} is one of the axes that are shown")
+            raise ValueError(f"at: {name!r} is a shown axis; leave it out")
     for name in axes:
         if name in (at or {}):
             dataset = dataset.isel({name: _place(name, dataset[name].values, (at or {})[name])})
@@ -89,13 +89,13 @@ def select(
 
 
 def _place(name: str, values: NDArray[Any], value: Any) -> int:
-    """Return where along an axis `select` stands."""
+    """Return the index that `select` takes along an axis."""
     is_text = values.dtype.kind not in "biuf"
     is_number = isinstance(value, Real)
     if value is None or (is_number and math.isnan(value)):
         fits = values == "none" if is_text else np.isnan(values)
     elif is_number and math.isfinite(value) and values.dtype.kind in "iuf":
-        # xarray's own nearest needs values in their order, and without NaN for None.
+        # xarray's own nearest selection needs sorted values, and no NaN (which stands for None).
         distances = np.abs(values - float(value))
         fits = distances == np.nanmin(distances)
     else:
@@ -106,33 +106,33 @@ def _place(name: str, values: NDArray[Any], value: Any) -> int:
 
 
 def label(value: Any) -> str:
-    """Return a coordinate's value in short."""
+    """Return a coordinate's value as a short text."""
     plain = value.item() if hasattr(value, "item") else value
     return f"{plain:.4g}" if isinstance(plain, float) else str(plain)
 
 
 def caption(dataset: xarray.Dataset) -> str:
-    """Return where a part of a grid stands along the axes that are not shown."""
+    """Return the selected values of the axes that are not shown."""
     names = (name for name in json.loads(dataset.attrs["axes"]) if name not in dataset.dims)
     return ", ".join(f"{name}={label(dataset[name].values[()])}" for name in names)
 
 
 def places(count: int, most: int) -> list[int]:
-    """Return up to a number of places that are spread evenly over all, the ends included."""
+    """Return at most `most` indices, evenly spaced over `count`, both ends included."""
     if count <= most:
         return list(range(count))
     return [int(place) for place in np.linspace(0, count - 1, most).round()]
 
 
 def thinned(dataset: xarray.Dataset, axis: str | None, most: int) -> xarray.Dataset:
-    """Leave up to a number of values of an axis."""
+    """Keep at most `most` values of an axis."""
     if axis is None:
         return dataset
     return dataset.isel({axis: places(dataset.sizes[axis], most)})
 
 
 def encoding_of(dataset: xarray.Dataset) -> str:
-    """Return the encoding of a point of a grid."""
+    """Return the encoding of one grid point."""
     if "encoding" in dataset.coords:
         return str(dataset["encoding"].values[()])
     return str(json.loads(dataset.attrs.get("settings", "{}")).get("encoding", "none"))

@@ -1,4 +1,4 @@
-"""Grids into Zarr stores: `grid_to_zarr`."""
+"""Render grids to Zarr stores: `grid_to_zarr`."""
 
 from __future__ import annotations
 
@@ -48,52 +48,74 @@ def grid_to_zarr(
     on_mended: Callable[[str], object] | None = None,
     progress: bool | None = None,
 ) -> xarray.Dataset:
-    """Render every combination of some values into a Zarr store.
+    """Render all combinations of the axes' values to a Zarr store.
 
-    The store can be opened with ``xarray.open_zarr`` from the beginning; its variable ``done``
-    tells which points are there. When the process ends before its time, however it ends, the same
-    call again renders the missing points only.
+    The store can be opened with ``xarray.open_zarr`` while it is written; its variable ``done``
+    tells which points are complete. If the process is killed, the same call renders only the
+    missing points.
 
     Parameters
     ----------
     source, settings, axes, size, shading, time, attachments, reduce, progress
         As for `vkbloom.Renderer.grid`.
     store : str, path-like or zarr.abc.store.Store
-        A folder, a URL that fsspec knows, or a store. With a `client` all workers must be able
-        to write to it.
+        A folder, a URL that fsspec supports, or a store. With a `client`, all its workers must be
+        able to write to it.
     client : distributed.Client, optional
-        The workers of its cluster render and write; by default this process does.
+        The workers of its cluster render and write. Default: this process does.
     chunks : mapping of str to int, optional
-        Points in a chunk by axis, 1 for axes left out. By default as many as make up about
-        1 MiB, 1024 at most, along the axes that are visited fastest. A chunk is written when all
-        its points are there; chunks along other axes than the fastest cost passes.
+        Grid points per chunk by axis; 1 for an axis that is not named. Default: chunks of about
+        1 MiB, at most 1024 points, along the axes that vary fastest. A chunk is written when all
+        its points are rendered; chunks along slower axes make more passes run.
     adapter, validation
-        Of the renderers, as for `vkbloom.Renderer`.
+        Arguments of the renderers, as for `vkbloom.Renderer`.
     resume : bool
-        Go on with a store that is there. False: raise FileExistsError.
+        Whether to continue an existing store. False: raise FileExistsError.
     verify : bool
-        Read what is there before going on, and render damaged points again. False: trust the
+        Whether to read the existing points first and render damaged ones again. False: trust the
         marks in ``done``.
     on_mended : callable, optional
-        Called with a line of text for each thing that was damaged.
+        Called with a line of text for each damaged or missing key that was replaced.
 
     Returns
     -------
     xarray.Dataset
-        The store, opened lazily, with "passes_run" and "passes_saved" of this call added to its
-        attributes.
+        The store, opened lazily. The attributes "passes_run" and "passes_saved" count the passes
+        of this call.
 
     Raises
     ------
     ValueError
-        The store holds another grid (the message tells what differs) or something else; or as
-        for `vkbloom.Renderer.grid`. Nothing was written.
+        The store contains another grid (the message lists the differences) or other data, or an
+        argument is wrong as for `vkbloom.Renderer.grid`. Nothing is written.
     FileExistsError
         The store exists and `resume` is False.
     OSError
-        Writing failed, for example because the disk is full. What is done is kept.
+        Writing failed, for example because the disk is full. Completed points are kept.
     ModuleNotFoundError
-        zarr, or for a client dask, is missing.
+        zarr is missing, or dask if `client` is given.
+
+    See Also
+    --------
+    Renderer.grid : The same in memory.
+    check_grid : Checks a store.
+    contact_sheet, response_curves : Pictures and plots of the result.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> image = np.zeros((16, 16, 4), np.uint8)
+    >>> image[8, 8] = 255
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     grid = vkbloom.grid_to_zarr(
+    ...         image,
+    ...         vkbloom.Separable(),
+    ...         {"blur_scale": [1.0, 2.0], "intensity": [0.5, 1.0, 2.0]},
+    ...         f"{folder}/grid.zarr",
+    ...         adapter="software",
+    ...     )
+    ...     print(dict(grid.sizes))
+    {'blur_scale': 2, 'intensity': 3, 'y': 16, 'x': 16, 'channel': 4}
     """
     xr = import_extra("xarray", "grid", "grid_to_zarr")
     import_extra("dask.array", "grid", "grid_to_zarr")
@@ -109,9 +131,9 @@ def grid_to_zarr(
         reduce=reduce,
     )
     if "done" in (axis.name for axis in grid.axes):
-        raise ValueError("axes: 'done' is the name of the marks of the points")
+        raise ValueError("axes: 'done' is not a possible name; the store uses it for its marks")
     if client is not None and not keys.is_shared:
-        raise ValueError("store: other processes cannot write to a store in memory")
+        raise ValueError("store: the workers cannot write to a store in memory; use a folder")
 
     def prepared(layout: Layout) -> GridStore:
         kept = GridStore(keys, grid, layout, _chunk(grid, layout, chunks, keys))
@@ -129,17 +151,19 @@ def grid_to_zarr(
 
 
 def _chunk(grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys) -> Index:
-    """Return the points of a block by axis: as asked for, as in the store, or by default."""
+    """Return the grid points per chunk by axis: requested, from the store, or the default."""
     if chunks is None:
         stored = stored_identity(read_json(keys.read(ROOT)) or {})
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout) if held is None else held
     if not isinstance(chunks, Mapping):
-        raise TypeError(f"chunks: numbers of points by axis are needed, not {chunks!r}")
+        raise TypeError(f"chunks: {chunks!r} is not a mapping of axis names to point counts")
     names = [axis.name for axis in grid.axes]
     for name, count in chunks.items():
         if name not in names:
-            raise ValueError(f"chunks: {name!r} is not an axis of the grid: {', '.join(names)}")
+            raise ValueError(
+                f"chunks: {name!r} is not an axis of the grid; it has {', '.join(names)}"
+            )
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-            raise ValueError(f"chunks: {name} is {count!r}, a whole number of at least 1 is needed")
+            raise ValueError(f"chunks: {name}: {count!r} is not an integer of at least 1")
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)

@@ -1,1 +1,1 @@
-"""Image files are read and written here, and each file is written whole or not at all."""
+"""Read and write image files; a file is written completely or not at all."""

@@ -1,4 +1,4 @@
-"""Image files of framebuffers: every value kept, and all files or none."""
+"""Write framebuffers to image files without loss: all files, or none if one fails."""
 
 from __future__ import annotations
 
@@ -31,35 +31,35 @@ _OWN = ("settings", "timings", "dtype", "framebuffer", "place")
 
 
 def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
-    """Write framebuffers to image files: what `Frames.save` does and describes.
+    """Write framebuffers to image files, as `Frames.save` documents.
 
     Parameters
     ----------
     frames : Framebuffers
-        One framebuffer at least.
+        At least one framebuffer.
     path : str or path-like
         A file name with an extension that OpenImageIO writes, or a folder.
 
     Returns
     -------
     list of Path
-        The files written, in the order of the framebuffers.
+        The written files, in the order of the framebuffers.
 
     Raises
     ------
     ValueError
-        If the extension is unknown, the name not UTF-8, or there is no framebuffer.
+        The extension is unknown, the name is not UTF-8, or there is no framebuffer.
     OSError
-        If a file cannot be written; it names the file, and no half file is left.
+        A file cannot be written; the error names it, and no partial file is left.
     ModuleNotFoundError
-        If OpenImageIO is missing: ``pip install vkbloom[images]``.
+        OpenImageIO is missing: ``pip install vkbloom[images]``.
     """
     if not frames:
-        raise ValueError("these Frames hold no framebuffer to save")
+        raise ValueError("frames: there is no framebuffer to save")
     oiio = import_extra("OpenImageIO", "images", "Frames.save")
     if os.fspath(path) == "":
-        # Such as a shell's variable that is not set. This folder is ".".
-        raise ValueError("path: the name of a file or a folder is needed, not ''")
+        # An empty name is usually an unset shell variable, and must not mean the current folder.
+        raise ValueError("path: '' is not the name of a file or a folder; use '.' for this folder")
     target = Path(path)
     check_name(target)
     plan: dict[Path, list[str]]
@@ -74,7 +74,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             plan = {
                 target.with_name(f"{target.stem}_{name}{target.suffix}"): [name] for name in frames
             }
-    # (temporary file, file) of everything reserved so far.
+    # (temporary file, final file) of every reserved file.
     files: list[tuple[Path, Path]] = []
     try:
         for file, names in plan.items():

@@ -1,4 +1,4 @@
-"""Image files read: what they hold, and the linear values that bloom is made of."""
+"""Read image files, and decode them to the linear values that bloom is computed from."""
 
 from __future__ import annotations
 
@@ -31,11 +31,10 @@ if TYPE_CHECKING:
 __all__ = ["check_plausible", "decode", "load", "opened"]
 
 _LARGEST_SIDE: Final = 65536
-# What the largest texture of 16384 x 16384 holds; keeps a damaged header from being taken at
-# its word.
+# Pixels of the largest texture, 16384 x 16384. A damaged header may claim more.
 _LARGEST_AREA: Final = 1 << 28
-# So many bytes of pixels need a file that could hold them. Deflate, which PNG, TIFF and OpenEXR
-# have, makes 1032 bytes of one at the most (RFC 1951: 258 of two bits).
+# Above this size in bytes, the pixels must be plausible for the size of the file. Deflate, which
+# PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
 # Red, green, blue, white.
@@ -46,42 +45,42 @@ _MOST_PARTS: Final = 100
 
 @contextmanager
 def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
-    """Open an image file for as long as the context lasts.
+    """Open an image file; the context closes it.
 
     Parameters
     ----------
     path : str or path-like
-        Of any format that OpenImageIO reads.
+        A file of any format that OpenImageIO reads.
     purpose : str
-        What needs OpenImageIO, as the subject of the message where it is missing.
+        What needs OpenImageIO; the subject of the message if it is missing.
 
     Yields
     ------
     OpenImageIO.ImageInput
-        It gives colours as they are stored, not multiplied by alpha.
+        The open file. Colours are read as stored, not multiplied by alpha.
 
     Raises
     ------
     OSError
-        The file is not there, or cannot be opened; it names the file.
+        The file does not exist or cannot be opened; the error names it.
     ValueError
-        The file is no image, or its name not UTF-8; it names the file.
+        The file is not an image, or its name is not UTF-8; the error names it.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
     oiio = import_extra("OpenImageIO", "images", purpose)
     name = os.fspath(path)
     check_name(name)
-    # OpenImageIO says the same of missing and of damaged files; this has the system's own reason.
+    # OpenImageIO reports missing and damaged files alike; this raises the system's own reason.
     with open(name, "rb"):
         pass
-    # Without this, colours would be multiplied by alpha where the file has them plain.
+    # Otherwise OpenImageIO multiplies straight colours by alpha.
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
     reader = oiio.ImageInput.open(name, plain)
     if reader is None:
         reason = failure_of(oiio) or "unknown format"
-        raise ValueError(f"{name}: not an image that can be read: {reason}")
+        raise ValueError(f"{name}: is not a readable image: {reason}")
     try:
         yield reader
     finally:
@@ -90,7 +89,7 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
 
 
 def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -> None:
-    """Raise ValueError where a file is far too short for the pixels that its header promises."""
+    """Raise ValueError if a file is far too short for the pixels that its header claims."""
     size = spec.image_bytes()
     if size > max(_LARGE, _LARGEST_RATIO * os.path.getsize(path)):
         raise ValueError(
@@ -105,7 +104,7 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
     Parameters
     ----------
     path : str or path-like
-        Of any format that OpenImageIO reads.
+        A file of any format that OpenImageIO reads.
     subimage : int, default 0
         Which part of a file that has several (OpenEXR, TIFF, GIF), from 0 on.
     layer : str, optional
@@ -119,7 +118,7 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
     Raises
     ------
     OSError
-        The file is not there, or cannot be opened; it names the file.
+        The file does not exist or cannot be opened; the error names it.
     ValueError
         The file is damaged or no image, has no such part or layer, is no flat image of 8 or 16
         bit integers or floats, or its name is not UTF-8; it names the file.
@@ -139,27 +138,30 @@ def _read(
         count = 0
         while reader.seek_subimage(count, 0):
             count += 1
-        raise ValueError(f"{name}: there is no part {subimage}, only 0 to {count - 1}")
+        raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
     spec = reader.spec()
     if spec.deep or spec.depth > 1:
-        raise ValueError(f"{name}: a flat image is needed, not a deep one or a volume")
+        raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
     stored_as = str(spec.format)
     if stored_as not in DTYPES:
         raise ValueError(
-            f"{name}: holds numbers of {stored_as}; 8 or 16 bit unsigned integers or floats are "
-            "needed"
+            f"{name}: numbers of {stored_as} are not supported; use unsigned integers of 8 or 16 "
+            "bits, or floats"
         )
     display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     left, top = min(spec.x, display[0]), min(spec.y, display[1])
     width = max(spec.x + spec.width, display[0] + display[2]) - left
     height = max(spec.y + spec.height, display[1] + display[3]) - top
     if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
-        raise ValueError(f"{name}: {width} x {height} pixels are too many")
+        raise ValueError(
+            f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
+            f"{_LARGEST_AREA} in all"
+        )
     check_plausible(spec, name)
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
-    # Of a JPEG that was cut off there are pixels, and an error.
+    # A truncated JPEG gives pixels and an error.
     reason = failure_of(reader)
     if data is None or reason:
         raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
@@ -232,7 +234,7 @@ def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
 
 
 def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Undo an orientation of TIFF 6.0 (also Exif), 1 to 8: where the first row and column are."""
+    """Undo an orientation of TIFF 6.0 and Exif, 1 to 8: the sides of the first row and column."""
     if orientation in (5, 6, 7, 8):
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
@@ -243,7 +245,7 @@ def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
 
 
 def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = False) -> Picture:
-    """Make a picture of linear values out of what a file holds.
+    """Decode a stored image to a picture of linear values.
 
     Parameters
     ----------
@@ -253,7 +255,7 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
         built-in configuration, such as "ACEScg". By default floats are linear, and integers what
         the file says by a cICP chunk, an ICC profile or a gamma, else sRGB.
     raw : bool, default False
-        Leave 8-bit values as they are.
+        Whether to keep 8-bit values without decoding.
 
     Returns
     -------
@@ -269,15 +271,15 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
         `raw` and the file does not hold 8-bit integers, or `colour` is given as well.
     """
     if raw and colour is not None:
-        raise ValueError(f"colour: {colour!r} has no meaning for raw values")
+        raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
     chosen, left_out = _chosen_channels(stored.channels)
     values = stored.pixels[:, :, chosen]
     kinds = {stored.numbers[index] for index in chosen}
     numbers = kinds.pop() if len(kinds) == 1 else "float"
     if raw and numbers != "uint8":
-        raise ValueError(f"raw: 8-bit integers are needed, not {numbers}")
+        raise ValueError(f"raw: {numbers} is not an 8-bit integer type")
     if numbers == "half":
-        # Another channel may have made the whole file float.
+        # OpenImageIO reads all channels as float if another channel is float.
         values = values.astype(np.float16, copy=False)
     notes = [f"left out the channels {', '.join(left_out)}"] if left_out else []
     grey = len(chosen) < 3
@@ -316,8 +318,8 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
         )
     else:
         raise ValueError(
-            f"the channels are {', '.join(names)}; R, G, B or one, with or without alpha, are "
-            "needed"
+            f"the channels {', '.join(names)} are not R, G, B or a single one, with or without "
+            "alpha"
         )
     return chosen, [name for index, name in enumerate(names) if index not in chosen]
 
@@ -405,7 +407,7 @@ def _decoded(values: NDArray[Any], space: str) -> NDArray[Any]:
                 else colours_of.from_space(linear[:, :, :3], space)
             )
             return linear.astype(values.dtype)
-    # By table: exact for each of the few values that there are.
+    # A table with one entry per integer value, computed in float64.
     scale = np.iinfo(values.dtype).max
     plain = np.arange(scale + 1) / scale
     table = (decode_srgb(plain) if space == "srgb" else plain).astype(np.float32)

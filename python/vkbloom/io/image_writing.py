@@ -1,4 +1,4 @@
-"""Pictures written to image files, in numbers and colours that the format has a place for."""
+"""Write pictures to image files, converted to a number type and channels of the format."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["as_numbers", "check_quality", "check_writable", "put", "save"]
 
-# The numbers to write, best first, by those that the picture came with. 16 bits come last for
-# floats, because files of 8 bits are what a PNG of a float picture is expected to be.
+# Number types to write, in order of preference, by the number type of the picture. For floats
+# uint8 comes before uint16, because a PNG of a float picture is expected to have 8 bits.
 _PREFERENCES: Final[Mapping[str, tuple[str, ...]]] = {
     "uint8": ("uint8", "float", "half", "uint16"),
     "uint16": ("uint16", "float", "half", "uint8"),
@@ -36,7 +36,7 @@ _LOSSY: Final = ("jpeg", "webp", "jpegxl")
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Find out whether a file's extension is of a format that can be written.
+    """Check that a file's extension belongs to a format that can be written.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     ValueError
-        It is not.
+        No writable format has the extension.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
@@ -86,20 +86,20 @@ def save(
     attributes: Mapping[str, str] | None = None,
     quality: int | None = None,
 ) -> tuple[str, ...]:
-    """Write a picture to a file, in the numbers that it came with or the next best ones.
+    """Write a picture to a file, with its own number type or the closest one of the format.
 
-    Grey becomes one channel and windows are kept where the format has such; else grey becomes
-    RGB, and what is outside the display window is cut off. NaN becomes 0 and infinity 1 in
-    integers, which hold 0..1. Alpha is written as it is.
+    Grey pictures are written with one channel if the format supports it, else as RGB. Data and
+    display windows are kept if the format has them, else pixels outside the display window are cut
+    off. Integer files cover 0..1: NaN becomes 0 and infinity becomes 1. Alpha is not changed.
 
     Parameters
     ----------
     picture : Picture
     path : str or path-like
-        With an extension that OpenImageIO writes. What is there is replaced, when the whole file
-        is written under another name.
+        A file name with an extension that OpenImageIO writes. An existing file is replaced when
+        the new one is complete.
     colour : {"linear", "srgb"}, optional
-        What the colours in the file shall be. By default integers are sRGB and floats linear.
+        Encoding of the colours in the file. Default: integers are sRGB and floats linear.
     attributes : mapping of str to str, optional
         Added to the file where its format has a place for them.
     quality : int, optional
@@ -108,20 +108,22 @@ def save(
     Returns
     -------
     tuple of str
-        What the user may want to know about what the file could not hold.
+        Notes for the user about information that the file cannot hold.
 
     Raises
     ------
     ValueError
-        The extension is unknown; the format cannot hold pictures of this kind; `colour` is given
-        for a picture that is not linear.
+        The extension is unknown, the format cannot hold the picture, or `colour` is given for a
+        picture that is not linear.
     OSError
-        The file cannot be written; it names the file, and no half file is left.
+        The file cannot be written; the error names it, and no partial file is left.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
     if colour is not None and picture.encoding != "linear":
-        raise ValueError(f"colour: {colour!r} needs a linear picture, not {picture.encoding}")
+        raise ValueError(
+            f"colour: {colour!r} needs a linear picture; this one is {picture.encoding}"
+        )
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
@@ -149,9 +151,11 @@ def _write(
     attributes: Mapping[str, str | int],
 ) -> tuple[str, ...]:
     writer = oiio.ImageOutput.create(str(temporary))
-    chosen = _chosen_form(oiio, picture, writer, temporary)
+    chosen = _chosen_layout(oiio, picture, writer, temporary)
     if chosen is None:
-        raise ValueError(f"{target}: {writer.format_name()} cannot hold such a picture")
+        raise ValueError(
+            f"{target}: {writer.format_name()} cannot hold this picture; use another format"
+        )
     values, numbers = chosen
     integer = numbers.startswith("uint")
     has_alpha = values.shape[2] in (2, 4)
@@ -225,14 +229,14 @@ def put(
     )
     if not is_written:
         raise safe_writing.write_error(writer, temporary, target)
-    # An error that nobody asked for would be printed when the writer is gone.
+    # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
     writer.geterror()
 
 
-def _chosen_form(
+def _chosen_layout(
     oiio: ModuleType, picture: Picture, writer: OpenImageIO.ImageOutput, temporary: Path
 ) -> tuple[NDArray[Any], str] | None:
-    """Return the channels and the numbers to write, those most like the picture's first."""
+    """Return the channels and the number type to write: the closest ones that the format has."""
     for values in _layouts(picture, writer.supports("alpha") != 0):
         for numbers in _PREFERENCES[picture.numbers]:
             if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
@@ -241,36 +245,36 @@ def _chosen_form(
 
 
 def _layouts(picture: Picture, with_alpha: bool) -> Iterator[NDArray[Any]]:
-    forms = [picture.values, picture.pixels] if picture.grey else [picture.pixels]
+    layouts = [picture.values, picture.pixels] if picture.grey else [picture.pixels]
     if with_alpha:
-        yield from forms
+        yield from layouts
     if picture.pixels.shape[2] == 4:
-        yield from (form[:, :, :-1] for form in forms)
+        yield from (layout[:, :, :-1] for layout in layouts)
     elif not with_alpha:
-        yield from forms
+        yield from layouts
 
 
 def _losses(
     picture: Picture, target: Path, values: NDArray[Any], has_alpha: bool, integer: bool
 ) -> list[str]:
-    """Say what the file cannot hold of a picture, or will be read differently."""
+    """Return notes about information that the file loses or that readers interpret differently."""
     notes: list[str] = []
     is_float = values.dtype.kind == "f"
     if picture.pixels.shape[2] == 4:
         opaque = 1.0 if is_float else np.iinfo(values.dtype).max
         is_opaque = bool((picture.pixels[:, :, 3] == opaque).all())
         suffix = target.suffix.lower()
-        # TIFF says for each file which of the two it is.
+        # A TIFF file records which of the two it has.
         associated = (suffix == ".exr") if suffix not in (".tif", ".tiff") else None
         if not has_alpha and not is_opaque:
-            notes.append(f"{target} has no place for the alpha, which is not 1 everywhere")
+            notes.append(f"{target} cannot hold alpha, which is not 1 everywhere")
         elif has_alpha and not is_opaque and associated is (not picture.stored.associated):
             notes.append(
-                f"colours and alpha are written to {target} as they are, although readers of it "
-                f"take the colours as {'' if associated else 'not '}multiplied by alpha"
+                f"colours and alpha are written to {target} unchanged, but its readers expect "
+                f"colours {'' if associated else 'not '}multiplied by alpha"
             )
     if integer and is_float and not np.isfinite(values).all():
-        notes.append(f"{target} holds integers: NaN is written as 0, infinity as 1")
+        notes.append(f"{target} has integers: NaN is written as 0, infinity as 1")
     return notes
 
 
@@ -291,22 +295,22 @@ def as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
     if dtype.kind == "f":
         return values.astype(dtype, copy=False)
     clipped = np.clip(np.nan_to_num(values.astype(np.float32), nan=0.0), 0.0, 1.0)
-    whole: NDArray[Any] = np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
-    return whole
+    integers: NDArray[Any] = np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
+    return integers
 
 
 def _describe(
     spec: OpenImageIO.ImageSpec, picture: Picture, format_name: str, target: Path
 ) -> None:
-    """Say in a file what its colours, its alpha and its pixels are."""
+    """Set the attributes that describe a file's colours, alpha and pixels."""
     is_exr = target.suffix.lower() == ".exr"
     stored, encoding = picture.stored, picture.encoding
     space = stored.space if encoding is None else SPACES[encoding]
-    # In OpenEXR linear goes without saying, and the primaries are in another attribute.
+    # OpenEXR files are linear by definition, and another attribute has their primaries.
     if space and not (is_exr and encoding == "linear"):
         spec.attribute("oiio:ColorSpace", space)
-    # Else OpenImageIO divides the colours by alpha where the format has them plain; TIFF can say
-    # what they are.
+    # Otherwise OpenImageIO divides by alpha for formats with straight colours. TIFF can record
+    # either.
     is_tiff = target.suffix.lower() in (".tif", ".tiff")
     if not is_exr and not (is_tiff and stored.associated):
         spec.attribute("oiio:UnassociatedAlpha", 1)

@@ -1,7 +1,7 @@
-"""Single images from files and into files, with their colours handled knowingly.
+"""Images of files, as stored and as decoded for a renderer.
 
-Bloom is made of light, so that images are decoded to linear values before it, and encoded again
-after it where the file holds integers. Which files hold what:
+Bloom is computed on linear values: images are decoded before, and encoded after it if the file has
+integers.
 
 ==================== ========================= =====================================
 numbers in the file  taken as                  written as
@@ -46,7 +46,7 @@ Encoding = Literal["linear", "srgb", "gamma22"]
 #: x, y, width, height in pixels.
 Window: TypeAlias = tuple[int, int, int, int]
 
-# The dtype in which numbers of a file are read, by OpenImageIO's names of them.
+# The dtype for reading each number type, by OpenImageIO's names.
 DTYPES: Final[Mapping[str, np.dtype[Any]]] = {
     "uint8": np.dtype(np.uint8),
     "uint16": np.dtype(np.uint16),
@@ -89,27 +89,27 @@ _LOST_ATTRIBUTES: Final = frozenset(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StoredImage:
-    """An image as a file holds it: every channel, no value changed.
+    """An image as stored in a file: every channel, no value changed.
 
     Parameters
     ----------
     pixels : ndarray, shape (H, W, C)
-        uint8, uint16, float16 or float32 (also of doubles), top row first, upright where the
-        file has an orientation. They cover the data window and the display window; what the
-        file has no data for is 0.
+        uint8, uint16, float16 or float32 (also for doubles), top row first, turned upright if the
+        file has an orientation. They cover the data window and the display window; pixels without
+        data are 0.
     channels : tuple of str
-        The C names, such as ("R", "G", "B", "A").
+        The names of the C channels, such as ("R", "G", "B", "A").
     numbers : tuple of str
-        OpenImageIO's name of each channel's numbers: "uint8", "uint16", "half", "float" or
+        OpenImageIO's name of each channel's number type: "uint8", "uint16", "half", "float" or
         "double".
     origin : (int, int)
-        Of the pixels, in the file's coordinates.
+        Position of the first pixel in the file's coordinates.
     display : (int, int, int, int)
         The display window (x, y, width, height), in the file's coordinates.
     associated : bool
         Whether the file's format says that colours are multiplied by alpha.
     space : str
-        OpenImageIO's name of the colour space that the file gives, else "".
+        OpenImageIO's name of the file's colour space; "" if the file has none.
     attributes : mapping of str to (OpenImageIO.TypeDesc, value)
         Those of which `is_kept` is true, by OpenImageIO's names.
     parts : tuple of str
@@ -142,20 +142,20 @@ class StoredImage:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Picture:
-    """An image that `vkbloom.Renderer.apply` takes, with what it needs to become a file again.
+    """An image that `vkbloom.Renderer.apply` accepts, and the data to write it to a file.
 
     Parameters
     ----------
     pixels : ndarray, shape (H, W, 3) or (H, W, 4)
         uint8, float16 or float32; grey images have three equal colours.
     encoding : {"linear", "srgb", "gamma22"} or None
-        What the colours are. None: not known, as nothing was done to them.
+        Encoding of the colours. None: not known, because the values were not decoded.
     numbers : str
-        OpenImageIO's name of the numbers in the file.
+        OpenImageIO's name of the number type in the file.
     grey : bool
-        Whether the file has one channel instead of three.
+        Whether the file has one colour channel instead of three.
     stored : StoredImage
-        What the file holds besides.
+        The image as stored in the file.
     notes : tuple of str
         What the user may want to know about how the file was taken.
     colour : str
@@ -205,18 +205,18 @@ class Picture:
 
     @property
     def values(self) -> NDArray[Any]:
-        """The pixels with one channel of the three equal ones of a grey image."""
+        """The pixels; a grey image has one colour channel here instead of three equal ones."""
         return self.pixels[:, :, [0, *range(3, self.pixels.shape[2])] if self.grey else slice(None)]
 
 
 def check_name(path: str | os.PathLike[str]) -> None:
-    """Raise ValueError for a file name that is not UTF-8, which OpenImageIO cannot be given."""
+    """Raise ValueError for a file name that is not UTF-8, which OpenImageIO does not accept."""
     name = os.fspath(path)
     try:
         name.encode()
     except UnicodeEncodeError:
         raise ValueError(
-            f"{name!r}: names of image files and of their folders must be UTF-8"
+            f"path: {name!r} is not UTF-8; rename the image file or its folder"
         ) from None
 
 
@@ -228,16 +228,16 @@ def is_kept(attribute: str) -> bool:
 
 
 def failure_of(source: Any) -> str:
-    """Return why something of OpenImageIO failed; "" where it did not.
+    """Return and clear the error of an OpenImageIO object; "" if there is none.
 
     Parameters
     ----------
     source : OpenImageIO.ImageInput or module
-        Its error is taken from it: one that nobody asked for would be printed in the end.
+        OpenImageIO prints an error that nobody has read when the object is destroyed.
     """
     try:
         text: str = source.geterror()
     except UnicodeDecodeError as error:
-        # It holds bytes of a damaged file.
+        # The message quotes bytes of a damaged file.
         text = error.object.decode(errors="replace")
     return text.strip()

@@ -1,6 +1,6 @@
-"""The driver's pipeline cache on disk, one file for each driver and machine user.
+"""The Vulkan pipeline cache on disk: one file per driver in the user's cache folder.
 
-A file is trusted only where its own checksum and its name fit; what does not fit is replaced.
+A file is used only if its checksum is right for its content and driver; otherwise it is replaced.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ _DIGEST_SIZE = hashlib.sha256().digest_size
 
 
 def folder() -> Path | None:
-    """Return the folder of the cache files, None where VKBLOOM_CACHE_DIR is set to nothing.
+    """Return the folder of the cache files; None if VKBLOOM_CACHE_DIR is empty.
 
-    By default the user's cache folder; the environment variable VKBLOOM_CACHE_DIR replaces it.
+    Default: the user's cache folder. The environment variable VKBLOOM_CACHE_DIR overrides it.
     """
     chosen = os.environ.get("VKBLOOM_CACHE_DIR")
     if chosen is not None:
@@ -31,19 +31,19 @@ def folder() -> Path | None:
         if sys.platform == "darwin":
             return Path.home() / "Library/Caches/vkbloom"
         cache = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        # The XDG Base Directory Specification wants relative ones ignored.
+        # The XDG Base Directory Specification says to ignore relative paths.
         return (cache if cache.is_absolute() else Path.home() / ".cache") / "vkbloom"
     return None
 
 
 def path(driver_uuid: bytes) -> Path | None:
-    """Return the cache file of a driver, None without a folder."""
+    """Return the cache file of a driver; None without a folder."""
     base = folder()
     return None if base is None else base / f"pipelines-{driver_uuid.hex()}.bin"
 
 
 def read(driver_uuid: bytes) -> bytes | None:
-    """Return what the driver kept the last time; None for no file, a damaged or a foreign one."""
+    """Return a driver's cached data; None if its file is missing, damaged or of another driver."""
     file = path(driver_uuid)
     if file is None:
         return None
@@ -55,12 +55,12 @@ def read(driver_uuid: bytes) -> bytes | None:
 
 
 def digest(driver_uuid: bytes, data: bytes) -> bytes:
-    """Return the checksum that the file of a driver holds."""
+    """Return the checksum of a driver's cache file."""
     return hashlib.sha256(driver_uuid + data).digest()
 
 
 def unwrap(content: bytes, driver_uuid: bytes) -> bytes | None:
-    """Return the driver's data of a whole file; None for a damaged or a foreign one."""
+    """Return the data of a cache file; None if it is damaged or of another driver."""
     header = len(MAGIC) + _DIGEST_SIZE
     data = content[header:]
     if content[:header] != MAGIC + digest(driver_uuid, data):
@@ -69,9 +69,9 @@ def unwrap(content: bytes, driver_uuid: bytes) -> bytes | None:
 
 
 def write(driver_uuid: bytes, data: bytes) -> None:
-    """Replace the driver's cache file in one step; a folder that cannot be written is left alone.
+    """Replace a driver's cache file atomically.
 
-    The cache only saves time, so failing to write it is no error.
+    The cache only saves time, so failing to write it is not an error.
     """
     file = path(driver_uuid)
     if file is None:

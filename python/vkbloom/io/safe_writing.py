@@ -1,12 +1,12 @@
-"""Safe writing of image files: whole ones or none, in formats that keep what they are given.
+"""Write image files safely: completely or not at all, in a format that keeps the values.
 
-A file is written under another name beside its own, and takes its place when it is complete:
+A file is written to a temporary file beside it, which is renamed when it is complete:
 
-1. `check_extension`, before anything is done
-2. `reserve` the temporary file, on which `holds` tries what the format can keep
-3. write it; a failure of OpenImageIO becomes a `write_error`
+1. `check_extension` before anything is written
+2. `reserve` the temporary file; `holds` tests on it what the format supports
+3. write it; `write_error` converts a failure of OpenImageIO
 4. `check_complete`, then `put_in_place`
-5. remove the temporary file where one is left
+5. remove the temporary file if it still exists
 """
 
 from __future__ import annotations
@@ -34,49 +34,48 @@ __all__ = [
     "put_in_place",
     "reserve",
     "write_error",
-    "write_whole",
+    "write_file",
 ]
 
-# Formats of OpenImageIO that throw the picture away or print it on the terminal.
+# Formats of OpenImageIO that discard the picture or print it on the terminal.
 _FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
 
-_LARGEST_HEADER: Final = 65536  # bytes; what a file may hold beside the pixels
+_LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
 _ZEROS: Final = 1 << 20  # bytes written at a time
 
 
 def check_extension(oiio: ModuleType, suffix: str) -> None:
-    """Find out whether an extension is of a format that can be written.
+    """Check that an extension belongs to a format that can be written.
 
     Parameters
     ----------
     oiio : module
         OpenImageIO.
     suffix : str
-        With its dot, such as ".png".
+        The extension with its dot, such as ".png".
 
     Raises
     ------
     ValueError
-        It is not.
+        No writable format has the extension.
     """
     writer = oiio.ImageOutput.create(f"image{suffix}")
     if writer is None:
         oiio.geterror()
     if writer is None or writer.format_name() in _FORMATS_WITHOUT_A_FILE:
-        raise ValueError(f"path: no image format for the extension {suffix!r} can be written")
+        raise ValueError(f"path: {suffix!r} is not the extension of a writable image format")
 
 
 def reserve(file: Path, size: int) -> Path:
-    """Make a file of a new name beside a file, with the disk space that it shall need.
+    """Create a temporary file beside a file, and allocate its disk space.
 
-    Doing it here gives the system's own reason where it fails, which OpenImageIO does not
-    pass on. And on a full disk its JPEG writer would end the process and its WebP writer
-    would not return.
+    A failure here has the system's own reason, which OpenImageIO does not report. On a full disk,
+    OpenImageIO's JPEG writer would end the process, and its WebP writer would not return.
 
     Parameters
     ----------
     file : Path
-        The file to write in the end, which is left alone.
+        The file to write in the end; it is not changed.
     size : int
         Bytes of the pixels.
 
@@ -90,27 +89,28 @@ def reserve(file: Path, size: int) -> Path:
     ValueError
         The name is not UTF-8.
     OSError
-        It cannot be made or the disk is full; it names `file`, and nothing is left.
+        The file cannot be created or the disk is full; the error names `file`, and no temporary
+        file is left.
     """
     return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
 
 
 def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> bool:
-    """Tell whether a format keeps a number of channels and a type of numbers.
+    """Return whether a format supports a number of channels and a number type.
 
-    A format answers only once a file is open, and libpng complains on stderr about a file
-    without pixels; so one pixel is written.
+    OpenImageIO knows this only for an open file. One pixel is written, because libpng prints a
+    message about a file without pixels.
 
     Parameters
     ----------
     oiio : module
         OpenImageIO.
     temporary : Path
-        From `reserve`; what is in it is lost.
+        From `reserve`; its content is overwritten.
     channels : int
         1 to 4.
     numbers : str
-        OpenImageIO's name of the numbers, such as "half".
+        OpenImageIO's name of the number type, such as "half".
 
     Returns
     -------
@@ -124,73 +124,73 @@ def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> boo
         is_kept = (str(opened.format), opened.nchannels) == (numbers, channels)
         writer.write_image(np.zeros((1, 1, channels), np.float32))
         writer.close()
-    # An error that nobody asked for would be printed when the writer is gone.
+    # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
     writer.geterror()
     return is_kept
 
 
 def write_error(writer: OpenImageIO.ImageOutput, temporary: Path, file: Path) -> OSError:
-    """Make an exception of what went wrong in a writer.
+    """Convert a writer's error to an exception.
 
     Parameters
     ----------
     writer : OpenImageIO.ImageOutput
-        A call of it has failed.
+        A writer with a failed call.
     temporary, file : Path
-        What it was writing, and the file that the exception names instead.
+        The file that it was writing, and the file that the exception names.
 
     Returns
     -------
     OSError
-        With the writer's reason.
+        An exception with the writer's reason.
     """
     reason = writer.geterror().replace(str(temporary), file.name).strip() or "not written"
     return OSError(errno.EIO, reason, str(file))
 
 
 def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
-    """Read what was written, as not all writers (PNG, Targa) notice that a disk is full.
+    """Check a written file by reading it: some writers (PNG, Targa) do not notice a full disk.
 
     Parameters
     ----------
     oiio : module
         OpenImageIO.
     temporary, file : Path
-        What was written, and the file that the exception names instead.
+        The file that was written, and the file that the exception names.
 
     Raises
     ------
     OSError
-        It cannot be read.
+        The file cannot be read.
     """
     if not _is_readable(oiio, temporary):
         raise OSError(errno.EIO, "not written completely; is the disk full?", str(file))
 
 
 def put_in_place(temporary: Path, file: Path) -> None:
-    """Give a temporary file its name, in place of what is there, and the permissions of that.
+    """Rename a temporary file to its final name, with the permissions of the file it replaces.
 
     Parameters
     ----------
     temporary, file : Path
-        From `reserve`, and what it was given.
+        The temporary file from `reserve`, and the file that it was reserved for.
 
     Raises
     ------
     OSError
-        It cannot be done, for example because a folder is there; it names `file`.
+        It cannot be renamed, for example because a folder has the name; the error names `file`.
     """
-    meant = _meant(file)
+    target = _link_target(file)
     with contextlib.suppress(OSError):
-        shutil.copymode(meant, temporary)
+        shutil.copymode(target, temporary)
     try:
-        temporary.replace(meant)
+        temporary.replace(target)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(file)) from error
 
 
-def write_whole(file: Path, content: bytes) -> None:
-    """Write a file at once, in place of what is there.
+def write_file(file: Path, content: bytes) -> None:
+    """Write a file atomically.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def write_whole(file: Path, content: bytes) -> None:
     Raises
     ------
     OSError
-        It cannot be written; it names `file`, which is as it was.
+        The file cannot be written; the error names it, and the old content is kept.
     """
     temporary = _filled(file, lambda stream: stream.write(content))
     try:
@@ -210,14 +210,14 @@ def write_whole(file: Path, content: bytes) -> None:
 
 
 def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
-    """Make a temporary file beside a file and fill it; where that fails, nothing is left."""
+    """Create a temporary file beside a file and fill it; remove it if that fails."""
     check_name(file)
-    temporary = _meant(file).with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
+    temporary = _link_target(file).with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
     try:
         with temporary.open("xb") as stream:
             fill(stream)
     except BaseException as error:
-        # Ctrl-C too, which a large file leaves time for.
+        # BaseException includes Ctrl-C, which may arrive while a large file is written.
         with contextlib.suppress(OSError):
             temporary.unlink()
         if isinstance(error, OSError):
@@ -227,25 +227,25 @@ def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
 
 
 def _allocate(stream: BinaryIO, size: int) -> None:
-    """Give a new file disk space, without writing it where the system can."""
+    """Allocate disk space for a new file; write zeros if the system cannot allocate."""
     if hasattr(os, "posix_fallocate"):
         try:
             os.posix_fallocate(stream.fileno(), 0, size)
             return
         except OSError as error:
-            # What musl says where the file system cannot; glibc writes instead.
+            # musl's error if the file system cannot allocate; glibc writes zeros itself.
             if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
                 raise
     for start in range(0, size, _ZEROS):
         stream.write(bytes(min(_ZEROS, size - start)))
 
 
-def _meant(file: Path) -> Path:
-    """Return the file that a name stands for: links are written through, not replaced."""
+def _link_target(file: Path) -> Path:
+    """Follow symbolic links: the file they point to is written, and the link is kept."""
     try:
         return Path(os.path.realpath(file))
     except OSError as error:
-        # The current folder is not there any more.
+        # The current folder has been removed.
         raise OSError(error.errno, error.strerror, str(file)) from error
 
 

@@ -1,4 +1,4 @@
-"""The sRGB curve and its inverse (IEC 61966-2-1), on arrays."""
+"""The sRGB transfer curve and its inverse (IEC 61966-2-1), for arrays."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["decode_srgb", "encode_srgb"]
 
 
 def decode_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
-    """Turn sRGB values into linear ones.
+    """Decode sRGB values to linear values.
 
     Parameters
     ----------
     encoded : ndarray of float
-        Any shape; 0..1, beyond which the curve goes on.
+        Any shape. The curve is defined for 0..1 and continued above.
 
     Returns
     -------
@@ -25,19 +25,19 @@ def decode_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
         (IEC 61966-2-1).
     """
     kind = encoded.dtype.type
-    # The maximum keeps the power defined where the line is used.
+    # The maximum avoids powers of negative numbers, where the linear part is used.
     curve = ((np.maximum(encoded, kind(0.04045)) + kind(0.055)) / kind(1.055)) ** kind(2.4)
     linear: NDArray[Any] = np.where(encoded <= kind(0.04045), encoded / kind(12.92), curve)
     return linear
 
 
 def encode_srgb(linear: NDArray[Any]) -> NDArray[Any]:
-    """Turn linear values into sRGB ones, the inverse of `decode_srgb`.
+    """Encode linear values to sRGB, the inverse of `decode_srgb`.
 
     Parameters
     ----------
     linear : ndarray of float
-        Any shape; 0..1, beyond which the curve goes on.
+        Any shape. The curve is defined for 0..1 and continued above.
 
     Returns
     -------

@@ -82,6 +82,19 @@ def composite(
         An image of another dtype, or none where the bloom is on; `settings` are none.
     ValueError
         An image of another shape, or sizes that differ.
+
+    See Also
+    --------
+    apply : All steps.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> scene = np.full((2, 2, 3), 0.25)
+    >>> bloom = np.full((2, 2, 3), 0.5)
+    >>> settings = vkbloom.Separable(intensity=0.5, composite="mix")
+    >>> reference.composite(scene, bloom, settings)[0, 0]
+    array([0.375, 0.375, 0.375])
     """
     check_settings(settings)
     image = as_float(scene, "scene", (3, 4))

@@ -107,6 +107,24 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
         An image of another dtype, or `settings` that are none.
     ValueError
         An image of another shape.
+
+    See Also
+    --------
+    passes : The blur alone.
+    composite : The last step alone.
+    vkbloom.Renderer.apply : The same on a device.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> image = np.zeros((16, 16, 4), np.float32)
+    >>> image[8, 8] = 4
+    >>> settings = vkbloom.Pyramid(levels=2, threshold=1.0)
+    >>> expected = reference.apply(image, settings)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, settings)
+    >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
+    True
     """
     method = _method(settings)
     scene = as_float(image, "image", (3, 4))
@@ -160,6 +178,18 @@ def passes(
         A glow of another dtype, or `settings` that are none.
     ValueError
         A glow of another shape, a size under 1 or an unknown format.
+
+    See Also
+    --------
+    apply : With threshold and composite.
+    blur : The last of these framebuffers.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> glow = np.full((16, 16, 3), 0.5)
+    >>> list(reference.passes(glow, vkbloom.DualKawase(levels=2)))
+    ['down_0', 'down_1', 'up_0', 'bloom']
     """
     method = _method(settings)
     values = finite(as_float(glow, "glow"))
@@ -198,6 +228,17 @@ def blur(
     ------
     TypeError, ValueError
         As for `passes`.
+
+    See Also
+    --------
+    passes : All framebuffers of the blur.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> glow = np.full((16, 16, 3), 0.5)
+    >>> float(reference.blur(glow, vkbloom.Pyramid(levels=2))[8, 8, 0])
+    0.5
     """
     return passes(glow, settings, size, format)["bloom"]
 
@@ -216,6 +257,18 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
     Returns
     -------
     float
+
+    See Also
+    --------
+    vkbloom.testing.assert_gain : Asserts it of any bloom.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> reference.gain(vkbloom.Pyramid(levels=3))
+    1.0
+    >>> round(reference.gain(vkbloom.Separable()), 3)
+    1.922
     """
     method = _method(settings)
     threshold = None if method.published else settings.threshold

@@ -65,6 +65,16 @@ class Camera:
         A field is no number, or no three numbers.
     ValueError
         A field is not finite or out of range.
+
+    See Also
+    --------
+    Scene : Has a camera.
+
+    Examples
+    --------
+    >>> camera = vkbloom.Camera(position=(0, 0, -5), rotation=(0, 90, 0), fov=60)
+    >>> camera.near, camera.far
+    (0.1, 256.0)
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, -10.25)
@@ -120,6 +130,21 @@ class Scene:
         A field has another type.
     ValueError
         `glow_intensity` is negative or not finite.
+
+    See Also
+    --------
+    Scene.ufo : The built-in scene.
+    Scene.from_gltf : Loads files.
+    Renderer.render : Renders a scene.
+
+    Examples
+    --------
+    >>> scene = vkbloom.Scene.ufo()
+    >>> settings = vkbloom.Separable(bloom_size=(32, 32))
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.render(scene, settings, size=(64, 48))
+    >>> list(frames)
+    ['glow', 'glow_depth', 'blur_vertical', 'bloom', 'scene', 'depth', 'final']
     """
 
     body: Mesh
@@ -170,6 +195,15 @@ class Scene:
         ------
         ModuleNotFoundError
             pygltflib or OpenImageIO is not installed.
+
+        See Also
+        --------
+        Scene.from_gltf : Loads files.
+
+        Examples
+        --------
+        >>> vkbloom.Scene.ufo().glow is not None
+        True
         """
         # The folder as a whole, because the glTF files refer to others in it.
         with resources.as_file(resources.files("vkbloom") / "assets") as assets:
@@ -220,6 +254,17 @@ class Scene:
             A file is damaged or holds no triangles, or an argument is out of range.
         ModuleNotFoundError
             pygltflib, or OpenImageIO for an image, is not installed.
+
+        See Also
+        --------
+        Scene.ufo : The built-in scene.
+
+        Examples
+        --------
+        >>> vkbloom.Scene.from_gltf("missing.glb")
+        Traceback (most recent call last):
+            ...
+        FileNotFoundError: [Errno 2] No such file or directory: 'missing.glb'
         """
         for name, path in (("base", base), ("glow", "" if glow is None else glow)):
             if not isinstance(path, str | os.PathLike):
@@ -249,6 +294,16 @@ class Scene:
         ------
         TypeError
             `camera` is none.
+
+        See Also
+        --------
+        Camera : The argument.
+
+        Examples
+        --------
+        >>> scene = vkbloom.Scene.ufo().with_camera(vkbloom.Camera(fov=30))
+        >>> scene.camera.fov
+        30.0
         """
         return dataclasses.replace(self, camera=camera)
 

@@ -1,7 +1,7 @@
-"""Tests of bloom: laws that any blur or bloom can be held against, and frames against references.
+"""Tests of bloom: laws that every blur or bloom should obey, and comparisons with references.
 
-The laws need no reference picture; they work on any callable that takes an image and returns one.
-`FrameRegression` is what the pytest fixture `frame_regression` gives.
+The laws need no reference picture. They take any callable that maps an image to an image.
+`FrameRegression` is the type of the pytest fixture `frame_regression`.
 """
 
 from __future__ import annotations

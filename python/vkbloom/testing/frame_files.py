@@ -1,4 +1,4 @@
-"""Frames that an engine has written to files."""
+"""Read frames that an engine has written to files."""
 
 from __future__ import annotations
 
@@ -13,28 +13,48 @@ __all__ = ["read_frame"]
 
 
 def read_frame(path: str | os.PathLike[str]) -> NDArray[Any]:
-    """Read an image file with the values that it stores.
+    """Read an image file with its stored values.
 
     Parameters
     ----------
     path : str or path-like
-        OpenEXR, PNG or another format that OpenImageIO reads, with the channels RGB, RGBA, grey or
-        grey with alpha; of OpenEXR files with several parts, the first.
+        A file of a format that OpenImageIO reads, such as OpenEXR or PNG, with the channels RGB,
+        RGBA, grey or grey with alpha. The first part is read.
 
     Returns
     -------
     ndarray, shape (H, W, 3) or (H, W, 4)
-        float16 of half, float32 of float, uint8 of 8 bits; of 16 bits float32, decoded to linear
-        values as `vkbloom.io.image_reading.decode` does. Top row first.
+        float16 for half, float32 for float, uint8 for 8 bits. 16-bit integers become float32,
+        decoded to linear values. Top row first.
 
     Raises
     ------
     OSError
-        The file is not there, or cannot be opened; it names the file.
+        The file does not exist or cannot be opened; the error names it.
     ValueError
-        The file is damaged or no such image; it names the file.
+        The file is damaged or not such an image; the error names it.
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+    See Also
+    --------
+    FrameRegression.check : Compares frames with references.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from vkbloom import testing
+    >>> frames = vkbloom.Frames(
+    ...     {"final": np.full((8, 8, 3), 0.5, np.float16)},
+    ...     timings={},
+    ...     settings=vkbloom.Separable(),
+    ...     info={},
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     (path,) = frames.save(f"{folder}/frame.exr")
+    ...     frame = testing.read_frame(path)
+    >>> frame.shape, frame.dtype
+    ((8, 8, 3), dtype('float16'))
     """
     stored = image_reading.load(path)
     try:

@@ -1,4 +1,4 @@
-"""Framebuffers held against those of a reference, pass by pass."""
+"""Compare framebuffers with those of a reference, in the order of the data flow."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ __all__ = ["Verdict", "first_failure", "judge", "judge_image"]
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What was found out about one framebuffer.
+    """The result of comparing one framebuffer.
 
     Parameters
     ----------
     name : str
-        Of the framebuffer.
+        Name of the framebuffer.
     failed_at : Stage or None
-        The first check that failed; None: it passed.
+        The first check that failed; None if all passed.
     reasons : tuple of str
-        Why it failed, one for each check that did.
+        One reason for each failed check.
     warning : str or None
-        It passed, but differs by more than `Tolerances.warn`.
+        A text if the framebuffer passed but differs by more than `Tolerances.warn`.
     comparison : Comparison or None
-        The figures; None where shapes or dtypes differ, or one image is missing.
+        The figures; None if shapes or dtypes differ, or one image is missing.
     atol, rtol : float
-        What was applied.
+        The tolerances that were used.
     """
 
     name: str
@@ -45,12 +45,12 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing failed."""
+        """Whether all checks passed."""
         return self.failed_at is None
 
     @property
     def identical(self) -> bool:
-        """Whether the images are equal to the bit, or for all that NaN tells."""
+        """Whether all values are equal; NaN equals NaN if the tolerances allow it."""
         return self.passed and self.comparison is not None and not self.comparison.max_error
 
 
@@ -64,14 +64,15 @@ def judge(
     Parameters
     ----------
     expected, actual : mapping of str to ndarray
-        By name, in the order that the data flows. Arrays as
-        `vkbloom.views.comparison.compare` takes them.
+        Framebuffers by name, in the order of the data flow, as arrays that
+        `vkbloom.views.comparison.compare` accepts.
     tolerances : Tolerances
 
     Returns
     -------
     tuple of Verdict
-        In the order of `actual`; framebuffers that only the reference has come where it has them.
+        In the order of `actual`; a framebuffer that only the reference has follows its predecessor
+        there.
     """
     return tuple(
         _of_missing(name, is_expected=name in expected)
@@ -82,7 +83,7 @@ def judge(
 
 
 def first_failure(verdicts: tuple[Verdict, ...]) -> Verdict | None:
-    """Return the first framebuffer, in the order that the data flows, that failed."""
+    """Return the first failed framebuffer in the order of the data flow."""
     return next((verdict for verdict in verdicts if not verdict.passed), None)
 
 
@@ -94,7 +95,7 @@ def judge_image(
     Parameters
     ----------
     name : str
-        Of the framebuffer.
+        Name of the framebuffer.
     expected, actual : ndarray
     tolerances : Tolerances
 
@@ -110,7 +111,7 @@ def judge_image(
     if reasons:
         return Verdict(name=name, failed_at="shape and dtype", reasons=tuple(reasons))
     atol, rtol = tolerances.of(expected.dtype)
-    # Of equal images no figure can fail, and the slow ones need not be computed.
+    # Equal images pass every limit, so the slow metrics need not be computed.
     metrics = () if np.array_equal(expected, actual) else tolerances.metrics
     found = compare(
         expected,
@@ -141,7 +142,7 @@ def _of_missing(name: str, *, is_expected: bool) -> Verdict:
 
 
 def _merged(expected: list[str], actual: list[str]) -> list[str]:
-    """Return the names of both: those of `actual`, each missing one after its predecessor."""
+    """Return the names of `actual`, with each missing one of `expected` after its predecessor."""
     names = list(actual)
     for index, name in enumerate(expected):
         if name not in names:

@@ -1,8 +1,8 @@
-"""Laws of a blur or bloom as a whole, on any callable that takes an image and returns one.
+"""Laws of a complete blur or bloom, for any callable that maps an image to an image.
 
-Each assertion says what the law is, the largest deviation from it with its place, and what the
-value there should have been. How large a deviation may be follows from how exact a single value of
-a result is (`vkbloom.testing.Probe`): the errors of all values that enter a law are added up.
+The message of a failed assertion has the law, the largest deviation with its position, and the
+expected value there. The allowed deviation is the sum of the errors of all values that a law uses;
+`vkbloom.testing.Probe` defines the error of a single value.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     """Assert that the bloom of a mixture of two images is the mixture of their blooms.
 
     The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise; additivity and
-    homogeneity at once, which is linearity (Oppenheim and Willsky, "Signals and Systems", chapter
-    1). It does not hold for a method with a threshold, a clamp or a firefly filter.
+    homogeneity together, that is, linearity (Oppenheim and Willsky, "Signals and Systems", chapter
+    1). A method with a threshold, a clamp or a firefly filter is not linear.
 
     Parameters
     ----------
     bloom : callable
         Takes an image and returns one of the same height and width.
     probe : Probe
-        What is tried, and how exact it has to be.
+        The kind of test image, and the allowed errors.
 
     Raises
     ------
@@ -50,10 +50,28 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable.
+
+    See Also
+    --------
+    assert_additive : The law of the picture with bloom.
+    assert_gain : The law of flat images.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(blur_strength=1.0)
+    >>> testing.assert_superposition(lambda image: reference.blur(image, settings))
+
+    A square is not linear:
+
+    >>> testing.assert_superposition(lambda image: image**2)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    AssertionError: assert_superposition: ...
     """
     __tracebackhide__ = True
-    # Quarters and halves of levels would be rounded before the bloom sees them.
-    a, b = (_whole_quarters(probe, probe.noise(index, probe.value)) for index in (0, 1))
+    # Otherwise halves and quarters of the values would be rounded in the test images.
+    a, b = (_divisible_by_four(probe, probe.noise(index, probe.value)) for index in (0, 1))
     whole, whole_error = probe.apply(bloom, a / 2 + b / 4)
     of_a, error_a = probe.apply(bloom, a)
     of_b, error_b = probe.apply(bloom, b)
@@ -72,24 +90,24 @@ def assert_additive(
     intensity: float = 1.0,
     probe: Probe = _DEFAULT,
 ) -> None:
-    """Assert that a picture with bloom is the picture plus light.
+    """Assert that a picture with bloom is the picture plus the bloom.
 
     The law: F(a) = a + intensity * G(a), for an image of noise, where F is the picture with bloom
-    and G the bloom alone: additive blending, which is how the aperture of a camera or an eye
-    spreads light over what is there (Spencer et al., "Physically-Based Glare Effects for Digital
-    Images", SIGGRAPH 1995). Without G, all that can be asked is F(a) >= a: light is added and none
-    is taken. A mix, which takes from bright pixels what it gives to others, fails.
+    and G the bloom alone. This is additive blending, as glare in a camera or an eye adds light
+    (Spencer et al., "Physically-Based Glare Effects for Digital Images", SIGGRAPH 1995). Without G
+    the law is F(a) >= a: light is added and none is removed. A mix removes light from bright
+    pixels and fails.
 
     Parameters
     ----------
     bloom : callable
-        Image to the picture with bloom.
+        Maps an image to the picture with bloom.
     glow : callable, optional
-        Image to the bloom alone.
+        Maps an image to the bloom alone.
     intensity : float
         Factor of the bloom in the picture, 0 or more.
     probe : Probe
-        For integers, `value` must leave room for the bloom, or it will be clamped.
+        With integers, `value` must be low enough that picture plus bloom is not clamped.
 
     Raises
     ------
@@ -97,6 +115,18 @@ def assert_additive(
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or `intensity` is out of range.
+
+    See Also
+    --------
+    assert_superposition : Linearity of the bloom alone.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(blur_strength=1.0)
+    >>> def bloom(image):
+    ...     return reference.blur(image, settings)
+    >>> testing.assert_additive(lambda image: image + 0.5 * bloom(image), bloom, intensity=0.5)
     """
     __tracebackhide__ = True
     check_number("intensity", intensity, 0.0, math.inf)
@@ -122,22 +152,22 @@ def assert_additive(
 
 
 def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
-    """Assert what a flat image becomes.
+    """Assert the gain of flat images.
 
-    The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, a half and a
-    quarter of it: the sum of the kernel's weights is the gain, at the border too where the image is
-    continued by its edge. A gain of 1 keeps the energy.
+    The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, half and a
+    quarter of it. The gain is the sum of the kernel's weights; it is the same at the border if the
+    image is continued by its edge. A gain of 1 keeps the energy.
 
     Parameters
     ----------
     bloom : callable
         Takes an image and returns one of the same height and width.
     gain : float
-        For `vkbloom`'s own methods, `vkbloom.reference.gain` computes it.
+        The expected gain; `vkbloom.reference.gain` computes it for vkbloom's own methods.
     probe : Probe
-        For integers, `value` times `gain` must not be over 1.
+        With integers, `value` times `gain` must be at most 1.
     border : int
-        Pixels to each side that are not looked at, for methods that see black beyond the image.
+        Pixels at each side that are ignored, for methods that read black outside the image.
 
     Raises
     ------
@@ -145,11 +175,21 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an argument is out of range.
+
+    See Also
+    --------
+    vkbloom.reference.gain : Gain of vkbloom's own methods.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(2.0), blur_strength=1.0)
+    >>> testing.assert_gain(lambda image: reference.blur(image, settings), 1.0)
     """
     __tracebackhide__ = True
     check_number("gain", gain, 0.0, math.inf)
     for part in (1.0, 0.5, 0.25):
-        image = _whole_quarters(probe, probe.flat(probe.value)) * part
+        image = _divisible_by_four(probe, probe.flat(probe.value)) * part
         result, error = probe.apply(bloom, image)
         inner = _inner(probe, border)
         compare_with_law(
@@ -170,8 +210,8 @@ def assert_symmetric(
 ) -> None:
     """Assert that the bloom of a mirrored image is the mirrored bloom.
 
-    The law: B(M a) = M B(a), for an image of noise and each mirroring M. A kernel that is not
-    symmetric breaks it, and so does a shift by any part of a pixel, such as a missing half-texel.
+    The law: B(M a) = M B(a), for an image of noise and each reflection M. It fails for a kernel
+    that is not symmetric, and for a shift by a part of a pixel, such as a missing half-texel.
 
     Parameters
     ----------
@@ -187,6 +227,17 @@ def assert_symmetric(
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an axis is unknown.
+
+    See Also
+    --------
+    assert_centroid_kept : The law of shifts, as a distance.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image):
+    ...     return reference.blur(image, vkbloom.Separable())
+    >>> testing.assert_symmetric(bloom, axes=("x", "y", "xy"))
     """
     __tracebackhide__ = True
     image = probe.noise(0, probe.value)
@@ -206,9 +257,9 @@ def assert_symmetric(
 
 
 def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
-    """Assert that an edge stays one edge: no dark or bright line beside it.
+    """Assert that an edge gets no dark or bright line beside it.
 
-    The law: across a step from black to `probe.value`, in either direction, values only rise, and
+    The law: across a step from black to `probe.value`, along x and along y, values never fall, and
     they stay between those of the black and of the flat bright image. It holds if no weight of the
     kernel is negative (Mitchell and Netravali, "Reconstruction Filters in Computer Graphics",
     SIGGRAPH 1988, on ringing).
@@ -219,7 +270,7 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
         Takes an image and returns one of the same height and width.
     probe : Probe
     border : int
-        Pixels to each side that are not looked at, for methods that see black beyond the image.
+        Pixels at each side that are ignored, for methods that read black outside the image.
 
     Raises
     ------
@@ -227,6 +278,16 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or `border` is out of range.
+
+    See Also
+    --------
+    assert_gain : The law of flat images.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_no_ringing(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
@@ -249,7 +310,7 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
             border=border,
         )
         inside = result[inner]
-        # The largest value so far: what a later one must not be under.
+        # The running maximum, below which no later value may lie.
         compare_with_law(
             "assert_no_ringing",
             f"along {across}, values only rise across a step from black to bright",
@@ -268,26 +329,26 @@ def assert_bounded_fireflies(
     brightness: Sequence[float] = (10.0, 1e3, 6e4),
     period: int = 2,
 ) -> None:
-    """Assert that one very bright pixel does not light up its surroundings.
+    """Assert that one very bright pixel brightens other pixels by a limited amount.
 
     The law: with a pixel of brightness L on a dark image, no other pixel rises by more than
-    `limit`, for each L, wherever the pixel lies. A linear bloom spreads a share of L and so has no
-    limit, which in an animation is a flicker; an average weighted by 1 / (1 + luminance) (Karis,
-    "Tone Mapping", 2013) or a clamp is to set one.
+    `limit`, for each L and each position of the pixel. A linear bloom has no such limit, because
+    it spreads a share of L; in an animation the pixel flickers. An average weighted by
+    1 / (1 + luminance) (Karis, "Tone Mapping", 2013) or a clamp sets a limit.
 
     Parameters
     ----------
     bloom : callable
         Takes an image and returns one of the same height and width.
     limit : float
-        By how much another pixel may rise, in real units.
+        The largest allowed rise of another pixel, in real units.
     probe : Probe
-        Of floats; `value` is not used.
+        A probe of floats; `value` is not used.
     brightness : sequence of float
-        Infinity is allowed: what is not finite must not spread.
+        The values of L. Infinity is allowed: values that are not finite must not spread.
     period : int
-        The pixel is tried in a square of as many places to a side, as chains of halved images
-        treat places differently: 2 for one halving, 4 for two.
+        The pixel is tried at period x period positions, because the result of a chain of halved
+        images depends on the position: 2 for one halving, 4 for two.
 
     Raises
     ------
@@ -295,10 +356,20 @@ def assert_bounded_fireflies(
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an argument is out of range.
+
+    See Also
+    --------
+    vkbloom.Pyramid : Has the parameter `firefly_filter`.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> probe = testing.Probe(size=(32, 32))
+    >>> testing.assert_bounded_fireflies(lambda image: np.minimum(image, 1.0), probe=probe)
     """
     __tracebackhide__ = True
     if probe.dtype.kind == "u":
-        raise TypeError(f"probe: {probe.dtype} has nothing brighter than 1; floats are needed")
+        raise TypeError(f"probe: {probe.dtype} has no values above 1; use a float dtype")
     check_number("limit", limit, 0.0, math.inf)
     if not 1 <= period <= min(probe.size):
         raise ValueError(f"period: {period!r} is out of range, 1 to {min(probe.size)}")
@@ -328,19 +399,19 @@ def compare_with_law(
     border: int = 0,
     note: str = "",
 ) -> None:
-    """Raise AssertionError with figure, place and law unless all values are as expected.
+    """Raise AssertionError with figure, position and law unless all values are as expected.
 
     Parameters
     ----------
     assertion, law : str
-        Which assertion it is, and what it is about.
+        Name of the assertion, and its law as text.
     found, expected : ndarray of float64, shape (H, W, C)
     allowed : float
-        Largest difference.
+        The largest allowed difference.
     border : int
-        Pixels that were cut off above and to the left.
+        Number of rows and columns that were removed at the top and the left.
     note : str
-        A further figure for the message.
+        A text with a further figure for the message.
     """
     __tracebackhide__ = True
     difference = np.abs(found - expected)
@@ -357,15 +428,16 @@ def compare_with_law(
 
 
 def fail(assertion: str, law: str, figure: str) -> NoReturn:
-    """Raise AssertionError with what was found and the law that it breaks."""
+    """Raise AssertionError with the figure and the law."""
     __tracebackhide__ = True
     raise AssertionError(f"{assertion}: {figure}\n  law: {law}")
 
 
-def _whole_quarters(probe: Probe, image: Image) -> Image:
-    """Round values so that a half and a quarter of two of them add up without rounding.
+def _divisible_by_four(probe: Probe, image: Image) -> Image:
+    """Round values so that the sum of half of one and a quarter of another is exact.
 
-    Integers to multiples of four levels; floats to 256 levels, of which half has 8 times as many.
+    Integers are rounded to multiples of four levels, floats to 256 levels; float16 represents an
+    eighth of such a level exactly.
     """
     levels = np.iinfo(probe.dtype).max / 4 if probe.dtype.kind == "u" else 256 / probe.value
     whole: Image = np.floor(image * levels + 1e-9) / levels

@@ -1,4 +1,4 @@
-"""The point spread of a blur or bloom, and the laws that are about its shape."""
+"""The point spread of a blur or bloom, and the laws of its shape."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ __all__ = [
 ]
 
 _DEFAULT = Probe()
-# Share of a point's light that may lie in the outermost pixels. Clamping to the edge doubles what
-# lies there at most, and so moves a centroid by a thousandth of half the image.
+# Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
+# that light, which moves a centroid by a thousandth of half the image.
 _AT_THE_BORDER: Final = 1e-3
 
 
 def point_spread(
     bloom: Bloom, probe: Probe = _DEFAULT, *, at: tuple[int, int] | None = None
 ) -> Image:
-    """Return what one lit pixel becomes.
+    """Return the point-spread function of a bloom.
 
-    The point-spread function h(x, y) = (B(v d) - B(0)) / v, d being an image with one pixel of 1
-    and v the probe's value. A linear, shift-invariant blur is the convolution with it (Goodman,
-    "Introduction to Fourier Optics", chapter 2).
+    h(x, y) = (B(v d) - B(0)) / v, where d is an image with one pixel of 1 and v the probe's value.
+    A linear, shift-invariant blur is the convolution with h (Goodman, "Introduction to Fourier
+    Optics", chapter 2).
 
     Parameters
     ----------
@@ -45,19 +45,34 @@ def point_spread(
         Takes an image and returns one of the same height and width.
     probe : Probe
     at : (int, int), optional
-        x and y of the pixel; by default the one in the middle.
+        x and y of the pixel. Default: the middle of the image.
 
     Returns
     -------
     ndarray of float64, shape (H, W, C)
-        With the pixel at its place.
+        h around the pixel `at`; it is not shifted to the middle.
 
     Raises
     ------
     AssertionError
         A result is not finite.
     TypeError, ValueError
-        `bloom` is not such a callable, or `at` is not in the image.
+        `bloom` is not such a callable, or `at` is outside the image.
+
+    See Also
+    --------
+    response : Figures of the point spread, along a parameter.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(weights=(0.5, 0.25), blur_strength=1.0)
+    >>> probe = testing.Probe(size=(9, 9))
+    >>> spread = testing.point_spread(lambda image: reference.blur(image, settings), probe)
+    >>> spread[3:6, 3:6, 0]
+    array([[0.0625, 0.125 , 0.0625],
+           [0.125 , 0.25  , 0.125 ],
+           [0.0625, 0.125 , 0.0625]])
     """
     __tracebackhide__ = True
     return _measured(bloom, probe, at)[0]
@@ -66,18 +81,18 @@ def point_spread(
 def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     """Assert that the point spread is the product of a row and a column.
 
-    The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), with (x0, y0) the place of the largest value;
-    equivalently, h as a matrix has the rank 1, and its second singular value is 0 (Treitel and
+    The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), where (x0, y0) is the position of the largest
+    value. Equivalently, h as a matrix has rank 1, and its second singular value is 0 (Treitel and
     Shanks, "The Design of Multistage Separable Planar Filters", IEEE Transactions on Geoscience
-    Electronics, 1971). Of a sum of separable layers it does not hold.
+    Electronics, 1971). A sum of separable layers is not separable.
 
     Parameters
     ----------
     bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone, as the
-        picture itself under it is a second layer.
+        Takes an image and returns the bloom alone, of the same height and width. The picture with
+        bloom is a sum of two layers and fails.
     probe : Probe
-        `value` must be dark enough for nothing to be clamped.
+        `value` must be low enough that nothing is clamped.
 
     Raises
     ------
@@ -85,6 +100,16 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         The law does not hold, the result is black, or it is not finite.
     TypeError, ValueError
         `bloom` is not such a callable.
+
+    See Also
+    --------
+    point_spread : The image that this law is about.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_separable(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     spread, error = _measured(bloom, probe, None)
@@ -102,7 +127,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column",
         spread,
         product,
-        # Four values, none of them larger than the one that is divided by.
+        # Four values enter, none larger than the divisor.
         4 * error,
         note=f"; the second singular value is {100 * max(shares):.3g} % of the first",
     )
@@ -115,23 +140,23 @@ def assert_centroid_kept(
     at: tuple[int, int] | None = None,
     within: float = 0.01,
 ) -> None:
-    """Assert that light spreads around the place that it comes from.
+    """Assert that the light of a pixel is centred on that pixel.
 
-    The law: the centroid of the point spread, sum of h(x, y) (x, y) / sum of h, is the pixel that
-    was lit. Chains of halved images keep it on average over places, and miss it at each: there a
-    larger `within` is the law.
+    The law: the centroid of the point spread, sum of h(x, y) (x, y) / sum of h, is the lit pixel.
+    A chain of halved images keeps the centroid only on average over all positions; use a larger
+    `within` for it.
 
     Parameters
     ----------
     bloom : callable
         Takes an image and returns one of the same height and width.
     probe : Probe
-        With a border wide enough for what is spread.
+        Its image must be large enough that no light reaches the border.
     at : (int, int), optional
-        x and y of the lit pixel; by default the one in the middle.
+        x and y of the lit pixel. Default: the middle of the image.
     within : float
-        Distance along each axis that is allowed, in pixels, on top of what the exactness of single
-        values leads to.
+        Allowed distance along each axis in pixels, in addition to the effect of the errors of
+        single values.
 
     Raises
     ------
@@ -140,6 +165,16 @@ def assert_centroid_kept(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the light reaches the
         border.
+
+    See Also
+    --------
+    assert_symmetric : The law of mirrored images.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_centroid_kept(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     check_number("within", within, 0.0, math.inf)
@@ -171,22 +206,22 @@ def assert_spread(
 ) -> None:
     """Assert how far light spreads.
 
-    The law: the standard deviation of the point spread along x and y is sigma. Variances add up
-    under convolution (Bracewell, "The Fourier Transform and Its Applications", chapter 8), so
-    that of several passes is the root of the sum of squares, and a kernel with weights w_i at
-    distances d_i has the variance sum w_i d_i^2 / sum w_i.
+    The law: the standard deviation of the point spread along x and y is sigma. A convolution adds
+    variances (Bracewell, "The Fourier Transform and Its Applications", chapter 8), so the sigma of
+    several passes is the root of the sum of squares. A kernel with weights w_i at distances d_i
+    has the variance sum w_i d_i^2 / sum w_i.
 
     Parameters
     ----------
     bloom : callable
         Takes an image and returns one of the same height and width.
     sigma : float or (float, float)
-        Along both axes or along x and y, in pixels.
+        Standard deviation in pixels: one number for both axes, or one for x and one for y.
     probe : Probe
-        With a border wide enough for what is spread.
+        Its image must be large enough that no light reaches the border.
     rtol : float
-        Relative difference that is allowed. The default has room for a Gaussian that is cut off at
-        three sigma, whose standard deviation is 1.3 % smaller.
+        Allowed relative difference. The default allows for a Gaussian that is cut off at three
+        sigma, whose standard deviation is 1.3 % smaller.
 
     Raises
     ------
@@ -195,6 +230,17 @@ def assert_spread(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the light reaches the
         border.
+
+    See Also
+    --------
+    response : Measures sigma along a parameter.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> weights = vkbloom.gaussian_weights(2.0)
+    >>> settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
+    >>> testing.assert_spread(lambda image: reference.blur(image, settings), 2.0)
     """
     __tracebackhide__ = True
     pair = sigma if isinstance(sigma, tuple) else (sigma, sigma)
@@ -209,7 +255,7 @@ def assert_spread(
             profile = spread[:, :, channel].sum(axis=axis)
             distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
             found = _deviation(profile)
-            # The variance's error, which is 2 sigma times that of the deviation.
+            # The error of the variance; it is 2 sigma times that of the standard deviation.
             variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
             allowed = rtol * pair[axis] + variance_error / max(2 * found, 1e-6)
             if not abs(found - pair[axis]) <= allowed:
@@ -224,27 +270,41 @@ def assert_spread(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Response:
-    """How the point spread of a bloom follows a parameter.
+    """Figures of a bloom's point spread for each value of a parameter.
+
+    All figures are of the first channel.
 
     Parameters
     ----------
     parameter : str
-        Its name.
+        Name of the parameter.
     values : tuple
-        What it was set to.
+        The N values of the parameter.
     gain : ndarray of float64, shape (N,)
-        What all the light of a pixel adds up to, for a pixel of 1; of the first channel, as all of
-        these.
+        The sum of the light of a pixel of 1.
     peak : ndarray of float64, shape (N,)
         The largest value.
     shift : ndarray of float64, shape (N, 2)
-        Of the centroid, in pixels along x and y; NaN where there is no light.
+        Shift of the centroid in pixels along x and y; NaN if there is no light.
     sigma : ndarray of float64, shape (N, 2)
-        Standard deviation along x and y in pixels; NaN where there is no light, or where negative
-        values outweigh.
+        Standard deviation along x and y in pixels; NaN if there is no light, or if negative values
+        make the variance negative.
     at_border : ndarray of float64, shape (N,)
-        Share of the light in the outermost pixels: where it is not small, the others are too
-        small.
+        Share of the light in the outermost pixels. If it is not small, the image cuts off light
+        and the other figures are too small.
+
+    See Also
+    --------
+    response : Returns it.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image, blur_scale):
+    ...     return reference.blur(image, vkbloom.Separable(blur_scale=blur_scale))
+    >>> found = testing.response(bloom, "blur_scale", [1.0, 2.0])
+    >>> bool(found.sigma[1, 0] > 1.9 * found.sigma[0, 0])
+    True
     """
 
     parameter: str
@@ -282,17 +342,17 @@ def response(
     values: Sequence[Any],
     probe: Probe = _DEFAULT,
 ) -> Response:
-    """Measure how the point spread of a bloom follows a parameter.
+    """Measure the point spread of a bloom for each value of a parameter.
 
     Parameters
     ----------
     bloom : callable
-        Takes an image and, as a keyword, the parameter; returns an image of the same height and
+        Takes an image and the parameter as a keyword; returns an image of the same height and
         width.
     parameter : str
-        The keyword.
+        Name of the keyword.
     values : sequence
-        What to set it to.
+        Values of the parameter.
     probe : Probe
 
     Returns
@@ -304,11 +364,26 @@ def response(
     AssertionError
         A result is not finite.
     TypeError, ValueError
-        `bloom` is not such a callable, or there is no value.
+        `bloom` is not such a callable, or `values` is empty.
+
+    See Also
+    --------
+    point_spread : The image that is measured.
+    assert_spread : Asserts one sigma.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image, sigma):
+    ...     weights = vkbloom.gaussian_weights(sigma)
+    ...     settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
+    ...     return reference.blur(image, settings)
+    >>> testing.response(bloom, "sigma", [1.0, 2.0]).sigma[:, 0].round(1)
+    array([1., 2.])
     """
     __tracebackhide__ = True
     if not len(values):
-        raise ValueError("values: one at least is needed")
+        raise ValueError("values: empty; give at least one")
     rows = []
     for value in values:
         one = functools.partial(bloom, **{parameter: value})
@@ -345,18 +420,18 @@ def response(
 
 
 def _measured(bloom: Bloom, probe: Probe, at: tuple[int, int] | None) -> tuple[Image, float]:
-    """Return the point spread and by how much its values may be off."""
+    """Return the point spread and the error of its values."""
     __tracebackhide__ = True
     place = at or probe.centre
     if not all(0 <= number < side for number, side in zip(place, probe.size, strict=True)):
-        raise ValueError(f"at: {at!r} is not in an image of {probe.size}")
+        raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
     lit, lit_error = probe.apply(bloom, probe.point(place, probe.value))
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
     return (lit - dark) / probe.value, (lit_error + dark_error) / probe.value
 
 
 def _check_lit(assertion: str, spread: Image, error: float) -> None:
-    """Fail where there is nothing to measure."""
+    """Fail if there is no light to measure."""
     __tracebackhide__ = True
     for channel in range(spread.shape[2]):
         largest = float(np.abs(spread[:, :, channel]).max())
@@ -390,7 +465,7 @@ def _centroid(profile: Image) -> float:
 
 
 def _deviation(profile: Image) -> float:
-    """Return the standard deviation of a profile, NaN if it has none."""
+    """Return the standard deviation of a profile; NaN if the variance is negative."""
     total = float(profile.sum())
     if not total:
         return math.nan
@@ -400,10 +475,10 @@ def _deviation(profile: Image) -> float:
 
 
 def _moment_error(plane: Image, error: float, axis: int, weights: Image) -> float:
-    """Return by how much a moment may be off, for values that are off independently.
+    """Return the error of a moment, for values with independent errors.
 
-    Only where there is light: elsewhere a value is 0 and exactly so. Independent errors add up as
-    the root of the sum of their squares; three times that is what is allowed.
+    Pixels without light are exactly 0 and have no error. Independent errors add as the root of the
+    sum of squares; three times that is allowed.
     """
     lit = plane != 0
     along = np.broadcast_to(weights if axis == 0 else weights[:, np.newaxis], plane.shape)

@@ -1,4 +1,4 @@
-"""Images that a blur or bloom is probed with, and what comes back of them."""
+"""Test images for a blur or bloom, and the check of the returned images."""
 
 from __future__ import annotations
 
@@ -14,16 +14,15 @@ from vkbloom.checks import check_number, check_size
 
 __all__ = ["Bloom", "Image", "Probe"]
 
-#: Real units: 0 to 1 for what is stored as integers.
+#: An image in real units: integers are scaled to 0..1.
 Image: TypeAlias = NDArray[np.float64]
 
-#: What is tested: takes an image and returns one of the same height and width.
+#: The bloom under test: takes an image and returns one of the same height and width.
 Bloom: TypeAlias = Callable[[NDArray[Any]], NDArray[Any]]
 
-#: (atol, rtol) of a result's dtype, rtol of its largest value. Integers: two levels, half a level
-#: for each rounding of a result that went through up to four buffers. Half: four roundings of
-#: 2**-11. Float: the accuracy of lavapipe's linear filter; filters by hand are a hundred times as
-#: exact.
+#: (atol, rtol) by a result's dtype; rtol is relative to the largest value. Integers: two levels,
+#: half a level for each rounding in up to four buffers. Half: four roundings of 2**-11. Float: the
+#: accuracy of lavapipe's linear filter; filters in shader code are a hundred times as exact.
 _ERRORS: Final[Mapping[str, tuple[float, float]]] = {
     "uint8": (2 / 255, 0.0),
     "uint16": (2 / 65535, 0.0),
@@ -35,33 +34,45 @@ _ERRORS: Final[Mapping[str, tuple[float, float]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Probe:
-    """The kind of image that the laws are tried on, and how exact the results have to be.
+    """The kind of test image for the laws, and the allowed errors of the results.
 
     Parameters
     ----------
     size : (int, int)
-        Width and height in pixels. A response must not reach the border, where a law is about the
-        whole of it.
+        Width and height in pixels. Laws of the complete point spread need an image whose border no
+        light reaches.
     channels : int or None
-        1 to 4; None: images of shape (H, W). Of 4, the last is alpha: it is 1 in all images, and
-        it is not looked at.
+        1 to 4; None: images of shape (H, W). A fourth channel is alpha: it is 1 in all test images
+        and ignored in results.
     dtype : str or dtype
-        Of the images: "uint8", "uint16" (both 0 to 1 in real units), "float16", "float32" or
+        Dtype of the images: "uint8", "uint16" (both 0 to 1 in real units), "float16", "float32" or
         "float64".
     value : float
-        The brightest value of an image in real units, 1 at most for integers. A method that
-        clamps, or that has a threshold, is linear on one side of it only.
+        The brightest value of an image in real units, at most 1 for integers. A method that clamps
+        or has a threshold is linear only on one side of it.
     atol, rtol : float or None
-        By how much a value of a result may be off, absolutely and relative to the largest value of
-        that result. None: by the result's dtype, as of `None` for both, two levels of an integer,
-        2e-3 of half and 1e-4 of float.
+        Allowed error of a value, absolute and relative to the largest value of the result. If both
+        are None, they follow from the result's dtype: two levels for integers, 2e-3 for half, 1e-4
+        for float.
     seed : int
-        Of the noise in images of noise.
+        Seed of the noise images.
 
     Raises
     ------
     ValueError, TypeError
         A field is out of range or of another type.
+
+    See Also
+    --------
+    assert_superposition : One of the laws that take a probe.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> probe = testing.Probe(size=(32, 24), dtype="float16", value=4.0)
+    >>> probe.centre
+    (16, 12)
+    >>> testing.assert_gain(lambda image: image, 1.0, probe)
     """
 
     size: tuple[int, int] = (65, 65)
@@ -88,12 +99,12 @@ class Probe:
 
     @property
     def centre(self) -> tuple[int, int]:
-        """X and y of the pixel in the middle."""
+        """X and y of the middle pixel."""
         return self.size[0] // 2, self.size[1] // 2
 
     @property
     def colours(self) -> int:
-        """How many channels are looked at."""
+        """Number of channels without alpha."""
         return 1 if self.channels is None else min(self.channels, 3)
 
     def flat(self, value: float) -> Image:
@@ -107,7 +118,7 @@ class Probe:
         return image
 
     def noise(self, index: int, highest: float) -> Image:
-        """Return random values, 0 to `highest`, rounded to what the dtype holds."""
+        """Return random values of 0 to `highest`, rounded to the dtype."""
         generator = np.random.default_rng((self.seed, index))
         image = generator.random((self.size[1], self.size[0], self.colours)) * highest
         return self._real(self._stored(image))
@@ -115,7 +126,7 @@ class Probe:
     def apply(
         self, bloom: Bloom, image: Image, *, exempt: tuple[int, int] | None = None
     ) -> tuple[Image, float]:
-        """Return what the bloom makes of an image, and by how much each value may be off.
+        """Return the bloom of an image, and the allowed error of its values.
 
         Parameters
         ----------
@@ -123,22 +134,22 @@ class Probe:
         image : ndarray of float64, shape (H, W, C)
             In real units, C as in `colours`.
         exempt : (int, int), optional
-            x and y of a pixel that is not looked at: it is 0 in what is returned.
+            x and y of a pixel to ignore; it is 0 in the result.
 
         Returns
         -------
         result : ndarray of float64, shape (H, W, C)
-            In real units. Of a result with alpha, its colours.
+            The result in real units, without alpha.
         error : float
 
         Raises
         ------
         TypeError
-            The bloom is not callable, or returns no array of numbers.
+            The bloom is not callable, or does not return an array of numbers.
         ValueError
-            What it returns has another height, width or number of channels.
+            The result has another height, width or number of channels.
         AssertionError
-            What it returns is not finite.
+            The result is not finite.
         """
         __tracebackhide__ = True
         result, dtype = self._called(bloom, image)
@@ -148,7 +159,7 @@ class Probe:
             y, x, channel = (int(index) for index in np.argwhere(~np.isfinite(result))[0])
             raise AssertionError(
                 f"the result is {result[y, x, channel]} at x {x}, y {y}, channel {channel}\n"
-                "  law: what a bloom makes of finite values is finite"
+                "  law: the bloom of finite values is finite"
             )
         atol, rtol = _ERRORS[dtype]
         if self.atol is not None or self.rtol is not None:
@@ -157,7 +168,7 @@ class Probe:
 
     def _called(self, bloom: Bloom, image: Image) -> tuple[Image, str]:
         if not callable(bloom):
-            raise TypeError(f"bloom: a callable is needed, not {bloom!r}")
+            raise TypeError(f"bloom: {bloom!r} is not callable")
         stored = self._stored(image)
         if self.channels == 4:
             opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1

@@ -1,4 +1,4 @@
-"""What a check leaves for the summary and the report: plain values that processes exchange."""
+"""Records of checks for the summary and the report: plain values that processes can exchange."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Figures", "Record"]
 
 
 class Figures(TypedDict):
-    """What was found out about one framebuffer; None where it could not be."""
+    """Figures of one framebuffer; None if a figure could not be computed."""
 
     name: str
     outcome: str  # "equal", "within" or "failed"

@@ -1,8 +1,8 @@
-"""References of a test module: lossless images, and who made them.
+"""References of a test module: lossless images, and the adapter that made them.
 
-A folder holds, for each name, ``<name>.json`` and the images that it lists:
+A folder contains, for each name, ``<name>.json`` and the images that it lists:
 ``<name>.<framebuffer>.png`` for integers, ``.exr`` for half and float, and
-``<name>.<framebuffer>.2.png`` and so on for further references that are as valid as the first.
+``<name>.<framebuffer>.2.png`` and so on for further, equally valid references.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from vkbloom.io.images import Picture
 
 __all__ = ["NAME", "Origin", "Reference", "ReferenceFolder", "cpu_vendor"]
 
-#: What names of references and framebuffers may be: nothing that a file system treats specially.
+#: Allowed names of references and framebuffers: safe as file names on every system.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]{0,99}")
 _FRAMEBUFFER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}")
 _FILE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]*")
 _FORMAT: Final = 1
 
-# Extension and OpenImageIO's name of the numbers by the array's dtype.
+# Extension, and OpenImageIO's name of the number type, by the array's dtype.
 _FILES: Final[Mapping[str, tuple[str, str]]] = {
     "uint8": (".png", "uint8"),
     "uint16": (".png", "uint16"),
@@ -41,16 +41,16 @@ _FILES: Final[Mapping[str, tuple[str, str]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Origin:
-    """Where images came from.
+    """The adapter, machine and version that made images.
 
     Parameters
     ----------
     adapter, driver : str or None
-        None where nobody said.
+        None if they are not known.
     cpu_vendor : str
-        Of the machine; software renderers round differently by it.
+        Vendor of the machine's CPU; software renderers round differently by vendor.
     version : str
-        Of vkbloom.
+        Version of vkbloom.
     """
 
     adapter: str | None
@@ -60,24 +60,24 @@ class Origin:
 
     @property
     def summary(self) -> str:
-        """All of it on one line."""
+        """All fields but the version on one line."""
         made_by = [text for text in (self.adapter, self.driver) if text]
         return ", ".join([*(made_by or ["an unnamed adapter"]), self.cpu_vendor])
 
     @property
     def machine(self) -> tuple[str | None, str | None, str]:
-        """What makes two of the same kind: all but the version."""
+        """The fields that identify a machine: all but the version."""
         return self.adapter, self.driver, self.cpu_vendor
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reference:
-    """Images that are right, and where they came from.
+    """Reference images, and their origin.
 
     Parameters
     ----------
     images : mapping of str to ndarray
-        By framebuffer, in the order that the data flows.
+        Images by framebuffer, in the order of the data flow.
     origin : Origin
     """
 
@@ -91,7 +91,7 @@ class ReferenceFolder:
     Parameters
     ----------
     path : Path
-        It need not be there before something is written.
+        It is created when the first reference is written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -116,9 +116,9 @@ class ReferenceFolder:
         Raises
         ------
         OSError
-            A file is missing or cannot be read; it names the file.
+            A file is missing or cannot be read; the error names it.
         ValueError
-            A file is damaged, or does not hold what the list says; it names the file.
+            A file is damaged, or differs from its entry in the list; the error names it.
         """
         return [
             Reference(
@@ -143,15 +143,15 @@ class ReferenceFolder:
             (H, W) or (H, W, C) of up to 4 channels, uint8, uint16, float16 or float32.
         origin : Origin
         add : bool
-            Beside those that are there, in place of the one of the same machine. Else in place of
-            all.
+            Whether to keep the existing references, except the one of the same machine. False:
+            replace all.
 
         Raises
         ------
         ValueError
-            A name cannot be that of a file, or an image cannot be kept without loss.
+            A name is not allowed, or an image cannot be stored without loss.
         OSError
-            A file cannot be written; it names the file.
+            A file cannot be written; the error names it.
         """
         check_name(name)
         for framebuffer, image in images.items():
@@ -243,18 +243,18 @@ class ReferenceFolder:
         }
         written = self._image(entry, self.file(name))
         if not np.array_equal(written, image, equal_nan=image.dtype.kind == "f"):
-            raise OSError(f"{file}: does not hold what was written")
+            raise OSError(f"{file}: reading it back gives other values than were written")
         return entry
 
     def _write_list(self, name: str, references: Sequence[Mapping[str, Any]]) -> None:
         text = json.dumps({"format": _FORMAT, "references": references}, indent=2)
-        safe_writing.write_whole(self.file(name), f"{text}\n".encode())
+        safe_writing.write_file(self.file(name), f"{text}\n".encode())
 
 
 def check_name(name: str) -> None:
-    """Raise ValueError where a reference cannot have that name."""
+    """Raise TypeError or ValueError unless a reference can have the name."""
     if not isinstance(name, str):
-        raise TypeError(f"name: a str is needed, not {name!r}")
+        raise TypeError(f"name: {name!r} is not a str")
     if not NAME.fullmatch(name):
         raise ValueError(
             f"name: {name!r} cannot name a reference; up to 100 letters, digits and _+,=.- are "
@@ -263,13 +263,12 @@ def check_name(name: str) -> None:
 
 
 def cpu_vendor() -> str:
-    """Name the maker of this machine's processor as it names itself.
+    """Return the vendor of this machine's CPU, as the CPU reports it.
 
     Returns
     -------
     str
-        "GenuineIntel", "AuthenticAMD" and the like, else what Python knows of the processor, else
-        its architecture.
+        "GenuineIntel", "AuthenticAMD" and so on; or `platform.processor`, or the architecture.
     """
     try:
         information = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
@@ -289,7 +288,7 @@ def _check_image(framebuffer: str, image: NDArray[Any]) -> None:
         )
     if image.dtype.name not in _FILES:
         raise ValueError(
-            f"{framebuffer}: {image.dtype} cannot be kept without loss; {', '.join(_FILES)} can"
+            f"{framebuffer}: {image.dtype} cannot be stored without loss; use {', '.join(_FILES)}"
         )
     if image.ndim not in (2, 3) or image.size == 0 or _with_channels(image.shape)[2] > 4:
         raise ValueError(

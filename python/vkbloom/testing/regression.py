@@ -1,4 +1,4 @@
-"""The fixture `frame_regression`: framebuffers held against references that were looked at."""
+"""The fixture `frame_regression`: compares framebuffers with approved references."""
 
 from __future__ import annotations
 
@@ -25,25 +25,39 @@ __all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
 
 
 class FrameDifferenceWarning(UserWarning):
-    """An image passed, but differs by more than ``warn``."""
+    """An image passed, but differs by more than ``warn``.
+
+    See Also
+    --------
+    Tolerances : Has the limit `warn`.
+
+    Examples
+    --------
+    Make such a warning an error of the test:
+
+    >>> import warnings
+    >>> from vkbloom import testing
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", testing.FrameDifferenceWarning)
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """What the command line asked for.
+    """The options of the command line.
 
     Parameters
     ----------
     update : bool
-        Write the references of checks that fail, in place of those that are there.
+        Whether to replace the references of failed checks.
     add : bool
-        Write them beside those that are there.
+        Whether to write further references for failed checks, and keep the existing ones.
     allow_missing : bool
-        Let a check pass that has no reference.
+        Whether a check without a reference passes.
     expect_adapter : str or None
-        A part of the name or of the driver of the adapter that frames must come from.
+        A part of the name or driver of the adapter that frames must come from.
     parts : Path or None
-        Folder for what the report shows of failed checks; None: no report.
+        Folder for the report's pictures of failed checks; None: no report.
     """
 
     update: bool = False
@@ -55,7 +69,7 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What a test gave to a check."""
+    """The arguments of a check."""
 
     name: str
     images: Mapping[str, NDArray[Any]]
@@ -64,19 +78,33 @@ class _Given:
 
 
 class FrameRegression:
-    """Compares frames with references; what the fixture `frame_regression` gives a test.
+    """Compares frames with references; the type of the fixture `frame_regression`.
 
     Parameters
     ----------
     folder : Path
-        Of the references of the test's module.
+        Folder of the references of the test's module.
     test : str
         The test's id, for messages.
     name : str
-        Of the reference where a check gives none.
+        Default name of the reference.
     mode : Mode
     records : list of dict
-        Where each check leaves what it found.
+        Each check appends its result.
+
+    See Also
+    --------
+    pytest_vkbloom.frame_regression : The fixture that gives it.
+    Tolerances : The limits of a comparison.
+
+    Examples
+    --------
+    A test in a module ``test_blur.py``, whose references are made by ``pytest --bloom-update``:
+
+    >>> def test_blur(bloom_renderer, frame_regression):
+    ...     image = np.full((16, 16, 4), 0.5, np.float32)
+    ...     frames = bloom_renderer.apply(image, vkbloom.Pyramid(levels=2))
+    ...     frame_regression.check(frames, atol=1e-3)
     """
 
     def __init__(
@@ -104,37 +132,37 @@ class FrameRegression:
         allow_nan: bool = False,
         info: Mapping[str, str] | None = None,
     ) -> None:
-        """Compare frames with their reference, and fail where they differ.
+        """Compare frames with their reference, and fail if they differ.
 
-        The checks of each framebuffer, in this order: shape and dtype, finiteness, equality (which
-        ends them), tolerances, SSIM, FLIP. All framebuffers are compared, so that the first one in
-        the order that the data flows can be named. Where there are several references, one that
-        fits is enough.
+        Each framebuffer is checked for shape and dtype, finiteness, equality (equal framebuffers
+        pass), tolerances, SSIM and FLIP, in this order. All framebuffers are compared, so that the
+        message can name the first failed one in the order of the data flow. If there are several
+        references, the frames must match one of them.
 
         Parameters
         ----------
         frames : Frames, mapping of str to ndarray, or ndarray
-            What a renderer gave; framebuffers of another one by name, in the order that the data
-            flows; or one image. Arrays of shape (H, W) or (H, W, C) with up to 4 channels, uint8,
+            Frames of vkbloom; framebuffers of another renderer by name, in the order of the data
+            flow; or one image. Arrays of shape (H, W) or (H, W, C) with up to 4 channels, uint8,
             uint16, float16 or float32, top row first.
         name : str, optional
-            Of the reference, within the test's module; by default the test's.
+            Name of the reference within the test's module. Default: the test's name.
         atol, rtol, fail_percent, hard_fail, warn
-            See `vkbloom.testing.Tolerances`; integers count as 0 to 1. A value that differs by
-            more than `warn` and passes is a `FrameDifferenceWarning`.
+            See `vkbloom.testing.Tolerances`; integers are scaled to 0..1. A difference above
+            `warn` that passes issues a `FrameDifferenceWarning`.
         ssim, flip : float, optional
-            Smallest SSIM (scikit-image's) and largest mean FLIP (OpenImageIO's), on top of the
-            tolerances. ``atol=math.inf`` leaves these alone to decide.
+            Smallest SSIM (scikit-image) and largest mean FLIP (OpenImageIO), in addition to the
+            tolerances. With ``atol=math.inf`` only these decide.
         allow_nan : bool, default False
-            Let NaN and infinity pass where the reference has the same.
+            Whether NaN and infinity pass if the reference has the same.
         info : mapping of str to str, optional
-            "adapter" and "driver" that made the images, recorded with a new reference; of `Frames`
+            "adapter" and "driver" that made the images, stored with a new reference. `Frames` have
             their own.
 
         Raises
         ------
         AssertionError
-            The frames differ, or there is no reference; says what, where, and how to go on.
+            The frames differ, or there is no reference; the message says where and what to do.
         TypeError, ValueError
             An argument is wrong, or a reference's file is damaged.
         OSError
@@ -180,14 +208,14 @@ class FrameRegression:
         warn: float | None = None,
         allow_nan: bool = False,
     ) -> None:
-        """Compare frames with others that the test has made, and report as `check` does.
+        """Compare frames with others of the same test, and report as `check` does.
 
         Parameters
         ----------
         actual, expected : Frames, mapping of str to ndarray, or ndarray
-            As for `check`; `expected` stands in for the reference, of which there are no files.
+            As for `check`; `expected` replaces the reference files.
         name : str, optional
-            For messages and the report.
+            Name in messages and the report.
         atol, rtol, fail_percent, hard_fail, ssim, flip, warn, allow_nan
             As for `check`.
 
@@ -222,7 +250,9 @@ class FrameRegression:
             check_name(name)
             return name
         if self._has_used_name:
-            raise ValueError("name: a second check in one test needs a name of its own")
+            raise ValueError(
+                "name: the test already has a check without a name; give this one a name"
+            )
         self._has_used_name = True
         return self._name
 
@@ -232,7 +262,7 @@ class FrameRegression:
             return
         if wanted.lower() not in f"{origin.adapter} {origin.driver or ''}".lower():
             raise ValueError(
-                f"--bloom-expect-adapter={wanted}: these frames come from {origin.summary}"
+                f"--bloom-expect-adapter={wanted}: the frames come from {origin.summary}"
             )
 
     def _without_reference(self, given: _Given) -> None:
@@ -243,8 +273,8 @@ class FrameRegression:
         record = self._record(given, "missing", None)
         if not self._mode.allow_missing:
             record["message"] = message = (
-                f"{given.name}: there is no reference {self._folder.file(given.name)}. Make it "
-                "with --bloom-update, look at it, and keep it with the tests"
+                f"{given.name}: there is no reference {self._folder.file(given.name)}. Create it "
+                "with --bloom-update, look at it, and commit it with the tests"
             )
             raise AssertionError(message)
 
@@ -252,8 +282,8 @@ class FrameRegression:
         for framebuffer, image in given.images.items():
             if not given.tolerances.allow_nan and not np.isfinite(image).all():
                 raise ValueError(
-                    f"{given.name}: {framebuffer} has NaN or infinity; allow_nan=True lets that be "
-                    "a reference"
+                    f"{given.name}: {framebuffer} has NaN or infinity; set allow_nan=True to store "
+                    "it as a reference"
                 )
         self._folder.write(given.name, given.images, given.origin, add=self._mode.add)
         self._record(given, "written", None)
@@ -265,9 +295,9 @@ class FrameRegression:
         verdicts: tuple[Verdict, ...],
         count: int | None,
     ) -> None:
-        """Record what was found; raise AssertionError if something failed.
+        """Record the result; raise AssertionError if a framebuffer failed.
 
-        `count` references were tried; None: the test gave what it expects.
+        `count` is the number of references; None if the test gave the expected frames.
         """
         __tracebackhide__ = True
         failure = first_failure(verdicts)
@@ -309,18 +339,18 @@ class FrameRegression:
 
 
 def name_of_test(test: str) -> str:
-    """Make the name of a reference out of a test's.
+    """Make the name of a reference from a test's name.
 
     Parameters
     ----------
     test : str
-        Within its module, such as "TestBlur::test_saucer[tutorial]".
+        Name of the test within its module, such as "TestBlur::test_saucer[tutorial]".
 
     Returns
     -------
     str
-        Such as "TestBlur.test_saucer-tutorial". A checksum follows where something had to be
-        replaced, so that two tests do not share a name.
+        A name such as "TestBlur.test_saucer-tutorial". If characters had to be replaced, a
+        checksum is appended, so that names stay unique.
     """
     plain = test.replace("::", ".")
     if plain.endswith("]") and "[" in plain:
@@ -333,17 +363,17 @@ def name_of_test(test: str) -> str:
 
 
 def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
-    """Return framebuffers by name, in this machine's byte order."""
+    """Return framebuffers by name, in native byte order."""
     if isinstance(frames, np.ndarray):
         frames = {"image": frames}
     if not isinstance(frames, Mapping) or not frames:
         raise TypeError(
-            f"{field}: Frames, a mapping of names to arrays or an array is needed, not {frames!r}"
+            f"{field}: {frames!r} is not Frames, a mapping of names to arrays, or an array"
         )
     images = {}
     for name, image in frames.items():
         if not isinstance(image, np.ndarray):
-            raise TypeError(f"{field}: {name} must be an array, not {type(image).__name__}")
+            raise TypeError(f"{field}: {name}: {type(image).__name__} is not a NumPy array")
         images[name] = image.astype(image.dtype.newbyteorder("="), copy=False)
     return images
 
@@ -361,7 +391,7 @@ def _origin(frames: object, info: Mapping[str, str] | None) -> Origin:
 def _closest(
     references: Sequence[Reference], given: _Given
 ) -> tuple[Reference, tuple[Verdict, ...]]:
-    """Return a reference that fits, else the one whose first failure is the furthest down."""
+    """Return a reference that matches, or else the one that fails latest in the data flow."""
     judged = [(each, judge(each.images, given.images, given.tolerances)) for each in references]
 
     def depth(pair: tuple[Reference, tuple[Verdict, ...]]) -> float:

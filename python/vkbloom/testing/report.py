@@ -1,4 +1,4 @@
-"""The report of a run: one page that needs nothing beside it, and the same figures as JSON."""
+"""The report of a test run: one self-contained HTML page, and the same figures as JSON."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _OUTCOMES: Final = {
     "equal": "✓ equal",
     "within": "✓ within the tolerances",
 }
-# Nothing is loaded from anywhere, whatever a name or a message may hold.
+# The page loads no resources, even if a name or message contains markup.
 _POLICY: Final = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 )
@@ -38,21 +38,21 @@ def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
     Parameters
     ----------
     folder : Path
-        Made if it is not there; what is there of these two is replaced.
+        Created if it does not exist; existing files of these names are replaced.
     parts : Path
-        Folder of what `vkbloom.testing.report_parts.write` wrote; removed in the end.
+        Folder of the files of `vkbloom.testing.report_parts.write`; removed at the end.
     records : sequence of Record
-        Of all checks, of all processes.
+        Records of all checks of all processes.
 
     Returns
     -------
     Path
-        Of the page.
+        Path of the page.
 
     Raises
     ------
     OSError
-        A file cannot be written; it names the file.
+        A file cannot be written; the error names it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     ordered = sorted(records, key=lambda record: (record["test"], record["name"]))
@@ -60,7 +60,7 @@ def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
         json.dumps(_plain(ordered), indent=2, allow_nan=False) + "\n", encoding="utf-8"
     )
     page = folder / "index.html"
-    # Piece by piece: the pictures of a bad run need not be in memory at once.
+    # Written piece by piece, so that not all pictures are in memory at once.
     with page.open("w", encoding="utf-8") as stream:
         for piece in _page(ordered, parts):
             stream.write(piece)
@@ -69,7 +69,7 @@ def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
 
 
 def _plain(records: Iterable[Record]) -> dict[str, Any]:
-    """Return the figures as JSON has them, which knows neither NaN nor infinity."""
+    """Return the figures for JSON, which has neither NaN nor infinity."""
 
     def finite(value: Any) -> Any:
         if isinstance(value, float) and not math.isfinite(value):

@@ -1,6 +1,6 @@
-"""What the report shows of one check: figures of every framebuffer, pictures of those that differ.
+"""The report's part of one check: figures of all framebuffers, pictures of those that differ.
 
-Made in the process that ran the test, as only that one has the images.
+Written in the process that ran the test, because only that one has the images.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ __all__ = ["Histogram", "Part", "Shown", "figures", "write"]
 _LARGEST_SIDE: Final = 960  # pixels of a picture in the report
 _BINS: Final = 41  # of a histogram; odd, so that one of them is around 0
 _AROUND: Final = 8  # pixels to each side of the worst one
-# OpenImageIO takes about 2 microseconds for a pixel of floats; a larger map would hold up a run.
+# OpenImageIO's FLIP takes about 2 microseconds per float pixel; larger maps would delay a run.
 _LARGEST_FLIP: Final = 1 << 22
 
-# Five colours of matplotlib's magma, which FLIP's own tool uses, from 0 to 1.
+# Five colours of matplotlib's magma from 0 to 1; FLIP's own tool uses this colour map.
 _MAGMA: Final = np.array(
     [(0, 0, 4), (81, 18, 124), (183, 55, 121), (252, 137, 97), (252, 253, 191)], np.float32
 )
 
 
 class Histogram(TypedDict):
-    """How often which difference, actual less expected, occurs."""
+    """Counts of differences, actual minus expected."""
 
     low: float
     high: float
@@ -44,7 +44,7 @@ class Histogram(TypedDict):
 
 
 class Shown(TypedDict):
-    """One framebuffer; pictures are base64 of PNG files, None where there is none."""
+    """One framebuffer; pictures are PNG files in base64, or None."""
 
     name: str
     expected: str | None
@@ -72,7 +72,7 @@ def figures(verdict: Verdict, images: Mapping[str, NDArray[Any]]) -> Figures:
     ----------
     verdict : Verdict
     images : mapping of str to ndarray
-        Those that were judged.
+        The actual images of the comparison.
     """
     image = images.get(verdict.name)
     found = verdict.comparison
@@ -104,15 +104,15 @@ def write(
     expected: Mapping[str, NDArray[Any]],
     actual: Mapping[str, NDArray[Any]],
 ) -> str:
-    """Write the pictures of a check to a file of its own.
+    """Write the pictures of a check to a new file.
 
     Parameters
     ----------
     folder : Path
-        Made if it is not there.
+        Created if it does not exist.
     verdicts : tuple of Verdict
     expected, actual : mapping of str to ndarray
-        What was judged.
+        The images of the comparison.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def _shown(verdict: Verdict, expected: NDArray[Any] | None, actual: NDArray[Any]
 
 def _add_flip(shown: Shown, expected: NDArray[Any], actual: NDArray[Any]) -> None:
     if expected.shape[0] * expected.shape[1] > _LARGEST_FLIP:
-        shown["flip_note"] = f"not computed of more than {_LARGEST_FLIP} pixels"
+        shown["flip_note"] = f"not computed for more than {_LARGEST_FLIP} pixels"
         return
     try:
         found = flip_map(expected, actual)
@@ -200,7 +200,7 @@ def _add_worst(
     expected, actual, differences = images
     left, top = max(x - _AROUND, 0), max(y - _AROUND, 0)
     window = (slice(top, y + _AROUND + 1), slice(left, x + _AROUND + 1))
-    # Stretched as the whole picture is, so that it is the same colours that are seen again.
+    # Stretched by the range of the complete picture, so that the colours are the same.
     shown["worst"] = {
         "expected": _encoded(_colours(pictures.picture(expected, shown["name"]))[window]),
         "actual": _encoded(
@@ -230,12 +230,12 @@ def _picture(name: str, image: NDArray[Any] | None, range_of: NDArray[Any] | Non
 
 
 def _colours(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Leave out what is not colour, so that alpha hides nothing."""
+    """Remove alpha, so that it hides nothing."""
     return pixels[:, :, : 3 if pixels.shape[2] >= 3 else 1]
 
 
 def _peaks(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Shrink a picture to the report's size and keep the largest value of each group of pixels."""
+    """Reduce a picture to the report's size, keeping the largest value of each group of pixels."""
     shrink = max(1.0, max(values.shape[:2]) / _LARGEST_SIDE)
     for axis in (0, 1):
         count = values.shape[axis]

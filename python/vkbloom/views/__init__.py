@@ -1,1 +1,1 @@
-"""What a person looks at: pictures and tables of framebuffers, contact sheets, comparisons."""
+"""Views of results: pictures and tables of framebuffers, contact sheets, comparisons."""

@@ -1,4 +1,4 @@
-"""Two images compared: how much they differ, where, and what makes them incomparable."""
+"""Compare two images: how much they differ, where, and why they may not be comparable."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ __all__ = ["Comparison", "Metric", "compare", "difference", "flip_map"]
 Metric = Literal["ssim", "psnr", "flip"]
 
 _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
-# Taps to a side of scikit-image's default window.
+# Side of scikit-image's default window in pixels.
 _SSIM_WINDOW: Final = 7
 _METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """What comparing two images found out.
+    """The result of comparing two images.
 
     Parameters
     ----------
     mismatches : tuple of str
-        Reasons for which the images are no match, whatever the limits: another shape, integers
-        against floats, NaN or infinity. Where shape or kind differ, the figures are None.
+        Reasons why the images do not match at any limits: another shape, integers against floats,
+        NaN or infinity. If shape or kind differ, the figures are None.
     max_error : float or None
-        Largest absolute difference of two finite values, integers counting as 0 to 1.
+        Largest absolute difference of two finite values; integers are scaled to 0..1.
     max_error_at : (int, int, int) or None
-        Where: x, y and channel. None where there is no error.
+        Its x, y and channel. None if there is no error.
     max_error_values : (float, float) or None
-        The two values there.
+        The two values at that position.
     mean_error : float or None
         Mean absolute difference of all finite values.
     percent_over : float or None
-        Percentage of pixels of which a channel differs by more than `threshold` and `relative`
-        allow, or is not finite in one image only.
+        Percentage of pixels that have a channel which differs by more than `threshold` and
+        `relative` allow, or which is not finite in only one image.
     threshold, relative : float
-        As given to `compare`.
+        The arguments of `compare`.
     data_range : float or None
-        Of SSIM and PSNR.
+        The data range for SSIM and PSNR.
     ssim, psnr, flip : float or None
-        Structural similarity, peak signal-to-noise ratio in dB (inf where nothing differs) and
-        mean FLIP.
+        Structural similarity, peak signal-to-noise ratio in dB (inf if nothing differs) and mean
+        FLIP.
     not_computed : mapping of str to str
-        Why one of these three is None, by its name; "not asked for" too.
+        Why one of these three is None, by its name; also "not asked for".
     """
 
     mismatches: tuple[str, ...]
@@ -104,20 +104,19 @@ def compare(
     Parameters
     ----------
     a, b : ndarray, shape (H, W) or (H, W, C)
-        uint8, uint16 (both compared as 0 to 1), float16, float32 or float64. `a` is the
-        reference. All channels count, alpha as any other, but for FLIP, which takes the first
-        three, or the first alone as grey.
+        uint8, uint16 (both scaled to 0..1), float16, float32 or float64. `a` is the reference. All
+        channels are compared, including alpha; FLIP uses the first three, or the first as grey.
     threshold : float, default 0
-        Difference from which on, exclusively, a pixel counts in `percent_over`.
+        A pixel counts in `percent_over` if it differs by more than this.
     relative : float, default 0
-        Added to `threshold`, times the absolute value that `a` has.
+        Added to `threshold` after multiplying with the absolute value in `a`.
     allow_nan : bool, default False
-        Take NaN, and infinity of one sign, as equal where both images have it.
+        Whether NaN, and infinity of the same sign, are equal if both images have it.
     data_range : float, optional
-        Of SSIM and PSNR. By default 1 for integers, and for floats what their values span
-        together with 0 and 1, so that images within 0..1 have 1.
+        Data range for SSIM and PSNR. Default: 1 for integers; for floats the range of the values,
+        0 and 1, which is 1 for images within 0..1.
     metrics : collection of {"ssim", "psnr", "flip"}
-        Which of the three to compute; the others are None. They cost far more than the rest.
+        The metrics to compute; the others are None. They are far slower than the other figures.
 
     Returns
     -------
@@ -130,9 +129,9 @@ def compare(
     Raises
     ------
     TypeError
-        An image is no array of one of these types.
+        An image is not an array of one of these types.
     ValueError
-        An image has another number of dimensions or no pixel; `threshold`, `relative` or
+        An image has another number of dimensions or no pixels; `threshold`, `relative` or
         `data_range` is out of range, or a metric is unknown.
     ModuleNotFoundError
         scikit-image (for SSIM and PSNR) or OpenImageIO (for FLIP) is missing.
@@ -182,36 +181,35 @@ def compare(
 def difference(
     a: NDArray[Any], b: NDArray[Any], scale: float | None = None
 ) -> tuple[NDArray[np.float32], float]:
-    """Make a picture of where two images differ.
+    """Make a picture of the differences of two images.
 
     Parameters
     ----------
     a, b : ndarray
         As for `compare`, of one shape, both integers or both floats.
     scale : float, optional
-        What the differences are multiplied with, above 0. By default so that the largest
-        becomes 1.
+        Factor of the differences, above 0. Default: makes the largest 1.
 
     Returns
     -------
     picture : ndarray, shape (H, W, 3)
-        Absolute differences of red, green and blue in 0..1, or those of one channel in grey;
-        those of further channels, such as alpha, brighten all three. Magenta where one image
-        only is not finite.
+        Absolute differences of red, green and blue in 0..1, or of one channel in grey; differences
+        of further channels, such as alpha, brighten all three. Pixels that are not finite in only
+        one image are magenta.
     scale : float
-        As given, or as found; 1 where nothing differs.
+        The factor that was used; 1 if nothing differs.
 
     Raises
     ------
     TypeError, ValueError
-        As for `compare`; also for images that it calls no match.
+        As for `compare`; also if the images do not match.
     """
     if scale is not None and not 0 < scale < math.inf:
         raise ValueError(f"scale: {scale!r} is out of range, finite and above 0")
     a, b = _checked("a", a), _checked("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
-        raise ValueError(f"there is no difference picture: {'; '.join(mismatches)}")
+        raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
     pair = _pair(a, b)
     largest = min(float(pair.error.max()), float(np.finfo(np.float64).max))
     if scale is None:
@@ -241,7 +239,7 @@ def _checked(name: str, image: NDArray[Any]) -> NDArray[Any]:
 
 
 def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
-    """Tell what keeps two images from being compared value by value."""
+    """List the reasons why two images cannot be compared value by value."""
     found: list[str] = []
     if a.shape[:2] != b.shape[:2]:
         sizes = (f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))
@@ -256,7 +254,7 @@ def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
 def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
     if a.dtype.kind == "u":
         scale = max(np.iinfo(a.dtype).max, np.iinfo(b.dtype).max)
-        # 65535 is 257 times 255, so 8-bit values keep their places among those of 16 bits.
+        # 65535 = 257 * 255, so that 8-bit values convert to 16 bits exactly.
         whole_a, whole_b = (
             image.astype(np.int32) * (scale // np.iinfo(image.dtype).max) for image in (a, b)
         )
@@ -268,7 +266,7 @@ def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
     same = (a == b) | (np.isnan(a) & np.isnan(b))
     plain_a = np.where(valid, a, 0).astype(np.float64)
     plain_b = np.where(valid, b, 0).astype(np.float64)
-    # Doubles of both signs may be further apart than the largest of them.
+    # The difference of two doubles of opposite signs may overflow.
     with np.errstate(over="ignore"):
         error = np.abs(plain_a - plain_b)
     return _Pair(plain_a, plain_b, error, valid, ~valid & ~same, False)
@@ -283,7 +281,7 @@ def _over(pair: _Pair, threshold: float, relative: float) -> NDArray[np.bool_]:
 
 
 def _places(where: NDArray[np.bool_]) -> str:
-    """Describe how many values of an (H, W, C) image are meant, and which is the first."""
+    """Describe the number of marked values of an (H, W, C) image, and the position of the first."""
     y, x, channel = (int(index[0]) for index in np.nonzero(where))
     return f"{int(where.sum())} values, the first at x {x}, y {y}, channel {channel}"
 
@@ -295,7 +293,7 @@ def _span(pair: _Pair) -> float:
 
 
 def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, float] | None]:
-    """Return place (x, y, channel) and values of the largest error, None without any."""
+    """Return position (x, y, channel) and values of the largest error; None if there is none."""
     index = np.unravel_index(int(pair.error.argmax()), pair.error.shape)
     if not pair.error[index]:
         return None, None
@@ -306,10 +304,10 @@ def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, flo
 def _metrics(
     pair: _Pair, data_range: float, wanted: Collection[Metric]
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Return the metrics that can be computed, and why the others are not, by their names."""
+    """Return the computed metrics, and the reasons for the others, by name."""
     computed: dict[str, float] = {}
     reasons: dict[str, str] = {name: "not asked for" for name in _METRICS if name not in wanted}
-    # Extreme floats end in a figure that is not finite, which is looked at below.
+    # Extreme floats give figures that are not finite, which are checked below.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if "ssim" in wanted:
             _add_ssim(pair, data_range, computed, reasons)
@@ -358,7 +356,7 @@ def _add_psnr(
 
 
 def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
-    """Return FLIP of every pixel, whose mean is the figure of `compare`.
+    """Return FLIP of every pixel; its mean is the figure of `compare`.
 
     Parameters
     ----------
@@ -368,19 +366,19 @@ def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
     Returns
     -------
     ndarray, shape (H, W)
-        0 (no difference that is seen) to 1.
+        0 (no visible difference) to 1.
 
     Raises
     ------
     TypeError, ValueError
-        As for `compare`; also for images that it calls no match.
+        As for `compare`; also if the images do not match.
     ModuleNotFoundError
         OpenImageIO 3.2 or later is missing.
     """
     a, b = _checked("a", a), _checked("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
-        raise ValueError(f"there is no FLIP: {'; '.join(mismatches)}")
+        raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
     if not hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
         raise ModuleNotFoundError("FLIP needs OpenImageIO 3.2: pip install vkbloom[images]")
     return _flip(_pair(a, b))

@@ -1,4 +1,4 @@
-"""What the parameters of a class mean, in words: the first sentences of its docstring."""
+"""Descriptions of a class's parameters: the first sentences in its docstring."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["described_parameters"]
 
 
 def described_parameters(kind: type) -> dict[str, str]:
-    """Return the first sentence on each parameter from a class's numpydoc docstring.
+    """Return the first sentence about each parameter from a class's numpydoc docstring.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ def described_parameters(kind: type) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Empty where there is no docstring, as where Python runs with -OO.
+        Empty if there is no docstring, as with ``python -OO``.
     """
     lines = inspect.cleandoc(kind.__doc__ or "").splitlines()
     texts: dict[str, list[str]] = {}

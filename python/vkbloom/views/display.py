@@ -1,8 +1,8 @@
-"""Settings, scenes and renderers as notebooks show them: HTML without script.
+"""HTML of settings, scenes and renderers for notebooks, without scripts.
 
-Colours are those of the page around: text is inherited, lines and grounds are a translucent grey,
-so that light and dark themes serve alike. All texts are escaped, and styles stand in the elements
-themselves, because notebooks that are not trusted lose style sheets.
+Text inherits the page's colour, and lines and backgrounds are a translucent grey, so that they
+suit light and dark themes. All texts are escaped. Styles are attributes of the elements, because
+notebooks that are not trusted remove style sheets.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ __all__ = ["fields_html", "renderer_html", "scene_html"]
 
 _CELL: Final = "padding:1px 12px 1px 0;text-align:left;vertical-align:top"
 _FACE_SIDE: Final = 72  # pixels
-# Places of the faces +x, -x, +y, -y, +z, -z in a cross of four columns: "row / column". -y is the
-# one above, see `vkbloom.scene.skybox`.
+# Grid positions ("row / column") of the faces +x, -x, +y, -y, +z, -z in a cross of four columns.
+# -y is up; see `vkbloom.scene.skybox`.
 _CROSS: Final = ("2 / 3", "2 / 1", "3 / 2", "1 / 2", "2 / 2", "2 / 4")
 
 
 def fields_html(settings: DataclassInstance) -> str:
-    """Return settings as a table: the fields that are not the default, then, folded, all others.
+    """Return settings as a table: changed fields, then the others in a collapsed section.
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ def scene_html(rows: Iterable[tuple[str, str]], faces: NDArray[Any] | None) -> s
     Parameters
     ----------
     rows : iterable of (str, str)
-        What the scene has, by name.
+        Names and descriptions of the scene's parts.
     faces : ndarray, shape (6, N, N, C), or None
-        Of the sky: +x, -x, +y, -y, +z, -z.
+        Faces of the sky: +x, -x, +y, -y, +z, -z.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def renderer_html(info: AdapterInfo, *, closed: bool) -> str:
     Parameters
     ----------
     info : AdapterInfo
-        Of the renderer.
+        The renderer's adapter.
     closed : bool
         Whether the renderer is closed.
 

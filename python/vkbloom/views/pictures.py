@@ -1,4 +1,4 @@
-"""Pictures of framebuffers to look at: PNG, and contact sheets as HTML and as PNG."""
+"""Viewable pictures of framebuffers: PNG, and contact sheets as HTML and PNG."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def leading_png(frames: Framebuffers) -> bytes:
     Parameters
     ----------
     frames : Framebuffers
-        One framebuffer at least.
+        At least one framebuffer.
 
     Returns
     -------
@@ -56,10 +56,10 @@ def leading_png(frames: Framebuffers) -> bytes:
 def contact_sheet_html(frames: Framebuffers) -> str:
     """Return a contact sheet of all framebuffers, with the pass times, as HTML.
 
-    Pictures are as in `leading_png`, without alpha, so that nothing is hidden, and
-    averaged down to 320 pixels at most. Linear floats of which more than one pixel in a
-    hundred is brighter than 1 are shown with less exposure; the caption says how much, and
-    gives the range of all floats. Colours are those of the page.
+    Pictures are made as in `leading_png`, without alpha, and reduced to at most 320 pixels by
+    averaging. Linear floats with more than one pixel in a hundred above 1 are shown with less
+    exposure; the caption gives the exposure, and the range of all floats. Text inherits the
+    page's colours.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def contact_sheet_html(frames: Framebuffers) -> str:
         stops = _viewing_stops(frames, name)
         picture = _picture(frames, name, scaled(width, height, shrink), stops)[:, :, :3]
         data = base64.b64encode(png(picture)).decode("ascii")
-        # An enlarged level of a pyramid shall show its pixels.
+        # Show the pixels of an enlarged pyramid level without smoothing.
         rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
         label, size = html.escape(name), html.escape(_described(array) + _ranged(array))
         if stops != 0:
@@ -131,14 +131,14 @@ def _timings_html(frames: Framebuffers) -> str:
 def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) -> bytes:
     """Return a labelled contact sheet of all framebuffers as PNG.
 
-    Pictures are shown as in a notebook, without alpha, fitted into cells that have the
-    shape of `final`; small ones are enlarged with hard pixels. The labels are drawn by
-    OpenImageIO; where that or its fonts are missing, they are left out with a warning.
+    Pictures are shown as in a notebook, without alpha, fitted into cells with the aspect of
+    `final`; small ones are enlarged by repeating pixels. OpenImageIO draws the labels; if it or
+    its fonts are missing, they are left out with a warning.
 
     Parameters
     ----------
     frames : Framebuffers
-        One framebuffer at least.
+        At least one framebuffer.
     columns : int, default 3
         Pictures in a row, 1 to 32.
     width : int, default 320
@@ -159,7 +159,7 @@ def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) 
     columns = check_index("columns", columns, 1, 32)
     width = check_index("width", width, 128, 4096)
     if not frames:
-        raise ValueError("frames: a contact sheet needs one framebuffer at least")
+        raise ValueError("frames: a contact sheet needs at least one framebuffer")
     columns = min(columns, len(frames))
     height = round(width / _aspect(frames))
     text = max(11, width // 20)
@@ -194,14 +194,14 @@ def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) 
 def labelled(
     sheet: NDArray[np.uint8], labels: Iterable[tuple[int, int, str]], size: int
 ) -> NDArray[np.uint8]:
-    """Draw texts at (x, baseline y), in light grey; without a font, leave them out.
+    """Draw light grey texts at (x, baseline y); leave them out if there is no font.
 
     Parameters
     ----------
     sheet : ndarray, shape (H, W, 3)
     labels : iterable of (int, int, str)
     size : int
-        Of the letters, in pixels.
+        Font size in pixels.
     """
     try:
         oiio = import_extra("OpenImageIO", "images", "A labelled contact sheet")
@@ -234,22 +234,22 @@ def picture(
     range_of: NDArray[Any] | None = None,
     stops: float = 0.0,
 ) -> NDArray[np.uint8]:
-    """Return an image as 8 bits to look at, as `leading_png` describes.
+    """Convert an image to a viewable 8-bit picture, as `leading_png` documents.
 
     Parameters
     ----------
     array : ndarray, shape (H, W) or (H, W, C)
     name : str
-        Of the framebuffer; "normal" and "position" are shown in their own ways.
+        Name of the framebuffer; "normal" and "position" have their own mappings.
     encoded : bool, default False
-        Whether floats have passed a transfer curve already.
+        Whether floats are already encoded.
     size : (int, int), optional
         Width and height of the picture: pixels are averaged or repeated.
     range_of : ndarray, optional
-        What is stretched to 0..1, depth and position, is stretched by this array's range, so that
-        two pictures can be compared.
+        Depth and position are stretched by this array's range, so that two pictures can be
+        compared.
     stops : float, default 0
-        Exposure that colours of light in floats are shown with; others are shown as they are.
+        Exposure of float colours in stops; other values do not change.
 
     Returns
     -------
@@ -285,7 +285,7 @@ def _viewing_stops(frames: Framebuffers, name: str) -> float:
     is_light = array.ndim == 3 and array.dtype != np.uint8 and name not in ("normal", "position")
     if not is_light or (name == "final" and frames.settings.encoding != "none"):
         return 0.0
-    # Every so manieth row and column: a percentile of them all would take longer than the picture.
+    # A subset of rows and columns: a percentile of all pixels would take longer than the picture.
     step = max(1, max(array.shape[:2]) // _THUMBNAIL_SIDE)
     brightest = array[::step, ::step, :3].max(axis=2).astype(np.float32)
     brightest = brightest[np.isfinite(brightest)]
@@ -294,7 +294,7 @@ def _viewing_stops(frames: Framebuffers, name: str) -> float:
 
 
 def _ranged(array: NDArray[Any]) -> str:
-    """Return the range of finite floats in words, alpha left out; nothing for other numbers."""
+    """Return the range of finite floats without alpha as text; "" for integers."""
     if array.dtype == np.uint8:
         return ""
     values = np.atleast_3d(array)[:, :, :3]
@@ -307,9 +307,9 @@ def _ranged(array: NDArray[Any]) -> str:
 
 
 def _aspect(arrays: Framebuffers) -> float:
-    """Width by height of the cells of a contact sheet: that of the leading framebuffer.
+    """Return the aspect of a contact sheet's cells, that of the leading framebuffer.
 
-    Bounded, so that a strip of one pixel still leaves room to look at the others.
+    It is bounded, so that a strip of one pixel leaves room for the others.
     """
     height, width = arrays[leading(arrays)].shape[:2]
     return float(min(max(width / height, 0.5), 3.0))
@@ -330,18 +330,18 @@ def _stretched(values: NDArray[np.float32], ranged: NDArray[np.float32]) -> NDAr
     finite = np.isfinite(ranged)
     low: NDArray[np.float32] = ranged.min(axis=(0, 1), where=finite, initial=np.inf)
     high: NDArray[np.float32] = ranged.max(axis=(0, 1), where=finite, initial=-np.inf)
-    # Also positive where no value is finite, and the range therefore inf to -inf.
+    # Stays positive if no value is finite and the range is inf to -inf.
     span = np.maximum(high - low, np.finfo(np.float32).tiny)
     return _clipped((np.clip(values, low, high) - low) / span)
 
 
 def scaled(width: int, height: int, factor: float) -> tuple[int, int]:
-    """Return a size times a factor, of at least one pixel a side."""
+    """Return a size times a factor; each side is at least one pixel."""
     return max(1, round(width * factor)), max(1, round(height * factor))
 
 
 def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
-    """Average groups of pixels where an (H, W, C) image shrinks, repeat them where it grows."""
+    """Resize an (H, W, C) image: average groups of pixels to reduce, repeat pixels to enlarge."""
     for axis, wanted in ((0, height), (1, width)):
         count = image.shape[axis]
         starts = np.arange(wanted) * count // wanted
@@ -357,24 +357,24 @@ def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.f
 def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
     """Encode a picture as PNG (W3C PNG specification).
 
-    Here so that notebooks show pictures with nothing but NumPy installed; files that users
-    save are written by OpenImageIO.
+    It lets notebooks show pictures with only NumPy installed; OpenImageIO writes the files that
+    users save.
 
     Parameters
     ----------
     pixels : ndarray of uint8, shape (H, W, C)
-        Of 1, 3 or 4 channels.
+        1, 3 or 4 channels.
     level : int, default -1
-        Of zlib: 1 (quick) to 9 (small), -1 being its own choice.
+        Compression level of zlib: 1 (fast) to 9 (small); -1 is its default.
 
     Returns
     -------
     bytes
-        A whole file.
+        A complete PNG file.
     """
     height, width, channels = pixels.shape
     rows = pixels.reshape(height, width * channels)
-    # Filter type 2, each row less the one above, compresses soft pictures far better.
+    # Filter type 2, the difference to the row above, compresses smooth pictures far better.
     filtered = np.full((height, 1 + rows.shape[1]), 2, np.uint8)
     filtered[:, 1:] = rows
     filtered[1:, 1:] -= rows[:-1]

@@ -1,4 +1,4 @@
-"""How far an image may be from another, and which of the limits a comparison exceeds."""
+"""Tolerances of image comparisons, and the limits that a comparison exceeds."""
 
 from __future__ import annotations
 
@@ -31,21 +31,20 @@ DEFAULTS: Final[Mapping[str, tuple[float, float]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
-    """How far an image may be from its reference, in the terms of OpenImageIO's `idiff`.
+    """The allowed differences of an image from its reference, named as in OpenImageIO's `idiff`.
 
-    Integers count as 0 to 1 in all of them. Each that is set must hold; images that are equal pass
-    without further ado.
+    Integers are scaled to 0..1. Every limit that is set must hold; equal images always pass.
 
     Parameters
     ----------
     atol, rtol : float or None
-        A pixel fails if a channel of it differs by more than atol + rtol * abs(reference):
-        `idiff`'s ``fail`` and ``failrelative``. None: `DEFAULTS` of the dtype if both are None,
-        else 0.
+        A pixel fails if one of its channels differs by more than atol + rtol * abs(reference):
+        ``fail`` and ``failrelative`` of `idiff`. If both are None, they follow from the dtype;
+        otherwise None is 0.
     fail_percent : float
         Percentage of pixels that may fail, 0 to 100: ``failpercent``.
     hard_fail : float or None
-        Difference that no pixel may exceed, whatever `fail_percent` allows: ``hardfail``.
+        Difference that no pixel may exceed, independent of `fail_percent`: ``hardfail``.
     warn : float or None
         Largest difference that passes without a warning: ``warn``.
     ssim : float or None
@@ -55,14 +54,25 @@ class Tolerances:
     flip : float or None
         Largest mean FLIP, 0 to 1.
     allow_nan : bool
-        Let NaN, and infinity of one sign, pass where both images have it.
+        Whether NaN, and infinity of the same sign, pass if both images have it.
 
     Raises
     ------
     ValueError
-        A number is out of its range; names the field, the value and the range.
+        A number is out of its range; the message names the field, the value and the range.
     TypeError
-        A field is no number.
+        A field is not a number.
+
+    See Also
+    --------
+    FrameRegression.check : Takes the same limits as arguments.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> limits = testing.Tolerances(atol=0.01, fail_percent=0.1, ssim=0.99)
+    >>> limits.metrics
+    ('ssim',)
     """
 
     atol: float | None = None
@@ -98,7 +108,7 @@ class Tolerances:
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
-        """The figures that have a limit, which `compare` has to compute."""
+        """The metrics that have a limit, which `compare` must compute."""
         limits: dict[Metric, float | None] = {
             "ssim": self.ssim,
             "psnr": self.psnr,
@@ -110,7 +120,7 @@ class Tolerances:
 def failures(
     found: Comparison, tolerances: Tolerances, metrics: Collection[Metric]
 ) -> list[tuple[Stage, str]]:
-    """Tell which limits a comparison exceeds.
+    """List the limits that a comparison exceeds.
 
     Parameters
     ----------
@@ -118,12 +128,12 @@ def failures(
         Made with the `atol` and `rtol` of the tolerances as `threshold` and `relative`.
     tolerances : Tolerances
     metrics : collection of {"ssim", "psnr", "flip"}
-        The figures whose limits are held; one that could not be computed fails.
+        The metrics whose limits are checked; a metric that could not be computed fails.
 
     Returns
     -------
     list of (Stage, str)
-        The check and the reason, in the order of the checks; empty where the images pass.
+        The failed checks and reasons, in the order of the checks; empty if the images pass.
     """
     failed: list[tuple[Stage, str]] = [("finiteness", reason) for reason in found.mismatches]
     over = found.percent_over or 0.0
@@ -145,7 +155,7 @@ def failures(
         if metric not in metrics or limit is None:
             continue
         if value is None:
-            # Of images that are no match, that is said already.
+            # For images that do not match, the reason has already been given.
             if not found.mismatches:
                 why = found.not_computed.get(metric, "no values to compare")
                 failed.append((name, f"{name} is not computed: {why}"))

@@ -1,0 +1,73 @@
+"""The examples in docstrings: they run as written, and every public object has one."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pytest_vkbloom
+import vkbloom
+from vkbloom import reductions, reference, testing
+
+# Exceptions are documented in the core.
+WITHOUT_EXAMPLE = {
+    "Error",
+    "AdapterNotFoundError",
+    "DeviceLostError",
+    "OutOfMemoryError",
+    "ShaderError",
+    "ValidationError",
+}
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def modules() -> Iterator[str]:
+    """The modules of the package and its plugin."""
+    yield "vkbloom"
+    for found in pkgutil.walk_packages(vkbloom.__path__, "vkbloom."):
+        if not found.name.endswith(("__main__", "._core")):
+            yield found.name
+    yield "pytest_vkbloom"
+
+
+def examples_in(module: ModuleType) -> list[doctest.DocTest]:
+    """The examples of a module, with the names that they use without importing them."""
+    names = {"np": np, "vkbloom": vkbloom}
+    found = doctest.DocTestFinder(exclude_empty=True).find(module, extraglobs=names)
+    return [test for test in found if test.examples]
+
+
+@pytest.mark.parametrize("name", list(modules()))
+def test_examples_of_a_module(name: str) -> None:
+    module = importlib.import_module(name)
+    report: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=FLAGS, verbose=False)
+    for test in examples_in(module):
+        runner.run(test, out=report.append)
+    assert runner.failures == 0, "".join(report)
+
+
+def public() -> Iterator[Any]:
+    for owner in (vkbloom, testing, reference, reductions):
+        for name in owner.__all__:
+            member = getattr(owner, name)
+            is_documented = inspect.isclass(member) or inspect.isfunction(member)
+            if is_documented and name not in WITHOUT_EXAMPLE:
+                yield pytest.param(member, id=f"{owner.__name__}.{name}")
+    yield pytest.param(pytest_vkbloom.frame_regression, id="frame_regression")
+
+
+@pytest.mark.parametrize("member", list(public()))
+def test_public_objects_have_an_example(member: Any) -> None:
+    """And name what else to look at."""
+    text = inspect.getdoc(member) or ""
+    for section in ("Examples", "See Also"):
+        assert f"{section}\n{'-' * len(section)}" in text, section
