@@ -120,14 +120,14 @@ def adapters() -> tuple[AdapterInfo, ...]:
     >>> any(adapter.type == "cpu" for adapter in vkbloom.adapters())
     True
     """
-    found: list[_core._Adapter] = []
+    found: list[_core.AdapterTuple] = []
     for driver in dict.fromkeys(("", bundled_driver())):
         with contextlib.suppress(_core.AdapterNotFoundError):
             found += _core.adapters(driver)
     return tuple(from_core(adapter) for adapter in found)
 
 
-def from_core(adapter: _core._Adapter) -> AdapterInfo:
+def from_core(adapter: _core.AdapterTuple) -> AdapterInfo:
     """Make what the core tells about an adapter an AdapterInfo."""
     name, kind, driver, driver_info, api_version, _, bundled = adapter
     return AdapterInfo(name, kind, driver, driver_info, api_version, bundled)
