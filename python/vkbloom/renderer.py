@@ -459,7 +459,7 @@ class Renderer:
         if isinstance(source, np.ndarray):
             for name, is_given in (("size", size is not None), ("shading", shading != "forward")):
                 if is_given:
-                    raise ValueError(f"{name}: only scenes have one, an image is given")
+                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
             image = check_image(source)
             kind, dtype = "image", image.dtype
             height, width, channels = image.shape

@@ -150,7 +150,7 @@ class TestStores:
         assert "exposure=0..1" in mended.stderr
         other = run(*words, "--resume", "--intensity", "0.5")
         assert other.exit_code == 1
-        assert "settings.intensity: 1.0 in the store, 0.5 requested" in other.stderr
+        assert "settings.intensity: 0.15 in the store, 0.5 requested" in other.stderr
 
     def test_workers(self, tmp_path: Path, image_file: Path) -> None:
         words = [image_file, "--axis", "exposure=0:1:4"]
@@ -209,7 +209,9 @@ class TestStores:
     )
     def test_wrong_use(self, tmp_path: Path, image_file: Path, words: list[str], told: str) -> None:
         out = tmp_path / "a.zarr"
-        result = run(image_file, "--axis", "blur_scale=1,2", "-o", out, *words)
+        result = run(
+            image_file, "--method", "separable", "--axis", "blur_scale=1,2", "-o", out, *words
+        )
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert told in result.stderr
         assert not out.exists()
@@ -231,7 +233,17 @@ class TestStores:
         (tmp_path / "folder.png").mkdir()
         for name, told in (("no/a.png", "No such file"), ("folder.png", "Is a directory")):
             file = tmp_path / name
-            result = run(image_file, "--axis", "blur_scale=1,2", "-o", out, option, file)
+            result = run(
+                image_file,
+                "--method",
+                "separable",
+                "--axis",
+                "blur_scale=1,2",
+                "-o",
+                out,
+                option,
+                file,
+            )
             assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
             assert result.stderr.startswith(f"vkbloom: {file}: {told}")
             assert not out.exists()
@@ -268,6 +280,8 @@ class TestImageFiles:
                 str(tmp_path / "one.png"),
                 "--exposure",
                 "-1",
+                "--intensity",
+                "1",
             ],
         )
         np.testing.assert_array_equal(
@@ -437,7 +451,7 @@ class TestOptionFiles:
     def test_lists_in_lists(self, tmp_path: Path, image_file: Path) -> None:
         file = tmp_path / "a.toml"
         file.write_text(
-            "[settings]\nlayers = [[1, 1], [2, 0.5]]\n[axes]\nbloom_size = [[4, 4], [8, 8]]\n"
+            '[settings]\nmethod = "separable"\nlayers = [[1, 1], [2, 0.5]]\n[axes]\nbloom_size = [[4, 4], [8, 8]]\n'
             "weights = [[0.5, 0.25], [1.0]]\n"
         )
         done(image_file, "--from", file, "-o", tmp_path / "a.zarr")

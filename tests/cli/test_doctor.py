@@ -589,6 +589,6 @@ def test_no_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_lavapipe_versions(driver_info: str, status: str) -> None:
-    finding = doctor._software([{"type": "cpu", "driver_info": driver_info}])
+    finding = doctor._software([{"type": "cpu", "driver_info": driver_info, "bundled": False}])
     assert finding.status == status
     assert "22.3.6 and 25.0.7" in finding.found

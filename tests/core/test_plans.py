@@ -136,8 +136,8 @@ def test_defaults(renderer: Renderer, scene: Scene, plain: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"size": (16, 9)}, "size: only scenes have one"),
-        ({"shading": "deferred"}, "shading: only scenes have one"),
+        ({"size": (16, 9)}, "size: the source is not a scene"),
+        ({"shading": "deferred"}, "shading: the source is not a scene"),
         ({"attachments": ("glare",)}, "attachments: there is no 'glare'"),
         ({"settings": Separable(bloom_size=(100_000, 1))}, "100000 x 1"),
     ],

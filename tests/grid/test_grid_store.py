@@ -272,7 +272,10 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("changes", "told"),
         [
-            ({"settings": Separable(intensity=0.5)}, r"settings.intensity: 1.0 in .* 0.5 asked"),
+            (
+                {"settings": Separable(intensity=0.5)},
+                r"settings.intensity: 1.0 in .* 0.5 requested",
+            ),
             (
                 {"settings": Pyramid(), "axes": {"exposure": AXES["exposure"]}, "chunks": None},
                 r"settings.method: \"separable\"",
@@ -294,7 +297,7 @@ class TestRefused:
         assert contents(copy) == before
 
     def test_another_version(self, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(vkbloom, "__version__", "9.9")
+        monkeypatch.setattr(vkbloom.grid.plan, "installed_version", lambda: "9.9")
         with pytest.raises(ValueError, match=r'version: "0.1.0" in the store, "9.9" requested'):
             make(copy)
 

@@ -23,6 +23,7 @@ _EXTRAS: Final = {
     "scenes": "glTF scenes and skyboxes, including the built-in saucer",
     "grid": "to_xarray and grids of settings",
     "cli": "the command line",
+    "software": "a bundled driver that renders on any CPU",
     "quality": "quality figures such as SSIM",
     "notebook": "the explorer, in notebooks and as a web page",
     "pytest": "frame_regression in tests",

@@ -249,7 +249,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         ("time", time != 0.0),
     ):
         if is_given:
-            raise ValueError(f"{name}: only scenes have one, an image is given")
+            raise ValueError(f"{name}: the source is not a scene; leave the argument out")
     if hasattr(source, "__array__") or hasattr(source, "__dlpack__"):
         return ImageSource([check_image(source)])
     labels: list[Any]
