@@ -451,7 +451,8 @@ class TestOptionFiles:
     def test_lists_in_lists(self, tmp_path: Path, image_file: Path) -> None:
         file = tmp_path / "a.toml"
         file.write_text(
-            '[settings]\nmethod = "separable"\nlayers = [[1, 1], [2, 0.5]]\n[axes]\nbloom_size = [[4, 4], [8, 8]]\n'
+            '[settings]\nmethod = "separable"\nlayers = [[1, 1], [2, 0.5]]\n'
+            "[axes]\nbloom_size = [[4, 4], [8, 8]]\n"
             "weights = [[0.5, 0.25], [1.0]]\n"
         )
         done(image_file, "--from", file, "-o", tmp_path / "a.zarr")

@@ -73,7 +73,8 @@ def test_pipelines_that_are_old_go(
     # Of this form a setting of the final pass is one pipeline, which drivers compile quickly.
     monkeypatch.setenv("VKBLOOM_FORM", "fragment")
     renderer = new_renderer()
-    names = (_core.CHOICES[name] for name in ("composite", "tonemap", "encoding"))
+    composites = Separable.composites
+    names = (composites, *(_core.CHOICES[name] for name in ("tonemap", "encoding")))
     chosen = [
         Separable(composite=composite, tonemap=tonemap, encoding=encoding)  # type: ignore[arg-type]
         for composite, tonemap, encoding in itertools.product(*names)

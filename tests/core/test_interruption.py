@@ -359,9 +359,9 @@ long = vkbloom.Separable(
     weights=vkbloom.gaussian_weights(10.0, 32), blur_scale=0.5, direct=True, format="rgba32float"
 )
 renderer = vkbloom.Renderer()
-batch = renderer._core.apply(image, ("final",))
-batch.add(long, lambda name, shape, dtype: np.empty(shape, dtype))
-batch.submit()
+source = vkbloom._core.image_source(image)
+plan = renderer._core.plan(source, long, ("final",))
+submission = renderer._core.run(source, (plan,), ((np.empty(image.shape, image.dtype),),))
 begin = time.perf_counter()
 
 def press():
@@ -373,7 +373,7 @@ timer = threading.Timer(0.1, press)
 if pressing:
     timer.start()
 try:
-    del renderer, batch
+    del renderer, submission
     gc.collect()
     print("collected", time.perf_counter() - begin, flush=True)
     if pressing:

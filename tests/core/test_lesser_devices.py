@@ -176,7 +176,7 @@ def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> No
     findings = {finding["topic"]: finding for finding in json.loads(done.stdout)["findings"]}
     render = findings["test render"]
     assert render["status"] == "ok"
-    assert "it does not time its passes" in render["found"]
+    assert "the device does not time its passes" in render["found"]
     assert findings["validation layer"]["status"] == "ok"
 
 

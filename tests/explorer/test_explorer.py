@@ -120,7 +120,7 @@ class TestControls:
     @pytest.mark.parametrize(
         ("fields", "message"),
         [
-            (None, "fields by name"),
+            (None, "fields: a mapping is needed"),
             ({}, "method: None"),
             ({"method": "__class__"}, "is not one of separable"),
             ({"method": "pyramid", "levels": 99}, "levels: 99 is out of range"),

@@ -165,7 +165,7 @@ def test_frames_come_with_their_pictures(serve: Any) -> None:
         # Each page has its own viewer.
         other = await connect(server)
         await other.write_message(json.dumps({"kind": "setup"}))
-        assert (await answer(other))[0]["sides"]["a"]["intensity"] == 1.0
+        assert (await answer(other))[0]["sides"]["a"]["intensity"] == 0.15
         await other.write_message(json.dumps({"kind": "nonsense"}))
         assert (await answer(other))[0]["kind"] == "error"
 
@@ -235,7 +235,7 @@ class TestCommand:
     def test_wrong_use(self) -> None:
         result = self.run("photo.exr", "--scene", "ufo")
         assert result.exit_code == 2
-        assert "do not go with an IMAGE" in result.stderr
+        assert "leave them out with an IMAGE" in result.stderr
         assert self.run("--size", "0x3").exit_code == 2
 
     def test_failures(self, monkeypatch: pytest.MonkeyPatch) -> None:

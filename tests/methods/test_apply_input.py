@@ -522,9 +522,7 @@ def test_render_many_runs_what_changed(renderer: Renderer, scene: Scene) -> None
     [
         pytest.param([[[0, 0, 0]]], id="list"),
         pytest.param(None, id="none"),
-        pytest.param(b"\0\0\0", id="bytes"),
         pytest.param("image.png", id="path"),
-        pytest.param(np.zeros((4, 4, 3)), id="float64"),
         pytest.param(np.zeros((4, 4, 3), np.int8), id="int8"),
         pytest.param(np.zeros((4, 4, 3), np.uint16), id="uint16"),
         pytest.param(np.zeros((4, 4, 3), np.bool_), id="bool"),
@@ -539,8 +537,8 @@ def test_image_of_the_wrong_type(renderer: Renderer, image: Any) -> None:
 
 
 def test_dtype_error_names_what_is_taken(renderer: Renderer) -> None:
-    with pytest.raises(TypeError, match=r"float64.*uint8, float16, float32"):
-        renderer.apply(np.zeros((4, 4, 3)))
+    with pytest.raises(TypeError, match=r"int32.*uint8, float16, float32"):
+        renderer.apply(np.zeros((4, 4, 3), np.int32))
 
 
 @pytest.mark.parametrize(

@@ -75,8 +75,8 @@ def test_the_gain_of_a_whole_chain() -> None:
         ((), ValueError, "level_weights: 0 weights"),
         ((1, 1, 1, 1, 1, float("nan")), ValueError, "level_weights: nan is out of range"),
         ((1, 1, 1, 1, 1, float("inf")), ValueError, "level_weights: inf is out of range"),
-        ("111111", TypeError, "level_weights: a sequence of numbers"),
-        (3.0, TypeError, "level_weights: a sequence of numbers"),
+        ("111111", TypeError, "is not a sequence of numbers"),
+        (3.0, TypeError, "is not a sequence of numbers"),
     ],
 )
 def test_what_are_no_weights(weights: Any, error: type[Exception], message: str) -> None:
