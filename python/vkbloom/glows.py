@@ -137,7 +137,7 @@ class BlenderGlare(Settings):
     There are n = floor(log2(size * shorter side)) levels, one at least. ``down_0`` has the frame's
     size: with v a colour's brightest channel it is c (v' - threshold) / v, 0 where v <= 0, with
     v' = smooth_min(smooth_max(v, threshold), threshold + maximum). smooth_min(a, b) is
-    min(a, b) - h^2 k / 4, h = max(1 - |a - b| / k, 0), and smooth_max its mirror image; k is the
+    min(a, b) - h^2 k / 4, h = max(1 - abs(a - b) / k, 0), and smooth_max its mirror image; k is the
     smoothness, but no more than their end is away from 0 and from the other end. Each next level is
     the floored half of the one before by the 13 taps of `Pyramid`; for ``down_1`` the four taps of
     each group are weighted by 1 / (1 + brightest channel). up_k = down_k + tent(up_k+1) with a tent

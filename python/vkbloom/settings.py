@@ -463,7 +463,7 @@ class Pyramid(Settings):
 
     With weights up_k = w_k down_k + tent(up_k+1), where the smallest level is w_N-1 down_N-1, and
     ``bloom`` = tent(up_0) is not divided: a flat image becomes the sum of the weights. In
-    "rgba8unorm" up_k is divided by the sum of the weights' sizes, |w_k| + ... + |w_N-1|.
+    "rgba8unorm" up_k is divided by the sum of the weights' sizes, ``|w_k|`` + ... + ``|w_N-1|``.
 
     Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
     SIGGRAPH 2014.
