@@ -21,9 +21,9 @@ mmdebstrap --mode=root --variant=minbase --quiet \
 		deb-src [signed-by=/etc/apt/sources.gpg] $mirror trixie main
 		deb [signed-by=/etc/apt/sources.gpg] $mirror bookworm main
 	END" \
-    --customize-hook="upload $here/fetch_sources.sh /root/fetch_sources.sh" \
-    --customize-hook="upload $here/versions.sh /root/versions.sh" \
-    --customize-hook='chroot "$1" sh /root/fetch_sources.sh' \
+    --customize-hook="upload $here/fetch_sources.sh /srv/fetch_sources.sh" \
+    --customize-hook="upload $here/versions.sh /srv/versions.sh" \
+    --customize-hook='chroot "$1" sh /srv/fetch_sources.sh' \
     bullseye "$root.part" \
     "deb $mirror bullseye main" "deb $security_mirror bullseye-security main"
 mv "$root.part" "$root"

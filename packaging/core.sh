@@ -4,7 +4,7 @@
 set -eu
 source=$1
 wheels=$2
-. /root/versions.sh
+. /srv/versions.sh
 python=/opt/python/bin/python3.11
 
 cd "$source"

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Runs in the build root, while it is made: fetches and unpacks the sources and compiles Python.
 set -eu
-. /root/versions.sh
+. /srv/versions.sh
 mkdir -p /build/fetched
 cd /build/fetched
 # apt's sandbox user must be able to write here.

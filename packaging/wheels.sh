@@ -8,18 +8,18 @@ root=$work/root
 . packaging/versions.sh
 
 test -d "$root" || packaging/build_root.sh "$root"
-cp packaging/versions.sh "$root/root/"
+cp packaging/versions.sh "$root/srv/"
 
 # PyPI is asked here, so the root needs neither certificates nor the network.
-rm -rf "$root/root/pypi"
-python3 -m pip download --quiet --no-deps --dest "$root/root/pypi" --only-binary=:all: \
+rm -rf "$root/srv/pypi"
+python3 -m pip download --quiet --no-deps --dest "$root/srv/pypi" --only-binary=:all: \
     --python-version 3.11 --implementation cp --abi cp311 --abi abi3 --abi none \
     --platform manylinux2014_x86_64 --platform manylinux_2_28_x86_64 \
     --requirement packaging/requirements.txt
 # pip's wheel can be run as it is: Debian's source of Python comes without it.
-chroot "$root" sh -c 'set -- /root/pypi/pip-*.whl
+chroot "$root" sh -c 'set -- /srv/pypi/pip-*.whl
     /opt/python/bin/python3.11 "$1/pip" install --quiet --no-index --no-deps \
-        --root-user-action=ignore --upgrade /root/pypi/*.whl'
+        --root-user-action=ignore --upgrade /srv/pypi/*.whl'
 
 rm -rf "$root/build/vkbloom" "$root/build/wheels"
 mkdir -p "$root/build/vkbloom" "$root/build/wheels" dist

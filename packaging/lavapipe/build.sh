@@ -4,7 +4,7 @@
 set -eu
 package=$1
 wheels=$2
-. /root/versions.sh
+. /srv/versions.sh
 source=/build/mesa-$MESA
 python=/opt/python/bin/python3.11
 
