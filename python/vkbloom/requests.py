@@ -70,7 +70,12 @@ def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArr
 
 def new_arrays(core: _core.Renderer, plan: _core.Plan) -> tuple[NDArray[Any], ...]:
     """Return an array for each of a plan's outputs."""
-    return tuple(new_array(core, shape, dtype) for _, shape, dtype in plan.outputs)
+    arrays = []
+    # A generator would make a cell of `core`. CPython 3.11 leaks all arguments of a call that gets
+    # no memory for a cell, and the plan with them.
+    for _, shape, dtype in plan.outputs:
+        arrays.append(new_array(core, shape, dtype))
+    return tuple(arrays)
 
 
 def run_one(
