@@ -172,13 +172,13 @@ def test_planning_waits_for_no_other_call(new_renderer: Callable[[], Renderer]) 
     image = picture(64, 64)
     slow = Separable(weights=(1 / 65,) * 33, direct=True, blur_scale=0.5, format="rgba32float")
     renderer.apply(image, slow)
-    large = picture(768, 768)
+    large = picture(256, 256)
     thread = threading.Thread(target=renderer.apply, args=(large, slow))
     thread.start()
     time.sleep(0.05)
     for _ in range(3):
         renderer.plan(image)
-    # It takes the device a second or so.
+    # The device needs some seconds for it.
     assert thread.is_alive()
     thread.join()
 
