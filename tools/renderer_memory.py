@@ -36,11 +36,14 @@ import numpy as np
 import vkbloom
 
 # One arena without thread caches, for all allocations including Python's objects, so that the bytes
-# in use are exact.
+# in use are exact. The software device draws in the thread that submits to it: with threads of its
+# own it begins a new scene while it draws the last one, and each scene keeps blocks of 64 KiB until
+# it is used again, so that what is in use depends on how fast the threads are.
 ENVIRONMENT = {
     "PYTHONMALLOC": "malloc",
     "MALLOC_ARENA_MAX": "1",
     "GLIBC_TUNABLES": "glibc.malloc.tcache_count=0",
+    "LP_NUM_THREADS": "0",
 }
 
 ROUNDS = 10
