@@ -66,6 +66,7 @@ format: build/stamp/lint
 # Tests of the core with ASan, UBSan and LeakSanitizer; threads with ThreadSanitizer.
 sanitize: build/stamp/core build/stamp/test
 	PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh
+	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10
 
 clean:
 	rm -rf build out docs/api $(VENV) python/vkbloom/_core*.so

@@ -34,12 +34,6 @@ static struct picture right[SOURCES][SETTINGS][SIZES];
 static pthread_mutex_t gil = PTHREAD_MUTEX_INITIALIZER;
 static atomic_bool over;
 
-// What the arrays keep of a renderer that is gone.
-struct array_memory {
-    struct vkb_pages pages;
-    unsigned references;
-};
-
 struct job;
 
 // renderer.c's, with the same rules for the lock and the GIL.
@@ -50,19 +44,20 @@ struct renderer {
     enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
-    struct array_memory *memory;
+    struct vkb_pages *pages;
     struct job *abandoned;  // with the GIL
     size_t pipelines;       // with the GIL
 };
 
-// batch.c's: points that go to the device together.
+// Requests that go to the device together.
 struct job {
     struct renderer *renderer;
     enum source source;
     unsigned size, count;
     unsigned settings[POINTS];
-    struct vkb_point points[POINTS];
-    struct array_memory *memory;  // whose pages the arrays are in; NULL: they are plain
+    struct vkb_plan plans[POINTS];
+    struct vkb_request requests[POINTS];
+    struct vkb_pages *pages;  // that the arrays are in; NULL: they are plain
     struct vkb_submission *submission;
     struct job *next;
 };
@@ -97,26 +92,17 @@ static struct renderer *open_renderer(void)
     struct vkb_error error = {0};
     struct renderer *renderer = vkb_alloc(&error, 1, sizeof *renderer);
 
-    if (!renderer || !(renderer->memory = vkb_alloc(&error, 1, sizeof *renderer->memory))
+    if (!renderer || !(renderer->pages = vkb_pages_create(&renderer->device, &error))
         || !vkb_device_create(&renderer->device, "software", "", false, &error)
         || !vkb_frame_create(&renderer->device, NULL, 0, &renderer->frame, &error)
         || !vkb_variants_by_name("auto", &renderer->device, &renderer->variants, &error))
         die("open", &error);
     pthread_mutex_init(&renderer->lock, NULL);
-    renderer->memory->pages.device = &renderer->device;
-    renderer->memory->references = 1;
     renderer->device.interrupted = interrupted;
     renderer->device.frame_seconds = 300.0;
     renderer->references = 1;
     renderer->open = true;
     return renderer;
-}
-
-// With the GIL.
-static void release_memory(struct array_memory *memory)
-{
-    if (memory && --memory->references == 0)
-        vkb_free(memory);
 }
 
 // With the GIL.
@@ -132,17 +118,15 @@ static void release_renderer(struct renderer *renderer)
 static void release_job(struct job *job)
 {
     for (unsigned i = 0; i < job->count; ++i) {
-        struct vkb_point *point = &job->points[i];
-        for (uint32_t output = 0; output < point->output_count; ++output)
-            if (job->memory)
-                vkb_pages_give_back(&job->memory->pages, point->outputs[output].memory);
-            else
-                vkb_free(point->outputs[output].memory);
-        vkb_free(point->outputs);
-        vkb_free(point->timings);
-        vkb_graph_destroy(&point->graph);
+        struct vkb_output *output = job->requests[i].outputs;
+        if (job->pages)
+            vkb_pages_give_back(job->pages, output->pages);
+        else
+            vkb_free(output->memory);
+        vkb_free(output);
+        vkb_free(job->requests[i].timings);
+        vkb_plan_destroy(&job->plans[i]);
     }
-    release_memory(job->memory);
     release_renderer(job->renderer);
     vkb_free(job);
 }
@@ -191,9 +175,8 @@ static void close_renderer(struct renderer *renderer)
         renderer->open = false;
         vkb_frame_destroy(&renderer->device, &renderer->frame);
         pthread_mutex_lock(&gil);
-        vkb_pages_close(&renderer->memory->pages);
-        release_memory(renderer->memory);
-        renderer->memory = NULL;
+        vkb_pages_close(renderer->pages);
+        renderer->pages = NULL;
         pthread_mutex_unlock(&gil);
         vkb_device_destroy(&renderer->device);
         pthread_mutex_lock(&gil);
@@ -231,45 +214,42 @@ static void *array_of(struct job *job, size_t size, struct vkb_page_run **pages)
     struct vkb_error error;
 
     *pages = NULL;
-    if (sizes[job->size].width < 256 || !job->renderer->memory)
+    if (sizes[job->size].width < 256 || !job->renderer->pages)
         return vkb_alloc(&error, 1, size);
-    if (!job->memory) {
-        job->memory = job->renderer->memory;
-        ++job->memory->references;
-    }
-    void *memory = vkb_pages_take(&job->memory->pages, size);
-    *pages = vkb_pages_find(&job->memory->pages, memory);
-    return memory;
+    job->pages = job->renderer->pages;
+    *pages = vkb_pages_take(job->pages, size, &error);
+    return *pages ? (*pages)->memory : NULL;
 }
 
-static void add_point(struct job *job, unsigned settings)
+static void add_request(struct job *job, unsigned settings)
 {
-    struct vkb_point *point = &job->points[job->count];
+    struct vkb_plan *plan = &job->plans[job->count];
+    struct vkb_request *request = &job->requests[job->count];
     struct vkb_error error = {0};
 
-    if (!build_graph(job, &settings_table[settings], &point->graph, &error)
-        || !(point->timings = vkb_alloc(&error, point->graph.pass_count, sizeof *point->timings))
-        || !(point->outputs = vkb_alloc(&error, 1, sizeof *point->outputs)))
+    if (!build_graph(job, &settings_table[settings], &plan->graph, &error)
+        || !(plan->outputs = vkb_alloc(&error, 1, sizeof *plan->outputs)))
         die("add", &error);
-    // Points of one job have the same images.
-    if (job->count > 0 && !vkb_graph_same_images(&job->points[0].graph, &point->graph)) {
-        vkb_graph_destroy(&point->graph);
-        vkb_free(point->timings);
-        vkb_free(point->outputs);
-        *point = (struct vkb_point){0};
+    // Requests of one job have the same images.
+    if (job->count > 0 && !vkb_graph_same_images(&job->plans[0].graph, &plan->graph)) {
+        vkb_plan_destroy(plan);
+        *plan = (struct vkb_plan){0};
         return;
     }
-    const uint32_t image = vkb_graph_find(&point->graph, "final");
-    const struct vkb_image_row *row = &point->graph.images[image];
+    if (!(request->timings = vkb_alloc(&error, plan->graph.pass_count, sizeof *request->timings))
+        || !(request->outputs = vkb_alloc(&error, 1, sizeof *request->outputs)))
+        die("add", &error);
+    plan->outputs[0] = vkb_graph_find(&plan->graph, "final");
+    plan->output_count = 1;
+    request->plan = plan;
+    const struct vkb_image_row *row = &plan->graph.images[plan->outputs[0]];
     const size_t size = (size_t)row->width * row->height * vkb_pixel_size(row->format);
-    point->outputs[0].image = image;
-    point->outputs[0].channels = vkb_graph_channels(&point->graph, image);
+    request->outputs[0].channels = vkb_graph_channels(&plan->graph, plan->outputs[0]);
     pthread_mutex_lock(&gil);
-    point->outputs[0].memory = array_of(job, size, &point->outputs[0].pages);
+    request->outputs[0].memory = array_of(job, size, &request->outputs[0].pages);
     pthread_mutex_unlock(&gil);
-    if (!point->outputs[0].memory)
+    if (!request->outputs[0].memory)
         die("add: no memory", NULL);
-    point->output_count = 1;
     job->settings[job->count++] = settings;
 }
 
@@ -311,8 +291,8 @@ static bool submit(struct job *job)
     enter(renderer);
     const bool open = renderer->open;
     if (open
-        && !vkb_frame_submit(&renderer->device, &renderer->frame, &source, job->points, job->count,
-                             &job->submission, &error))
+        && !vkb_frame_submit(&renderer->device, &renderer->frame, &source, job->requests,
+                             job->count, &job->submission, &error))
         die("submit", &error);
     leave(renderer);
     return open;
@@ -354,10 +334,10 @@ static void set_abandoned(struct job *job)
     pthread_mutex_unlock(&gil);
 }
 
-static size_t picture_size(const struct job *job, unsigned point)
+static size_t picture_size(const struct job *job, unsigned request)
 {
-    const struct vkb_output *output = &job->points[point].outputs[0];
-    const struct vkb_image_row *row = &job->points[point].graph.images[output->image];
+    const struct vkb_plan *plan = &job->plans[request];
+    const struct vkb_image_row *row = &plan->graph.images[plan->outputs[0]];
 
     return (size_t)row->width * row->height * vkb_pixel_size(row->format);
 }
@@ -368,7 +348,7 @@ static void compare(const struct job *job)
         const struct picture *expected = &right[job->source][job->settings[i]][job->size];
         const size_t size = picture_size(job, i);
         if (size != expected->size
-            || memcmp(job->points[i].outputs[0].memory, expected->bytes, size) != 0) {
+            || memcmp(job->requests[i].outputs[0].memory, expected->bytes, size) != 0) {
             fprintf(stderr, "source %d, settings %u, size %u: another picture\n", (int)job->source,
                     job->settings[i], job->size);
             exit(1);
@@ -423,7 +403,7 @@ static void render(struct worker *worker, struct renderer *renderer, unsigned de
     // Without the lock, as batch.c.
     const bool usable = renderer->open && !renderer->device.lost;
     for (unsigned i = 0; i < count; ++i)
-        add_point(job, draw(worker, SETTINGS));
+        add_request(job, draw(worker, SETTINGS));
     if (!usable || !submit(job)) {
         finish(job);
         return;
@@ -541,14 +521,14 @@ static void render_right(void)
             for (unsigned size = 0; size < SIZES; ++size) {
                 struct picture *picture = &right[source][settings][size];
                 struct job *job = new_job(renderer, source, size);
-                add_point(job, settings);
+                add_request(job, settings);
                 if (!submit(job) || !collect(job))
                     die("closed", NULL);
                 picture->size = picture_size(job, 0);
                 picture->bytes = vkb_alloc(&error, 1, picture->size);
                 if (!picture->bytes)
                     die("picture", &error);
-                memcpy(picture->bytes, job->points[0].outputs[0].memory, picture->size);
+                memcpy(picture->bytes, job->requests[0].outputs[0].memory, picture->size);
                 if (is_black(picture))
                     die("a picture with nothing in it", NULL);
                 finish(job);
