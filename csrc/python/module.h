@@ -36,6 +36,7 @@ extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submis
 struct vkb_pending {
     struct vkb_submission *submission;  // NULL: not submitted
     PyObject *plans;                    // a tuple: their graphs are read until then
+    PyObject *source;                   // what the device reads until then
     struct vkb_request *requests;
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
@@ -57,6 +58,7 @@ struct vkb_renderer {
     const struct vkb_messages *before;  // whose the messages are when the holder leaves
     uint64_t serial;                    // by which plans know it; never 0
     struct vkb_pages *pages;            // of large arrays; NULL: closed
+    struct vkb_residents *residents;    // of handles; NULL: closed
     size_t pipeline_count;              // made so far; read and written with the GIL
     struct vkb_cached cached;           // read and written with the GIL
     enum vkb_variants variants;
@@ -140,12 +142,19 @@ struct vkb_held_image {
 bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
 
+// An image is the caller's array, or one that stays on the device of a renderer.
 struct vkb_source_object {
     PyObject_HEAD
     struct vkb_source source;
     struct vkb_held_scene scene;
     struct vkb_held_image image;
+    struct vkb_resident *resident;  // NULL: none
+    struct vkb_residents *residents;
+    long process;  // whose device the resident image is on
 };
+
+// Whether the renderer can use the source; else with a ValueError set.
+bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_source_object *source);
 
 struct vkb_plan_object {
     PyObject_HEAD
@@ -168,6 +177,7 @@ PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
+PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);
 
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);

@@ -197,7 +197,8 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     self->lock = PyThread_allocate_lock();
     if (!self->lock)
         PyErr_NoMemory();
-    else if ((self->pages = vkb_pages_create(&self->device, &error)))
+    else if ((self->pages = vkb_pages_create(&self->device, &error))
+             && (self->residents = vkb_residents_create(&self->device, &error)))
         self->open = create(self, adapter, driver, validation, variants, read_cache, &error);
     if (self->open) {
         self->device.interrupted = interrupted;
@@ -231,7 +232,9 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
     vkb_pages_close(self->pages);
+    vkb_residents_close(self->residents);
     self->pages = NULL;
+    self->residents = NULL;
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);
@@ -274,6 +277,7 @@ static void dealloc(PyObject *object)
         return;
     release_all(take_over(self));
     vkb_pages_close(self->pages);
+    vkb_residents_close(self->residents);
     if (self->lock)
         PyThread_free_lock(self->lock);
     release(self);
@@ -364,6 +368,11 @@ static PyMethodDef methods[] = {
     {"run", vkb_renderer_run, METH_VARARGS,
      "run(source, plans, arrays) -> Submission. Hands plans with the same images to the device; "
      "arrays holds a tuple for each plan, in the order of its outputs."},
+    {"upload", vkb_renderer_upload, METH_VARARGS,
+     "upload(source, spare, recycled) -> Source. A copy of an image on the device. `spare`: None, "
+     "or "
+     "such a source that nobody needs any more, whose memory it takes; `recycled`: it will be "
+     "one."},
     {"pages", vkb_new_pages, METH_O,
      "pages(size) -> Pages. Memory for an array, used again when the array is gone."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},

@@ -55,8 +55,9 @@ static bool check_plans(const struct vkb_renderer *renderer, const struct vkb_so
 }
 
 // Room for what the requests need beside their plans.
-static struct vkb_pending *new_pending(PyObject *plans, struct vkb_error *error)
+static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct vkb_error *error)
 {
+    struct vkb_resident *resident = ((struct vkb_source_object *)source)->resident;
     struct vkb_pending *pending = vkb_alloc(error, 1, sizeof *pending);
     const Py_ssize_t count = PyTuple_Size(plans);
     size_t output_count = 0, pass_count = 0;
@@ -68,6 +69,9 @@ static struct vkb_pending *new_pending(PyObject *plans, struct vkb_error *error)
         pass_count += plan_at(plans, i)->plan.graph.pass_count;
     }
     pending->plans = Py_NewRef(plans);
+    pending->source = Py_NewRef(source);
+    if (resident)
+        vkb_resident_use(resident);
     pending->requests = vkb_alloc(error, (size_t)count, sizeof *pending->requests);
     pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
     pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
@@ -76,6 +80,15 @@ static struct vkb_pending *new_pending(PyObject *plans, struct vkb_error *error)
         return pending;
     vkb_pending_release(pending);
     return NULL;
+}
+
+static void release_source(struct vkb_pending *pending)
+{
+    struct vkb_source_object *source = (struct vkb_source_object *)pending->source;
+
+    if (source && source->resident)
+        vkb_resident_end_use(source->residents, source->resident);
+    Py_XDECREF(pending->source);
 }
 
 static void release_views(struct vkb_pending *pending)
@@ -92,12 +105,14 @@ void vkb_pending_release(struct vkb_pending *pending)
     vkb_free(pending->views);
     vkb_free(pending->timings);
     Py_XDECREF(pending->plans);
+    release_source(pending);
     vkb_free(pending);
 }
 
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg)
 {
     Py_VISIT(pending->plans);
+    Py_VISIT(pending->source);
     for (size_t i = 0; i < pending->view_count; ++i)
         Py_VISIT(pending->views[i].obj);
     return 0;
@@ -154,8 +169,8 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
     return true;
 }
 
-static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *plans,
-                                         PyObject *arrays)
+static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *source,
+                                         PyObject *plans, PyObject *arrays)
 {
     struct vkb_module_state *state = state_of((PyObject *)renderer);
     PyTypeObject *type = (PyTypeObject *)state->submission_type;
@@ -166,7 +181,7 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
     if (!self)
         return NULL;
     self->renderer = (struct vkb_renderer *)Py_NewRef((PyObject *)renderer);
-    self->pending = new_pending(plans, &error);
+    self->pending = new_pending(source, plans, &error);
     if (!self->pending)
         vkb_raise(state, &error);
     else if (hold_arrays(renderer, self->pending, arrays))
@@ -180,7 +195,8 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
 {
     const struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
-        .input = source->source.kind == VKB_SOURCE_IMAGE ? &source->image.input : NULL,
+        .input = source->image.held ? &source->image.input : NULL,
+        .resident = source->resident,
     };
 
     if (!vkb_renderer_enter(renderer, error))
@@ -188,8 +204,8 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
     bool done = vkb_require_open(renderer, error)
              && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
                                  pending->count, &pending->submission, error);
-    if (done && data.input)
-        pending->specials = renderer->frame.upload.specials;
+    if (done)
+        pending->specials = vkb_frame_specials(&renderer->frame, &data);
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
@@ -204,9 +220,10 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O!O!O!:run", state->source_type, &source, &PyTuple_Type,
                           &plans, &PyTuple_Type, &arrays)
+        || !vkb_check_source(renderer, (struct vkb_source_object *)source)
         || !check_plans(renderer, &((struct vkb_source_object *)source)->source, plans, arrays))
         return NULL;
-    struct submission *self = new_submission(renderer, plans, arrays);
+    struct submission *self = new_submission(renderer, source, plans, arrays);
     if (self && !submit(renderer, (struct vkb_source_object *)source, self->pending, &error)) {
         // Also with an exception set, which is kept: whoever hears of the arrays' end is Python.
         vkb_raise(state, &error);

@@ -95,6 +95,10 @@ static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error
     struct vkb_image_cache *cache = &run->frame->cache;
     struct vkb_cached_image *cached;
 
+    if (row->input && run->input) {
+        set_cached(run, image, run->input);
+        return true;
+    }
     if ((vkb_image_cache_replaces(cache, row)
          && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
         || !vkb_image_cache_resolve(run->device, cache, row, &cached, error))
@@ -121,6 +125,13 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
+static void use_resident(struct vkb_run *run, struct vkb_resident *resident)
+{
+    run->input = &resident->cached;
+    run->upload = &resident->upload;
+    run->send_input = resident->staged;
+}
+
 // Stages the image and finds out whether the device has it already.
 static bool stage_input(struct vkb_run *run, const struct vkb_input *input, struct vkb_error *error)
 {
@@ -132,6 +143,7 @@ static bool stage_input(struct vkb_run *run, const struct vkb_input *input, stru
                 return false;
             run->input = run->images[i];
         }
+    run->upload = &run->frame->upload;
     // An image that its last writing did not reach holds nothing to compare with.
     if (run->input->image.mapped && !run->input->content.valid)
         vkb_upload_forget(&run->frame->upload);
@@ -147,7 +159,7 @@ static bool stage_input(struct vkb_run *run, const struct vkb_input *input, stru
 static void record_input(struct vkb_run *run)
 {
     if (!run->input->image.mapped)
-        vkb_upload_record(run->device, run->submission->commands.buffer, &run->frame->upload,
+        vkb_upload_record(run->device, run->submission->commands.buffer, run->upload,
                           &run->input->image);
     run->input->content.valid = true;
 }
@@ -177,7 +189,9 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     request->timing_count = 0;
     request->first_span = submission->timer.span_count;
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        set_cached(run, i, vkb_image_cache_find(&frame->cache, &graph->images[i]));
+        set_cached(run, i,
+                   graph->images[i].input ? run->input
+                                          : vkb_image_cache_find(&frame->cache, &graph->images[i]));
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i)
@@ -216,6 +230,8 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
                    struct vkb_request *requests, uint32_t request_count, struct vkb_error *error)
 {
     run->graph = &requests[0].plan->graph;
+    if (source->resident)
+        use_resident(run, source->resident);
     return (!source->scene || load_scene(run, source->scene, error))
         && (!source->input || stage_input(run, source->input, error))
         && reserve(run, requests, request_count, error)
@@ -275,6 +291,8 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     struct vkb_run run = {.device = device, .frame = frame};
     // All requests have the same images.
     const uint32_t image_count = requests[0].plan->graph.image_count;
+    const enum vkb_access access =
+        source->resident ? source->resident->cached.image.access : VKB_ACCESS_NONE;
     bool done;
 
     if (!renew(device, frame, error)
@@ -290,7 +308,12 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         run.submission->requests = requests;
         run.submission->request_count = request_count;
         *submission = run.submission;
+        if (source->resident)
+            source->resident->staged = false;
     } else {
+        // What was recorded of it does not run.
+        if (source->resident)
+            source->resident->cached.image.access = access;
         fail_frame(device, frame, run.submission, error);
         vkb_submissions_give_back(device, &frame->submissions, run.submission);
     }
@@ -342,6 +365,14 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
     if (*over)
         vkb_submissions_give_back(device, &frame->submissions, submission);
     return done;
+}
+
+struct vkb_specials vkb_frame_specials(const struct vkb_frame *frame,
+                                       const struct vkb_frame_source *source)
+{
+    return source->resident ? source->resident->specials
+         : source->input    ? frame->upload.specials
+                            : (struct vkb_specials){0};
 }
 
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,

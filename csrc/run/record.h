@@ -14,6 +14,7 @@ struct vkb_run {
     struct vkb_cached_image **images;  // by the graph's image index
     struct vkb_content **contents;     // of the cache
     struct vkb_cached_image *input;    // NULL: none
+    const struct vkb_upload *upload;   // that the input's pixels come from
     bool send_input;                   // the device does not have it yet
 };
 

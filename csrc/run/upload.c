@@ -192,7 +192,7 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     *changed = first < input->height;
     if (!*changed)
         return true;
-    if (!vkb_submissions_wait(device, submissions, error)
+    if ((submissions && !vkb_submissions_wait(device, submissions, error))
         || (fresh && !prepare(device, upload, input, image, error)))
         return false;
     for (uint32_t y = first; y < input->height; ++y) {

@@ -6,17 +6,18 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast
 
 import numpy as np
 
 from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, from_core
-from vkbloom.checks import check_attachments, check_image, check_size
+from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
+from vkbloom.image import Image
 from vkbloom.plans import Pass, Plan, framebuffers
 from vkbloom.settings import Settings, Shading, check_settings
-from vkbloom.sources import image_source, scene_source
+from vkbloom.sources import image_kind, image_source, is_image, scene_source
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
@@ -82,6 +83,28 @@ def _arrays_for(
         given[name] if name in given else requests.new_array(core, shape, dtype)
         for name, shape, dtype in plan.outputs
     )
+
+
+def _paired(
+    images: Iterable[NDArray[Any] | Image], settings: Settings | Sequence[Settings]
+) -> Iterator[requests.Work]:
+    """Yield each image with its settings; what is wrong comes in its turn."""
+    count = 0
+    for image in images:
+        if isinstance(settings, Settings):
+            one = settings
+        elif count < len(settings):
+            one = settings[count]
+        else:
+            raise ValueError(f"settings: {len(settings)} are fewer than the images")
+        work = requests.Work(image_source(image), one)
+        # The array is the caller's again while the next is asked for.
+        del image
+        yield work
+        del work
+        count += 1
+    if not isinstance(settings, Settings) and count < len(settings):
+        raise ValueError(f"settings: {len(settings)} are more than the {count} images")
 
 
 class Renderer:
@@ -284,7 +307,7 @@ class Renderer:
 
     def apply(
         self,
-        image: NDArray[Any],
+        image: NDArray[Any] | Image,
         settings: Settings | None = None,
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
@@ -294,11 +317,11 @@ class Renderer:
 
         Parameters
         ----------
-        image : ndarray, shape (H, W, 3) or (H, W, 4)
+        image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
             Linear light: uint8 (read as value / 255), float16 or float32; any strides. The levels
             of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; RGBA
             keeps its alpha, which the bloom never changes. NaN and infinity count as 0 in the
-            bloom and stay where they are in ``final``.
+            bloom and stay where they are in ``final``. An `Image` of `upload` is used as it is.
         settings : Settings, optional
             By default ``Separable()``.
         attachments, out
@@ -334,7 +357,7 @@ class Renderer:
 
     def apply_many(
         self,
-        image: NDArray[Any],
+        image: NDArray[Any] | Image,
         settings_seq: Iterable[Settings],
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
@@ -344,7 +367,7 @@ class Renderer:
         Parameters
         ----------
         image
-            As for `apply`; it must not change before the last frame is taken.
+            As for `apply`; an array must not change before the last frame is taken.
         settings_seq : iterable of Settings
         attachments
             As for `apply`.
@@ -363,6 +386,124 @@ class Renderer:
         """
         names = check_attachments(attachments)
         return self._run_many(image_source(image), settings_seq, names)
+
+    def apply_each(
+        self,
+        images: Iterable[NDArray[Any] | Image],
+        settings: Settings | Sequence[Settings] | None = None,
+        *,
+        attachments: Literal["all"] | str | Sequence[str] = "all",
+    ) -> Iterator[Frames]:
+        """Give one image after the other bloom.
+
+        Parameters
+        ----------
+        images : iterable of images
+            Each as for `apply`; shapes and dtypes may change from one to the next. Each is copied
+            before the next is asked for, so that one array can be filled again and again.
+        settings : Settings or sequence of Settings, optional
+            For all images, or one for each of them; by default ``Separable()``.
+        attachments
+            As for `apply`.
+
+        Yields
+        ------
+        Frames
+            One for each image, in their order.
+
+        Raises
+        ------
+        ValueError
+            At the call: the lengths of both sequences differ, or an argument is out of range. At
+            the turn of an image: it is one that `apply` refuses, or there is no settings for it.
+        TypeError
+            `images` is not iterable, or an argument has another type.
+
+        See Also
+        --------
+        apply_many : One image with one settings after the other.
+        upload : Keeps an image on the device.
+
+        Notes
+        -----
+        The device works on the next images while a frame is used: after the first frame, at most
+        two images are taken ahead of the frame that is given. What goes wrong with an image, or
+        with the iterable, is raised in its turn, after the frames before it, and is the end.
+
+        Examples
+        --------
+        >>> images = (np.full((16, 24, 3), level, np.float32) for level in (0.25, 0.5, 1.0))
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     for frames in renderer.apply_each(images, vkbloom.Pyramid(levels=2)):
+        ...         print(frames["final"].max())
+        0.5
+        1.0
+        2.0
+        """
+        names = check_attachments(attachments)
+        if not isinstance(images, abc.Iterable) or isinstance(images, str | bytes | np.ndarray):
+            raise TypeError(
+                f"images: several images are needed, not {type(images).__name__}; of one image "
+                "make a list, or call apply"
+            )
+        if settings is not None and not isinstance(settings, Settings):
+            if not isinstance(settings, abc.Sequence):
+                raise TypeError(f"settings: {settings!r} is not Settings, or a sequence of them")
+            settings = [check_settings(one) for one in settings]
+            if isinstance(images, abc.Sized) and len(images) != len(settings):
+                raise ValueError(
+                    f"settings: {len(settings)} are not as many as the {len(images)} images"
+                )
+        if self.closed:
+            raise ValueError("the renderer is closed")
+        work = requests.uploaded(self._core, _paired(images, settings or check_settings(None)))
+        results = requests.run(work, self._core, names, alone=True)
+        return (self._frames(one, result) for one, result in results)
+
+    def upload(self, image: NDArray[Any]) -> Image:
+        """Copy an image to the device, where it stays for many calls.
+
+        Parameters
+        ----------
+        image : ndarray
+            As for `apply`. It may change as soon as this returns.
+
+        Returns
+        -------
+        Image
+            Accepted by this renderer wherever an image is. Calls with it compare no bytes.
+
+        Raises
+        ------
+        ValueError
+            The image has another shape, or more pixels than the adapter allows; or the renderer is
+            closed.
+        TypeError
+            The image has another dtype.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed. After any but a lost device the renderer can be used again.
+
+        See Also
+        --------
+        apply_each : One image after the other, copied while the device works on others.
+
+        Examples
+        --------
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     image = renderer.upload(np.full((90, 160, 4), 0.5, np.float32))
+        ...     dark, bright = (
+        ...         renderer.apply(image, vkbloom.Separable(exposure=exposure))["final"]
+        ...         for exposure in (-1.0, 1.0)
+        ...     )
+        >>> bool((dark < bright).all(axis=(0, 1))[:3].all())
+        True
+        """
+        if isinstance(image, Image):
+            raise TypeError("image: it was uploaded already")
+        shape, dtype = image_kind(image)
+        height, width, channels = shape
+        source = self._core.upload(image_source(image), None, False)
+        return Image(source, (height, width, channels), dtype)
 
     def render_many(
         self,
@@ -397,7 +538,7 @@ class Renderer:
 
     def plan(
         self,
-        source: Scene | NDArray[Any],
+        source: Scene | NDArray[Any] | Image,
         settings: Settings | None = None,
         size: tuple[int, int] | None = None,
         *,
@@ -408,7 +549,7 @@ class Renderer:
 
         Parameters
         ----------
-        source : Scene or ndarray
+        source : Scene or an image
             As for `render` and `apply`.
         settings : Settings, optional
             By default ``Separable()``.
@@ -456,17 +597,16 @@ class Renderer:
         names = check_attachments(attachments)
         kind: str = shading
         dtype = channels = None
-        if isinstance(source, np.ndarray):
+        if is_image(source):
             for name, is_given in (("size", size is not None), ("shading", shading != "forward")):
                 if is_given:
                     raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            image = check_image(source)
-            kind, dtype = "image", image.dtype
-            height, width, channels = image.shape
-            planned = image_source(image)
+            kind, (shape, dtype) = "image", image_kind(source)
+            height, width, channels = shape
+            planned = image_source(source)
         else:
             width, height = check_size("size", _SCENE_SIZE if size is None else size)
-            planned = scene_source(source, (width, height), shading, 0.0)
+            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0)
         plan = self._core.plan(planned, settings, names)
         outputs = framebuffers(plan)
         passes = tuple(Pass(*row[:-1]) for row in plan.passes)
@@ -476,7 +616,11 @@ class Renderer:
 
     def grid(
         self,
-        source: Scene | NDArray[Any] | Sequence[NDArray[Any]] | Mapping[str, NDArray[Any]],
+        source: Scene
+        | NDArray[Any]
+        | Image
+        | Sequence[NDArray[Any] | Image]
+        | Mapping[str, NDArray[Any] | Image],
         settings: Settings | None = None,
         axes: Mapping[str, Iterable[Any]] | None = None,
         *,
@@ -491,7 +635,7 @@ class Renderer:
 
         Parameters
         ----------
-        source : Scene, ndarray, or list or mapping of ndarray
+        source : Scene, image, or list or mapping of images
             Several images add the dimension "image" before all others; a mapping's keys label
             them. They must have one shape and dtype.
         settings : Settings, optional
@@ -573,8 +717,14 @@ class Renderer:
         # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
-        checked = map(check_settings, settings_seq)
-        results = requests.run(checked, self._core, source, names)
+        return self._run_work(
+            (requests.Work(source, check_settings(one)) for one in settings_seq), names
+        )
+
+    def _run_work(
+        self, sequence: Iterable[requests.Work], names: tuple[str, ...] | None
+    ) -> Iterator[Frames]:
+        results = requests.run(sequence, self._core, names)
         return (self._frames(settings, result) for settings, result in results)
 
     def _frames(self, settings: Settings, result: requests.Result) -> Frames:

@@ -7,25 +7,49 @@ from typing import TYPE_CHECKING, Any
 
 from vkbloom import _core
 from vkbloom.checks import check_image, check_size, check_time
+from vkbloom.image import Image
 from vkbloom.settings import SHADINGS
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from vkbloom.scene import Mesh, Scene
     from vkbloom.scene.textures import Texture
     from vkbloom.settings import Shading
 
-__all__ = ["image_source", "scene_arguments", "scene_source"]
+__all__ = ["image_kind", "image_source", "is_image", "scene_arguments", "scene_source"]
 
 
 def image_source(image: object) -> _core.Source:
-    """Return an image as the core takes it; the image must not change while it is used.
+    """Return an image as the core takes it; an array must not change while it is used.
 
     Raises
     ------
     TypeError, ValueError
         As `check_image`.
     """
+    if isinstance(image, Image):
+        return image._source
     return _core.image_source(check_image(image))
+
+
+def is_image(source: object) -> bool:
+    """Whether a source is an image, or looks like one; anything else may be a scene."""
+    return isinstance(source, Image | memoryview) or any(
+        hasattr(source, name) for name in ("__array__", "__array_interface__", "__dlpack__")
+    )
+
+
+def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Return shape and dtype of an image, or of a handle of one.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `check_image`.
+    """
+    checked = image if isinstance(image, Image) else check_image(image)
+    return checked.shape, checked.dtype
 
 
 def scene_source(

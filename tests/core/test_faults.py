@@ -93,6 +93,7 @@ def names() -> set[str]:
         "grid in memory",
         "grid to Zarr",
         "readback",
+        "handles",
     }
 
 

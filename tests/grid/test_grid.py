@@ -284,7 +284,7 @@ class TestRefusals:
 
     @pytest.fixture
     def nothing_renders(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        for name in ("apply", "apply_many"):
+        for name in ("apply", "_run_work"):
             monkeypatch.setattr(Renderer, name, None)
 
     @pytest.mark.parametrize(
