@@ -90,7 +90,7 @@
     THRESHOLD_ROWS(B, READS)
 
 // A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
-// the steps the distance of the tent's taps in texels of the smaller level. `taps` are the same
+// the steps the distance of the taps in texels of the image that is read. `taps` are the same
 // weights on whole texels, where a level is exactly twice as large as the one below; the
 // threshold is of a first level that starts from the image itself.
 #define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
@@ -108,9 +108,12 @@
     COMPOSITE_ROWS(B, READS, INPUT) \
     VEC4S(B, taps, 1)
 
-// The first pass of a published method, from the frame.
+// The first pass of a published method, from the frame. The steps are the distance of taps in texels
+// of the frame.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y) \
     THRESHOLD_ROWS(B, READS) \
     READS(B, highlight) \
     READS(B, clamp_max) \
@@ -186,6 +189,9 @@
     REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
     REAL(high_pass_frequency, 1.0, 0.001, 1.0) \
     REAL(scatter, 0.7, 0.0, 1.0) \
+    REAL(scale_x, 1.0, 0.0, 16.0) \
+    REAL(scale_y, 1.0, 0.0, 16.0) \
+    REAL(anamorphism, 0.0, -1.0, 1.0) \
     REAL(size, 0.5, 0.0, 1.0) \
     REAL(filter_radius, 0.005, 0.0, 1.0)
 
