@@ -643,13 +643,16 @@ class Renderer:
         settings : Settings, optional
             What the axes vary; by default ``Separable()``.
         axes : mapping of str to sequence
-            Values by settings field, or by "time" for a scene.
+            Values by settings field, or by "time" for a scene. "preset" has names of
+            `vkbloom.presets`, or "settings" a list of Settings, of any methods: these two exclude
+            each other and the argument `settings`, and the other axes change each of them.
         size : (int, int), optional
             Width and height of a scene's frames, by default (1280, 720).
         shading, time
             Of a scene, as for `render`.
         attachments : "all" or sequence of str
-            The framebuffers to keep. Their shape and dtype must be the same at all points.
+            The framebuffers to keep. Their shape must be the same at all points, and all are of
+            uint8 or all of floats, which become the largest of their dtypes.
         reduce : mapping of str to callable, optional
             Figures to keep, by name: each is called with the `Frames` of a point, and returns a
             number or a small array. `vkbloom.reductions` has ready ones. With ``attachments=()``
@@ -671,7 +674,9 @@ class Renderer:
         ------
         ValueError
             An argument is out of range; or, before anything is rendered, a framebuffer has
-            different shapes along an axis.
+            different shapes along an axis, or some point lacks it.
+        MemoryError
+            The result is larger than the memory that is left; nothing was rendered.
         TypeError
             An argument has the wrong type.
         ModuleNotFoundError
@@ -683,6 +688,19 @@ class Renderer:
         -----
         Points are visited in the order that runs the fewest passes, whatever the order of the
         axes. For grids that outgrow memory see `vkbloom.grid_to_zarr`.
+
+        Examples
+        --------
+        >>> image = np.zeros((32, 48, 3), np.float32)
+        >>> image[16, 24] = 50
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     grid = renderer.grid(
+        ...         image, axes={"preset": ["kino", "filament"], "intensity": [0.5, 1.0]}
+        ...     )
+        >>> dict(grid.sizes)
+        {'preset': 2, 'intensity': 2, 'y': 32, 'x': 48, 'channel': 3}
+        >>> grid["final"].sel(preset="kino", intensity=0.5).shape
+        (32, 48, 3)
         """
         from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
         from vkbloom.grid.plan import ask  # noqa: PLC0415
