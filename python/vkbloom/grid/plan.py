@@ -378,7 +378,7 @@ def _survey(
         found = _graph_of(grid, renderer, index)[0]
         if grid.attachments == "all" and set(found) != set(expected):
             names = tuple(sorted(set(found) ^ set(expected)))
-        for name in names:
+        for name in (name for name in names if name in expected or name in found):
             common = _common(promoted.get(name), found.get(name))
             if common is None:
                 _refuse(grid, name, (first, expected.get(name)), (index, found.get(name)))
