@@ -61,4 +61,4 @@ def _edges(count: int, point: int, scale: float) -> Array:
     reach = max(point + 0.5, count - point - 0.5) * scale
     # Rounding must not add a pixel of nothing.
     pixels = max(0, math.ceil(reach - 0.5 - 1e-9))
-    return (np.arange(-pixels, pixels + 2) - 0.5) / scale + point + 0.5
+    return np.asarray((np.arange(-pixels, pixels + 2) - 0.5) / scale + point + 0.5)
