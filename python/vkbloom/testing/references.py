@@ -62,7 +62,7 @@ class Origin:
     def summary(self) -> str:
         """All fields but the version on one line."""
         made_by = [text for text in (self.adapter, self.driver) if text]
-        return ", ".join([*(made_by or ["an unnamed adapter"]), self.cpu_vendor])
+        return ", ".join([*(made_by or ["arrays that name no adapter"]), self.cpu_vendor])
 
     @property
     def machine(self) -> tuple[str | None, str | None, str]:

@@ -207,6 +207,8 @@ class FrameRegression:
         flip: float | None = None,
         warn: float | None = None,
         allow_nan: bool = False,
+        info: Mapping[str, Any] | None = None,
+        expected_info: Mapping[str, Any] | None = None,
     ) -> None:
         """Compare frames with others of the same test, and report as `check` does.
 
@@ -218,6 +220,9 @@ class FrameRegression:
             Name in messages and the report.
         atol, rtol, fail_percent, hard_fail, ssim, flip, warn, allow_nan
             As for `check`.
+        info, expected_info : mapping of str to object, optional
+            "adapter" and "driver" that made `actual` and `expected`, for messages and the report:
+            an engine's name, or `Frames.info`. `Frames` have their own.
 
         Raises
         ------
@@ -240,9 +245,11 @@ class FrameRegression:
         if name is not None:
             check_name(name)
         given = _Given(
-            name or self._name, _images("actual", actual), _origin(actual, None), tolerances
+            name or self._name, _images("actual", actual), _origin(actual, info), tolerances
         )
-        reference = Reference(images=_images("expected", expected), origin=_origin(expected, None))
+        reference = Reference(
+            images=_images("expected", expected), origin=_origin(expected, expected_info)
+        )
         self._conclude(given, reference, judge(reference.images, given.images, tolerances), None)
 
     def _chosen_name(self, name: str | None) -> str:
@@ -378,7 +385,7 @@ def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     return images
 
 
-def _origin(frames: object, info: Mapping[str, str] | None) -> Origin:
+def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
     known: Mapping[str, Any] = info or (frames.info if isinstance(frames, Frames) else {})
     return Origin(
         adapter=known.get("adapter"),
