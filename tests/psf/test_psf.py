@@ -30,7 +30,7 @@ ALL: list[psf.PSF] = [
     psf.aperture(np.ones((8, 8))),
     psf.fog_glow(16),
     psf.unreal(KERNEL, center=(0.5, 0.5), scatter=0.5),
-    psf.measured(vkbloom.Separable(), size=(17, 16)),
+    psf.measured(vkbloom.Separable(blur_strength=0.5), size=(17, 16)),
     psf.samples([[1, 2, 3]]),
 ]
 
