@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-import typing
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Final
 
 import click
 from rich import box
@@ -25,9 +23,7 @@ from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.cli.terminal import show
 from vkbloom.io.animations import animation
-from vkbloom.settings import Shading
-
-_SHADINGS: Final = typing.get_args(Shading)
+from vkbloom.settings import SHADINGS, Shading
 
 
 @click.command()
@@ -63,7 +59,7 @@ _SHADINGS: Final = typing.get_args(Shading)
     show_default=True,
     help="Frames a second of a GIF.",
 )
-@click.option("--shading", type=click.Choice(_SHADINGS), default=_SHADINGS[0], show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @click.option(
     "--attachments",
     metavar="all|NAME,...",
