@@ -186,7 +186,7 @@ class TestStores:
             time.sleep(0.05)
         os.killpg(running.pid, signal.SIGINT)
         stdout, stderr = running.communicate()
-        assert (running.returncode, stdout, stderr) == (1, "", "\nvkbloom: interrupted\n")
+        assert (running.returncode, stdout, stderr) == (130, "", "\nvkbloom: interrupted\n")
 
     @pytest.mark.parametrize(
         ("words", "told"),
@@ -222,7 +222,8 @@ class TestStores:
         arrays = {"glow": noise(9, 12, 3, dtype="float32"), "final": load(image_file).pixels}
         file = tmp_path / "frames.exr"
         vkbloom.Frames(arrays, timings={}, settings=Separable(), info={}).save(file)
-        result = run(image_file, "-o", tmp_path / "a.zarr", "--reduce", f"psnr@{file}")
+        words = ("--axis", "exposure=0", "--reduce", f"psnr@{file}")
+        result = run(image_file, "-o", tmp_path / "a.zarr", *words)
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert "frames.exr has several parts" in result.stderr
 
@@ -379,10 +380,11 @@ class TestImageFiles:
         self, tmp_path: Path, image_file: Path, content: bytes, told: str
     ) -> None:
         out = tmp_path / "files"
-        done(image_file, "-o", out)
+        words = (image_file, "--axis", "exposure=0", "-o", out)
+        done(*words)
         (out / "grid.json").write_bytes(content)
         before = {path: path.read_bytes() for path in out.iterdir()}
-        result = run(image_file, "-o", out, "--resume")
+        result = run(*words, "--resume")
         assert result.exit_code == 1
         assert told in result.stderr
         assert {path: path.read_bytes() for path in out.iterdir()} == before
@@ -583,6 +585,7 @@ class TestOptionFiles:
 
     def test_a_flag_that_is_off(self, tmp_path: Path, image_file: Path) -> None:
         (tmp_path / "a.toml").write_text("resume = false\nraw = false\n[settings]\nbloom = false")
-        done(image_file, "--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
+        words = ("--axis", "exposure=0", "-o", tmp_path / "a.zarr")
+        done(image_file, "--from", tmp_path / "a.toml", *words)
         settings = json.loads(xr.open_zarr(tmp_path / "a.zarr").attrs["settings"])
         assert settings["bloom"] is False

@@ -96,7 +96,8 @@ def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any
     if not values:
         raise click.UsageError(f"--axis {word}: has no values; give at least one")
     # The option's own type converts each value, so that axes and options have one syntax.
-    kind = click.BOOL if annotation is bool else fields.option_type(annotation)
+    plain = {bool: click.BOOL, str: click.STRING}
+    kind = plain[annotation] if annotation in plain else fields.option_type(annotation)
     try:
         return [kind.convert(part.strip(), None, None) for part in values]
     except click.BadParameter as error:

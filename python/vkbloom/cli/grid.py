@@ -178,6 +178,7 @@ def command(
         raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
     _check_drawing("--sheet", sheet, (".png",))
     _check_drawing("--curves", curves, (".png", ".svg", ".pdf"))
+    chunks = axis_options.chunk_counts(chunk_words)
     if not axis_words and len(images) < 2:
         raise click.UsageError("nothing varies; give an --axis such as exposure=-1:1:5")
     axes = axis_options.axis_values(axis_words, settings)
@@ -213,7 +214,7 @@ def command(
                 begun,
                 axes,
                 out,
-                chunks=axis_options.chunk_counts(chunk_words),
+                chunks=chunks,
                 resume=resume,
                 on_mended=note,
                 progress=True,

@@ -110,7 +110,7 @@ def command(
                     attachments=names if index else no_bloom.with_bloom(names, settings),
                     shading=shading,
                 )
-                if index == 0 and no_bloom.is_without(frames):
+                if index == 0 and loaded.glow is not None and no_bloom.is_without(frames):
                     note(no_bloom.reason(settings))
                 shown = no_bloom.only(frames, names)
                 if add is not None:
