@@ -26,7 +26,7 @@ from . import (
 from .compositing import CompositeSettings, check_settings, composite
 from .image import Storage, as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
-from .threshold import extract, masked
+from .threshold import apply_threshold, masked
 
 __all__ = ["apply", "blur", "gain", "passes"]
 
@@ -162,7 +162,7 @@ def apply(
         glow = store.end(reduced)
         blurred = method.passes(glow, settings, (width, height), store, weights)
     else:
-        glow = store(masked(extract(reduced, settings.threshold, settings.knee), weights))
+        glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), weights))
         blurred = method.passes(glow, settings, (width, height), store)
     framebuffers = {name: _with_alpha(part) for name, part in {"glow": glow, **blurred}.items()}
     # What of the scene the bloom came of.
@@ -302,7 +302,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
     """
     method = _method(settings)
     threshold = None if method.published else settings.threshold
-    glow = float(extract(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
+    glow = float(apply_threshold(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
     return glow * (method.gain(settings, size) if method.sized else method.gain(settings))
 
 
