@@ -47,6 +47,8 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
         struct vkb_pass_row row = level ? vkb_down_row(&levels, false, from, levels.downs[level])
                                         : vkb_prefilter_row(&levels, VKB_SHADER_bevy_prefilter_frag,
                                                             from, levels.downs[level]);
+        if (level == 0)
+            vkb_mask_prefilter(&levels, &row);
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

@@ -177,6 +177,8 @@ def passes(
     settings: Settings,
     size: tuple[int, int] | None = None,
     format: str | None = None,
+    *,
+    mask: NDArray[Any] | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers that the blur makes of a glow: no threshold, no composite.
 
@@ -195,6 +197,9 @@ def passes(
     format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"}, optional
         Of the bloom buffers; by default that of the settings, and where that is None, the one
         of the glow's dtype.
+    mask : ndarray, shape (height, width), optional
+        Multiplies what passes the threshold of a published method, as in `apply`. The glow of
+        other methods has come past threshold and mask.
 
     Returns
     -------
@@ -230,7 +235,12 @@ def passes(
     has_alpha = channels == 4 and settings.alpha != "blur"
     colours = values[..., :3] if has_alpha else values
     colours = store.end(colours) if method.published else store(colours)
-    framebuffers = method.passes(colours, settings, size or (width, height), store)
+    size = size or (width, height)
+    if method.published:
+        weights = None if mask is None else as_mask(mask, size)
+        framebuffers = method.passes(colours, settings, size, store, weights)
+    else:
+        framebuffers = method.passes(colours, settings, size, store)
     if not has_alpha:
         return framebuffers
     return {name: _with_alpha(rgb) for name, rgb in framebuffers.items()}
