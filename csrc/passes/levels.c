@@ -10,7 +10,8 @@ struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coar
     struct vkb_combination combination = {
         .kernel = kernel,
         .last_kernel = kernel,
-        .radius = 1.0,
+        .radius_x = 1.0,
+        .radius_y = 1.0,
         .smallest = 1.0,
         .gain = 1.0,
     };
@@ -111,6 +112,7 @@ struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_f
     if (!firefly_filter && is_twice(levels->graph, from, to))
         row.constants.sampling = SAMPLING_TEXEL;
     row.constants.firefly_filter = firefly_filter;
+    row.params.pyramid.step_x = row.params.pyramid.step_y = 1.0f;
     return row;
 }
 
@@ -218,8 +220,9 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = own != VKB_NO_IMAGE ? own : from;
     row.read_count = 2;
-    params->step_x = params->step_y =
-        (float)(combination->radius * (combination->width_step ? smaller->width : 1));
+    const double unit = combination->width_step ? smaller->width : 1;
+    params->step_x = (float)(combination->radius_x * unit);
+    params->step_y = (float)(combination->radius_y * unit);
     if (combination->target_step) {
         params->step_x = (float)((double)smaller->width / larger->width);
         params->step_y = (float)((double)smaller->height / larger->height);

@@ -18,8 +18,8 @@ struct vkb_levels {
 // up_N-1 = smallest * down_N-1, bloom = gain * V(up_0).
 struct vkb_combination {
     enum vkb_mode kernel, last_kernel;  // U and V, of UPSAMPLE_*
-    double radius;                      // of a tent, in texels of the smaller level
-    bool width_step;                    // the radius is a share of the smaller level's width
+    double radius_x, radius_y;          // of a tent, in texels of the smaller level
+    bool width_step;                    // the radii are shares of the smaller level's width
     bool target_step;                   // instead, one texel of the larger level
     double own[MAX_LEVELS], coarse[MAX_LEVELS];
     double smallest, gain;

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NoReturn
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom.adapter import bundled_driver, from_core
+from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_image, check_size
 from vkbloom.frames import Frames
 from vkbloom.plans import Pass, Plan, framebuffers
@@ -170,6 +170,8 @@ class Renderer:
             "driver": self.info.driver_info or self.info.driver,
             "version": installed_version(),
         }
+        if self.info.bundled and (sha256 := bundled_hash()):
+            self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
 
     @property

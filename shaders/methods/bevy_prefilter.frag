@@ -19,7 +19,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 vec4 shade()
 {
-    vec4 means[5] = group_means(PLACE_IN(source));
+    vec4 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
     vec4 sum = vec4(0.0);
     for (int group = 0; group < 5; ++group) {
         vec4 part = GROUP_SHARES[group] * means[group];

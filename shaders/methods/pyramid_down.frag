@@ -44,7 +44,7 @@ vec4 shade()
 {
     if (SAMPLING == SAMPLING_TEXEL)
         return stored(halved());
-    vec4 means[5] = group_means(PLACE_IN(source));
+    vec4 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
     vec4 sum = vec4(0.0);
     float shares = 0.0;
     for (int group = 0; group < 5; ++group) {

@@ -38,6 +38,8 @@ _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
     "maximum": (0, 20),
     "filter_radius": (0, 0.05),
     "max_mip_dimension": (16, 1024),
+    "scale_x": (0, 8),
+    "scale_y": (0, 8),
     "resolution": (16, 1024),
     "levels": (1, 10),
     "loops": (1, 8),
