@@ -156,9 +156,7 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
     """
     array = image if isinstance(image, np.ndarray) else _viewed(image, name)
     if type(array) is not np.ndarray and np.ma.is_masked(array):
-        raise ValueError(
-            f"{name}: some of it is masked; fill it first, such as {name}.filled(0)"
-        )
+        raise ValueError(f"{name}: some of it is masked; fill it first, such as {name}.filled(0)")
     if array.dtype == np.float64:
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
@@ -204,7 +202,9 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
         return values / np.float32(255)
     # Not the other way round, so that NaN fails too.
     if array.dtype.kind == "f" and not (array.min() >= 0 and array.max() <= 1):
-        raise ValueError(f"mask: {_outside(array)} is out of range, 0 to 1; clip it: mask.clip(0, 1)")
+        raise ValueError(
+            f"mask: {_outside(array)} is out of range, 0 to 1; clip it: mask.clip(0, 1)"
+        )
     return values
 
 

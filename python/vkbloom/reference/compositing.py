@@ -136,7 +136,8 @@ def composite(
     if settings.dither and stored == np.uint8:
         rgb = np.floor(255 * rgb + _noise(rgb.shape[:2], settings.dither_seed)) / 255
     result = np.concatenate([rgb, store(alpha)], axis=-1)
-    return np.where(np.isfinite(image), result, image)
+    result = np.where(np.isfinite(image), result, image)
+    return result
 
 
 def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Array:
@@ -151,9 +152,7 @@ def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Arr
     return alpha
 
 
-def _blend(
-    scene: Array, bloom: Array, mode: str, intensity: float, share: float | Array
-) -> Array:
+def _blend(scene: Array, bloom: Array, mode: str, intensity: float, share: float | Array) -> Array:
     """Return scene and bloom as one image."""
     if mode == "add":
         return scene + intensity * bloom

@@ -24,7 +24,7 @@ from . import (
     urp,
 )
 from .compositing import CompositeSettings, check_settings, composite
-from .image import Storage, as_float, as_mask, finite, format_of, storage
+from .image import as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
 from .threshold import apply_threshold, masked
 
@@ -338,7 +338,9 @@ def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
     values = as_float(emission, "emission", (3, 4))
     kinds = [(part.shape, part.dtype) for part in map(np.asarray, (image, emission))]
     if kinds[0] != kinds[1]:
-        raise ValueError(f"emission must have the image's shape and dtype {kinds[0]}, not {kinds[1]}")
+        raise ValueError(
+            f"emission must have the image's shape and dtype {kinds[0]}, not {kinds[1]}"
+        )
     return values
 
 

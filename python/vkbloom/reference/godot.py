@@ -125,7 +125,9 @@ def _first(samples: Array, settings: GodotSettings) -> Array:
     blurred[..., :3] *= 2.0**settings.exposure
     if settings.threshold is not None:
         # A step where the scale is 0, which smoothstep leaves undefined.
-        t = np.clip((brightest(blurred) - settings.threshold) / max(settings.threshold_scale, 1e-6), 0, 1)
+        t = np.clip(
+            (brightest(blurred) - settings.threshold) / max(settings.threshold_scale, 1e-6), 0, 1
+        )
         blurred = blurred * np.maximum(t * t * (3 - 2 * t), settings.glow_bloom)
     blurred[..., :3] = np.minimum(blurred[..., :3], settings.luminance_cap)
     return blurred
