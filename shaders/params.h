@@ -245,8 +245,8 @@
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
 // int, and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as
 // an image of that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for
-// loops that a compiler can unroll; with FROM_IMAGE, halving reads the image itself and applies
-// the threshold. FIRST is of an engine's first level, LEVELS the number that a pass gathers.
+// loops that a compiler can unroll; with FROM_IMAGE, halving reads the image itself and applies the
+// threshold. FIRST is of an engine's first level, LEVELS the number that a pass gathers.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \

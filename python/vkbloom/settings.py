@@ -600,7 +600,7 @@ def methods() -> dict[str, type[Settings]]:
     return {kind.method: kind for kind in Settings.__subclasses__()}
 
 
-def check_shading(shading: Shading) -> Shading:
+def check_shading(shading: str) -> Shading:
     """Return the shading; raise ValueError if there is no shading of that name."""
     if shading not in SHADINGS:
         raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")

@@ -136,8 +136,8 @@ def composite(
     if settings.dither and stored == np.uint8:
         rgb = np.floor(255 * rgb + _noise(rgb.shape[:2], settings.dither_seed)) / 255
     result = np.concatenate([rgb, store(alpha)], axis=-1)
-    result = np.where(np.isfinite(image), result, image)
-    return result
+    kept: Array = np.where(np.isfinite(image), result, image)
+    return kept
 
 
 def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Array:

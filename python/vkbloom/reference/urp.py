@@ -106,7 +106,8 @@ def _prefilter(rgb: Array, settings: UrpSettings) -> Array:
     if settings.threshold is not None:
         half_width = settings.threshold * settings.knee
         kept = soften(kept, settings.threshold, half_width, 4 * half_width + 1e-4, 1e-4)
-    return np.maximum(kept, 0)
+    positive: Array = np.maximum(kept, 0)
+    return positive
 
 
 def _taps(step: float) -> list[tuple[float, float]]:
