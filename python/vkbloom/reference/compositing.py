@@ -144,7 +144,8 @@ def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Arr
     """Return the alpha of the final image, (H, W, 1), or (H, W, 0) where the scene has none."""
     if settings.alpha == "max":
         brightest = settings.intensity * bloom[..., :3].max(axis=-1, keepdims=True)
-        return np.maximum(alpha, np.clip(brightest, 0, 1))
+        larger: Array = np.maximum(alpha, np.clip(brightest, 0, 1))
+        return larger
     if settings.alpha == "blur":
         if bloom.shape[2] == 3:
             raise ValueError('bloom must have 4 channels where settings.alpha is "blur", not 3')
