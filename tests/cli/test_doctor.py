@@ -43,12 +43,10 @@ def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
 @pytest.fixture(scope="module")
 def lavapipe() -> Path:
     """Return the manifest of lavapipe."""
-    (manifest,) = (
-        Path(finding.found.partition(":")[0])
-        for finding in drivers.examine(None)
-        if finding.topic.startswith("driver lvp")
-    )
-    return manifest
+    for finding in drivers.examine(None):
+        if finding.topic.startswith("driver lvp"):
+            return Path(finding.found.partition(":")[0])
+    pytest.skip("no manifest of lavapipe is here")
 
 
 @pytest.fixture
@@ -425,9 +423,8 @@ def test_a_question_that_fails_is_answered() -> None:
 
 
 @pytest.fixture(scope="module")
-def frames() -> vkbloom.Frames:
-    with vkbloom.Renderer("software") as renderer:
-        return trial.render(renderer)
+def frames(renderer: vkbloom.Renderer) -> vkbloom.Frames:
+    return trial.render(renderer)
 
 
 def test_a_right_render_has_no_differences(frames: vkbloom.Frames) -> None:
@@ -468,7 +465,7 @@ def test_nan_is_found(frames: vkbloom.Frames) -> None:
 def test_the_cache_of_a_render_is_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
     assert installation.cache([]) == Finding("pipeline cache", "ok", f"{tmp_path}; no file yet")
-    with vkbloom.Renderer("software") as renderer:
+    with vkbloom.Renderer() as renderer:
         trial.render(renderer)
     (file,) = tmp_path.iterdir()
     uuid = file.stem.removeprefix("pipelines-")

@@ -30,7 +30,7 @@ from vkbloom import (
 Array = NDArray[Any]
 
 # (width, height): odd, even, tall, wide, smaller than the chains are long.
-SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (333, 217)]
+SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (211, 157)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 PUBLISHED = sorted(set(presets) - {"tutorial", "outline", "deferred"})
 
