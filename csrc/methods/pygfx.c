@@ -36,7 +36,7 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
             return false;
     }
     combination.last_kernel = UPSAMPLE_LINEAR;
-    combination.radius = settings->values.filter_radius;
+    combination.radius_x = combination.radius_y = settings->values.filter_radius;
     combination.width_step = true;
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }

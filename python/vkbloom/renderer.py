@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NoReturn
 import numpy as np
 
 from vkbloom import _core, requests
-from vkbloom.adapter import bundled_driver, from_core
+from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_image, check_size
 from vkbloom.frames import Frames
 from vkbloom.plans import Pass, Plan, framebuffers
@@ -152,14 +152,14 @@ class Renderer:
             raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        forms = os.environ.get("VKBLOOM_FORM") or "auto"
+        variants = os.environ.get("VKBLOOM_FORM") or "auto"
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(
             adapter,
             bundled_driver(),
             bool(validation),
-            forms,
+            variants,
             _frame_seconds(),
             pipeline_cache.read,
         )
@@ -170,6 +170,8 @@ class Renderer:
             "driver": self.info.driver_info or self.info.driver,
             "version": installed_version(),
         }
+        if self.info.bundled and (sha256 := bundled_hash()):
+            self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
 
     @property

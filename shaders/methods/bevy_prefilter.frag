@@ -18,7 +18,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 vec4 shade()
 {
-    vec3 means[5] = group_means(PLACE_IN(source));
+    vec3 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
     vec3 sum = vec3(0.0);
     for (int group = 0; group < 5; ++group) {
         vec3 part = GROUP_SHARES[group] * means[group];

@@ -17,7 +17,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 vec4 shade()
 {
-    vec3 means[5] = group_means(PLACE_IN(source));
+    vec3 means[5] = group_means(PLACE_IN(source), vec2(1.0));
     vec3 sum = vec3(0.0);
     float shares = 0.0;
     for (int group = 0; group < 5; ++group) {

@@ -42,9 +42,9 @@ vec3 halved()
 
 vec4 shade()
 {
-    if (SAMPLING == SAMPLING_WHOLE)
+    if (SAMPLING == SAMPLING_TEXEL)
         return vec4(storable(halved()), 1.0);
-    vec3 means[5] = group_means(PLACE_IN(source));
+    vec3 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
     vec3 sum = vec3(0.0);
     float shares = 0.0;
     for (int group = 0; group < 5; ++group) {

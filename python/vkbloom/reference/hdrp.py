@@ -33,6 +33,8 @@ class HdrpSettings(Protocol):
     def scatter(self) -> float: ...
     @property
     def high_quality_filtering(self) -> bool: ...
+    @property
+    def anamorphism(self) -> float: ...
 
 
 def passes(
@@ -40,7 +42,8 @@ def passes(
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    Level k is the frame's size / 2^(k + 1), rounded, halves to even. Five taps of the frame,
+    Level k is the frame's size / 2^(k + 1), rounded, halves to even; an anamorphism a below 0
+    multiplies the width by 1 + a / 2, one above 0 the height by 1 - a / 2. Five taps of the frame,
     weighted by 1 / (1 + luminance), go into an image of the size of down_0, which is that image
     blurred; each further level is the one above it, bilinear at positions one pixel of the level
     apart, blurred. The blur is the binomial of order 8 along each axis. On the way up the smaller
@@ -69,8 +72,10 @@ def passes(
     """
     height, width, _ = glow.shape
     count = min(max(math.floor(math.log2(max(width, height)) - 2), 1), 16)
+    across = width * (1 + min(settings.anamorphism, 0) / 2)
+    down = height * (1 - max(settings.anamorphism, 0) / 2)
     sizes = [
-        (max(1, round(width / 2 ** (k + 1))), max(1, round(height / 2 ** (k + 1))))
+        (max(1, round(across / 2 ** (k + 1))), max(1, round(down / 2 ** (k + 1))))
         for k in range(count)
     ]
     reduced = store(_prefilter(glow, sizes[0]))

@@ -111,15 +111,26 @@ def gain(settings: PyramidSettings, size: tuple[int, int]) -> float:
     return sum(settings.level_weights[: len(level_sizes(size, settings.levels))])
 
 
-def groups(image: Array, size: tuple[int, int]) -> Iterator[tuple[float, Array]]:
-    """Yield the share and the mean of each of the five groups of taps, (height, width, C)."""
+def groups(
+    image: Array, size: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)
+) -> Iterator[tuple[float, Array]]:
+    """Yield the share and the mean of each of the five groups of taps, (height, width, C).
+
+    `scale` multiplies the taps' distances along x and y.
+    """
     for share, x_offsets, y_offsets in _GROUPS:
-        x_taps, y_taps = ([(x, 0.5) for x in offsets] for offsets in (x_offsets, y_offsets))
+        x_taps = [(scale[0] * x, 0.5) for x in x_offsets]
+        y_taps = [(scale[1] * y, 0.5) for y in y_offsets]
         yield share, sample(image, size, x_taps, y_taps)
 
 
-def downsample(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:
-    """Read the 13 taps around each pixel of a smaller image.
+def downsample(
+    image: Array,
+    size: tuple[int, int],
+    firefly_filter: bool,
+    scale: tuple[float, float] = (1.0, 1.0),
+) -> Array:
+    """Read the 13 taps around each pixel of a smaller image, at `scale` times their distances.
 
     With `firefly_filter` the share of each group is multiplied by 1 / (1 + luminance of the
     group's mean), and the shares are divided by their sum. A negative luminance counts as 0.
@@ -130,7 +141,7 @@ def downsample(image: Array, size: tuple[int, int], firefly_filter: bool) -> Arr
         )
     total = np.zeros((size[1], size[0], image.shape[2]))
     shares = np.zeros((size[1], size[0], 1))
-    for group_share, mean in groups(image, size):
+    for group_share, mean in groups(image, size, scale):
         share = np.full((size[1], size[0], 1), group_share)
         if firefly_filter:
             grey = mean if image.shape[2] == 1 else luminance(mean)
