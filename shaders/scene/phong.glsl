@@ -2,9 +2,9 @@
 // pass. All vectors are in view space, and the normal has length 1.
 
 const vec3 LIGHT_POSITION = vec3(-5.0, -5.0, 0.0);
-// A colour with a channel of at least 0.9 is a lamp, and gets ambient light. 0.9 is rounded to a half
-// float, which is what the G-buffer holds of it. What GPUs interpolate between three vertices of 0.9
-// may be a little less than that, but not less than this.
+// A colour with a channel of at least 0.9 is a lamp, and gets ambient light. The limit is the half
+// float nearest to 0.9: the G-buffer holds this value for 0.9, and an interpolated 0.9 may be lower
+// by the rounding of the interpolation.
 const float LAMP = 0.89990234375;
 
 vec3 phong(vec3 colour, vec3 n, vec3 position)
