@@ -395,8 +395,10 @@ def test_an_anamorphic_bloom_is_stretched(
     assert (across / down if stretched == "x" else down / across) > 1.5
 
 
-@pytest.mark.parametrize("size", [(800, 450), (800, 449), (799, 450)])
-@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize(
+    ("size", "smooth"),
+    [((800, 450), True), ((800, 450), False), ((800, 449), True), ((799, 450), True)],
+)
 def test_hdrps_cubic_filter_is_for_larger_frames(
     renderer: Renderer, size: tuple[int, int], smooth: bool
 ) -> None:
