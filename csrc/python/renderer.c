@@ -366,13 +366,17 @@ static PyMethodDef methods[] = {
      "plan(source, settings, names) -> Plan. Without a wait, without the device; None: all "
      "framebuffers."},
     {"run", vkb_renderer_run, METH_VARARGS,
-     "run(source, plans, arrays) -> Submission. Hands plans with the same images to the device; "
-     "arrays holds a tuple for each plan, in the order of its outputs."},
+     "run(source, plans, arrays[, first, count]) -> Submission. Hands plans with the same images "
+     "to "
+     "the device; arrays holds a tuple for each plan, in the order of its outputs, or for rows "
+     "first to first + count of each."},
     {"upload", vkb_renderer_upload, METH_VARARGS,
-     "upload(source, spare, recycled) -> Source. A copy of an image on the device. `spare`: None, "
-     "or "
-     "such a source that nobody needs any more, whose memory it takes; `recycled`: it will be "
-     "one."},
+     "upload(source, spare, recycled, height=0) -> Source. A copy of an image on the device. "
+     "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "
+     "`recycled`: it will be one; `height`: rows in all, where `fill` gives it more."},
+    {"fill", vkb_renderer_fill, METH_VARARGS,
+     "fill(source, rows, first). Gives an uploaded image rows of an image in host memory, from row "
+     "`first` on, before anything uses it."},
     {"pages", vkb_new_pages, METH_O,
      "pages(size) -> Pages. Memory for an array, used again when the array is gone."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},

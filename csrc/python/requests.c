@@ -118,8 +118,15 @@ int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, voi
     return 0;
 }
 
+// Rows of the outputs to read back.
+struct rows {
+    uint32_t first, count;
+};
+
+// `rows` may be NULL: all of them.
 static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                       const struct vkb_plan *plan, uint32_t output, PyObject *array)
+                       const struct vkb_plan *plan, uint32_t output, const struct rows *rows,
+                       PyObject *array)
 {
     const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
     Py_buffer *view = &pending->views[pending->view_count];
@@ -127,6 +134,8 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
     if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
         return false;
     pending->outputs[pending->view_count++] = (struct vkb_output){
+        .first_row = rows ? rows->first : 0,
+        .row_count = rows ? rows->count : row->height,
         .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
         .memory = view->buf,
         // (Whoever keeps many arrays shall not pay for each small one.)
@@ -134,14 +143,21 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
                    ? vkb_pages_find(renderer->pages, view->buf)
                    : NULL,
     };
-    if ((size_t)view->len == vkb_output_size(plan, output))
+    if (rows
+        && (rows->count == 0 || rows->first >= row->height
+            || rows->count > row->height - rows->first)) {
+        PyErr_Format(PyExc_ValueError, "%s: it does not have those rows", row->name);
+        return false;
+    }
+    const size_t size = vkb_output_size(plan, output);
+    if ((size_t)view->len == (rows ? size / row->height * rows->count : size))
         return true;
     PyErr_Format(PyExc_ValueError, "%s: the array has the wrong size", row->name);
     return false;
 }
 
 static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                        PyObject *arrays)
+                        const struct rows *rows, PyObject *arrays)
 {
     size_t passes = 0;
 
@@ -162,7 +178,7 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
             return false;
         }
         for (uint32_t output = 0; output < plan->output_count; ++output)
-            if (!hold_array(renderer, pending, plan, output, PyTuple_GetItem(tuple, output)))
+            if (!hold_array(renderer, pending, plan, output, rows, PyTuple_GetItem(tuple, output)))
                 return false;
         ++pending->count;
     }
@@ -170,7 +186,7 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
 }
 
 static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *source,
-                                         PyObject *plans, PyObject *arrays)
+                                         PyObject *plans, const struct rows *rows, PyObject *arrays)
 {
     struct vkb_module_state *state = state_of((PyObject *)renderer);
     PyTypeObject *type = (PyTypeObject *)state->submission_type;
@@ -184,7 +200,7 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
     self->pending = new_pending(source, plans, &error);
     if (!self->pending)
         vkb_raise(state, &error);
-    else if (hold_arrays(renderer, self->pending, arrays))
+    else if (hold_arrays(renderer, self->pending, rows, arrays))
         return self;
     Py_DECREF(self);
     return NULL;
@@ -193,11 +209,14 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
 static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object *source,
                    struct vkb_pending *pending, struct vkb_error *error)
 {
-    const struct vkb_frame_source data = {
+    struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
-        .input = source->image.held ? &source->image.input : NULL,
         .resident = source->resident,
     };
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (source->images[kind].held)
+            data.inputs[kind] = &source->images[kind].input;
 
     if (!vkb_renderer_enter(renderer, error))
         return false;
@@ -216,14 +235,17 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     struct vkb_module_state *state = state_of(object);
     PyObject *source, *plans, *arrays;
+    struct rows rows = {0};
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!O!O!:run", state->source_type, &source, &PyTuple_Type,
-                          &plans, &PyTuple_Type, &arrays)
+    if (!PyArg_ParseTuple(arguments, "O!O!O!|O&O&:run", state->source_type, &source, &PyTuple_Type,
+                          &plans, &PyTuple_Type, &arrays, vkb_read_uint32, &rows.first,
+                          vkb_read_uint32, &rows.count)
         || !vkb_check_source(renderer, (struct vkb_source_object *)source)
         || !check_plans(renderer, &((struct vkb_source_object *)source)->source, plans, arrays))
         return NULL;
-    struct submission *self = new_submission(renderer, source, plans, arrays);
+    struct submission *self =
+        new_submission(renderer, source, plans, PyTuple_Size(arguments) > 3 ? &rows : NULL, arrays);
     if (self && !submit(renderer, (struct vkb_source_object *)source, self->pending, &error)) {
         // Also with an exception set, which is kept: whoever hears of the arrays' end is Python.
         vkb_raise(state, &error);

@@ -11,23 +11,51 @@ static struct vkb_source_object *new_source(PyObject *module)
     return (struct vkb_source_object *)allocate(type, 0);
 }
 
-PyObject *vkb_image_source(PyObject *module, PyObject *array)
+// Whether what accompanies the image fits it; one that is not there does.
+static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind kind)
 {
-    struct vkb_source_object *self = new_source(module);
+    const struct vkb_input *image = &self->images[VKB_INPUT_IMAGE].input;
+    const struct vkb_input *other = &self->images[kind].input;
 
+    if (!self->images[kind].held
+        || (other->width == image->width && other->height == image->height
+            && (kind == VKB_INPUT_MASK
+                || (other->format == image->format && other->channels == image->channels))))
+        return true;
+    if (kind == VKB_INPUT_MASK)
+        PyErr_SetString(PyExc_ValueError, "mask: it does not have the image's size");
+    else
+        PyErr_SetString(PyExc_ValueError, "emission: it does not have the image's shape and dtype");
+    return false;
+}
+
+PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
+{
+    PyObject *image, *emission = Py_None, *mask = Py_None;
+
+    if (!PyArg_ParseTuple(arguments, "O|OO:image_source", &image, &emission, &mask))
+        return NULL;
+    struct vkb_source_object *self = new_source(module);
     if (!self)
         return NULL;
-    if (!vkb_read_image(array, &self->image)) {
+    if (!vkb_read_image(image, "image", &self->images[VKB_INPUT_IMAGE])
+        || (emission != Py_None
+            && !vkb_read_image(emission, "emission", &self->images[VKB_INPUT_EMISSION]))
+        || (mask != Py_None && !vkb_read_mask(mask, &self->images[VKB_INPUT_MASK]))
+        || !fits_image(self, VKB_INPUT_EMISSION) || !fits_image(self, VKB_INPUT_MASK)) {
         Py_DECREF(self);
         return NULL;
     }
+    const struct vkb_input *input = &self->images[VKB_INPUT_IMAGE].input;
     self->source = (struct vkb_source){
         .kind = VKB_SOURCE_IMAGE,
         .image =
             {
-                .format = self->image.input.format,
-                .size = {self->image.input.width, self->image.input.height},
-                .channels = self->image.input.channels,
+                .format = input->format,
+                .size = {input->width, input->height},
+                .channels = input->channels,
+                .has_emission = emission != Py_None,
+                .has_mask = mask != Py_None,
             },
     };
     return (PyObject *)self;
@@ -99,14 +127,33 @@ static struct vkb_resident *take_resident(struct vkb_renderer *renderer, PyObjec
     return resident;
 }
 
+// Begins images of `height` rows, unless that is 0, and fills them from row `first` on.
+static bool stage_all(struct vkb_renderer *renderer, struct vkb_resident *resident,
+                      const struct vkb_source_object *source, uint32_t height, uint32_t first,
+                      struct vkb_error *error)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        struct vkb_input complete = source->images[kind].input;
+        complete.height = height;
+        if (source->images[kind].held
+            && ((height > 0
+                 && !vkb_resident_begin(&renderer->device, resident, kind, &complete,
+                                        &renderer->frame.cache.clock, error))
+                || !vkb_resident_fill(&renderer->device, resident, kind,
+                                      &source->images[kind].input, first, error)))
+            return false;
+    }
+    return true;
+}
+
 static bool stage(struct vkb_renderer *renderer, struct vkb_resident *resident,
-                  const struct vkb_input *input, struct vkb_error *error)
+                  const struct vkb_source_object *source, uint32_t height, uint32_t first,
+                  struct vkb_error *error)
 {
     if (!vkb_renderer_enter(renderer, error))
         return false;
     const bool done = vkb_require_open(renderer, error)
-                   && vkb_resident_stage(&renderer->device, resident, input,
-                                         &renderer->frame.cache.clock, error);
+                   && stage_all(renderer, resident, source, height, first, error);
     const bool silent = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return silent;
@@ -119,12 +166,15 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
     PyTypeObject *type = (PyTypeObject *)state->source_type;
     PyObject *given, *spare;
     int recycled;
+    uint32_t height = 0;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!Op:upload", type, &given, &spare, &recycled))
+    if (!PyArg_ParseTuple(arguments, "O!Op|O&:upload", type, &given, &spare, &recycled,
+                          vkb_read_uint32, &height))
         return NULL;
     const struct vkb_source_object *source = (struct vkb_source_object *)given;
-    if (!source->image.held || (spare != Py_None && !PyObject_TypeCheck(spare, type))) {
+    if (!source->images[VKB_INPUT_IMAGE].held
+        || (spare != Py_None && !PyObject_TypeCheck(spare, type))) {
         PyErr_SetString(PyExc_ValueError, "upload: an image in host memory is needed");
         return NULL;
     }
@@ -134,13 +184,16 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
     struct vkb_source_object *self = (struct vkb_source_object *)allocate(type, 0);
     if (!self)
         return NULL;
+    if (height < source->source.image.size.height)
+        height = source->source.image.size.height;
     self->residents = renderer->residents;
     self->process = renderer->process;
     self->resident = take_resident(renderer, spare, &error);
     if (self->resident) {
         self->resident->recycled = recycled;
-        if (stage(renderer, self->resident, &source->image.input, &error)) {
+        if (stage(renderer, self->resident, source, height, 0, &error)) {
             self->source = source->source;
+            self->source.image.size.height = height;
             return (PyObject *)self;
         }
     }
@@ -148,13 +201,50 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
     return vkb_raise(state, &error);
 }
 
+// Whether the rows go into the resident images from row `first` on.
+static bool check_rows(const struct vkb_source_object *source, const struct vkb_source_object *rows,
+                       uint32_t first)
+{
+    const struct vkb_image_source *image = &source->source.image, *part = &rows->source.image;
+
+    if (source->resident && source->resident->uses == 0 && rows->images[VKB_INPUT_IMAGE].held
+        && part->format == image->format && part->channels == image->channels
+        && part->has_emission == image->has_emission && part->has_mask == image->has_mask
+        && part->size.width == image->size.width && first <= image->size.height
+        && part->size.height <= image->size.height - first)
+        return true;
+    PyErr_SetString(PyExc_ValueError, "fill: the rows do not go into the image");
+    return false;
+}
+
+PyObject *vkb_renderer_fill(PyObject *object, PyObject *arguments)
+{
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    PyObject *given, *rows;
+    uint32_t first;
+    struct vkb_error error = {0};
+
+    if (!PyArg_ParseTuple(arguments, "O!O!O&:fill", state->source_type, &given, state->source_type,
+                          &rows, vkb_read_uint32, &first))
+        return NULL;
+    const struct vkb_source_object *source = (struct vkb_source_object *)given;
+    const struct vkb_source_object *held = (struct vkb_source_object *)rows;
+    if (!vkb_check_source(renderer, source) || !check_rows(source, held, first))
+        return NULL;
+    if (!stage(renderer, source->resident, held, 0, first, &error))
+        return vkb_raise(state, &error);
+    return Py_NewRef(Py_None);
+}
+
 static int traverse(PyObject *object, visitproc visit, void *arg)
 {
     struct vkb_source_object *self = (struct vkb_source_object *)object;
 
     Py_VISIT(Py_TYPE(object));
-    if (self->image.held)
-        Py_VISIT(self->image.view.obj);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (self->images[kind].held)
+            Py_VISIT(self->images[kind].view.obj);
     for (size_t i = 0; i < self->scene.view_count; ++i)
         Py_VISIT(self->scene.views[i].obj);
     return 0;
@@ -167,7 +257,8 @@ static int clear(PyObject *object)
 
     self->source = (struct vkb_source){0};
     vkb_release_scene(&self->scene);
-    vkb_release_image(&self->image);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        vkb_release_image(&self->images[kind]);
     // A submission that uses it has this object, and is released first. A forked process keeps its
     // copy: the device is its parent's.
     if (self->resident && self->resident->uses > 0)

@@ -15,7 +15,8 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
     vkb_submissions_destroy(device, &frame->submissions);
     vkb_image_cache_destroy(device, &frame->cache);
-    vkb_upload_destroy(device, &frame->upload);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        vkb_upload_destroy(device, &frame->uploads[kind]);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
     vkb_planner_destroy(&frame->planner);
@@ -70,7 +71,7 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
         for (uint32_t output = 0; output < plan->output_count; ++output) {
             const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
             if (!vkb_readback_plan(run->device, &submission->readback, row->format, row->width,
-                                   row->height, &requests[i].outputs[output], error))
+                                   &requests[i].outputs[output], error))
                 return false;
         }
     }
@@ -95,8 +96,8 @@ static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error
     struct vkb_image_cache *cache = &run->frame->cache;
     struct vkb_cached_image *cached;
 
-    if (row->input && run->input) {
-        set_cached(run, image, run->input);
+    if (run->inputs[row->input]) {
+        set_cached(run, image, run->inputs[row->input]);
         return true;
     }
     if ((vkb_image_cache_replaces(cache, row)
@@ -125,48 +126,70 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
-static void use_resident(struct vkb_run *run, struct vkb_resident *resident)
+// Stages an image and finds out whether the device has it already.
+static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
+                        const struct vkb_input *input, struct vkb_error *error)
 {
-    run->input = &resident->cached;
-    run->upload = &resident->upload;
-    run->send_input = resident->staged;
-}
-
-// Stages the image and finds out whether the device has it already.
-static bool stage_input(struct vkb_run *run, const struct vkb_input *input, struct vkb_error *error)
-{
+    struct vkb_cached_image *image = run->inputs[kind];
+    struct vkb_upload *upload = &run->frame->uploads[kind];
     bool changed;
 
-    for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (run->graph->images[i].input) {
-            if (!resolve(run, i, error))
-                return false;
-            run->input = run->images[i];
-        }
-    run->upload = &run->frame->upload;
+    run->uploads[kind] = upload;
+
     // An image that its last writing did not reach holds nothing to compare with.
-    if (run->input->image.mapped && !run->input->content.valid)
-        vkb_upload_forget(&run->frame->upload);
-    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->submissions, input,
-                          &run->input->image, &changed, error))
+    if (image->image.mapped && !image->content.valid)
+        vkb_upload_forget(upload);
+    if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, input, &image->image,
+                          &changed, error))
         return false;
-    run->send_input = changed || !run->input->content.valid;
-    return !run->send_input
-        || vkb_content_begin_writing(&run->input->content, &run->frame->cache.clock, NULL, 0,
-                                     error);
+    run->send_input[kind] = changed || !image->content.valid;
+    return !run->send_input[kind]
+        || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
 }
 
-static void record_input(struct vkb_run *run)
+static bool stage_inputs(struct vkb_run *run, const struct vkb_frame_source *source,
+                         struct vkb_error *error)
 {
-    if (!run->input->image.mapped)
-        vkb_upload_record(run->device, run->submission->commands.buffer, run->upload,
-                          &run->input->image);
-    run->input->content.valid = true;
+    for (uint32_t i = 0; i < run->graph->image_count; ++i) {
+        const enum vkb_input_kind kind = run->graph->images[i].input;
+        if (kind == VKB_INPUT_NONE)
+            continue;
+        if (source->resident) {
+            run->inputs[kind] = &source->resident->inputs[kind].cached;
+            run->uploads[kind] = &source->resident->inputs[kind].upload;
+            run->send_input[kind] = source->resident->staged;
+        }
+        if (!resolve(run, i, error))
+            return false;
+        run->inputs[kind] = run->images[i];
+        if (!source->resident && !stage_input(run, kind, source->inputs[kind], error))
+            return false;
+    }
+    return true;
 }
 
+static void record_inputs(struct vkb_run *run)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        struct vkb_cached_image *image = run->inputs[kind];
+        if (!run->send_input[kind])
+            continue;
+        if (!image->image.mapped)
+            vkb_upload_record(run->device, run->submission->commands.buffer, run->uploads[kind],
+                              &image->image);
+        image->content.valid = true;
+    }
+}
+
+// That of the scene, or of the input that was written last.
 static uint64_t source_version(const struct vkb_run *run)
 {
-    return run->input ? run->input->content.version : run->frame->scene.serial;
+    uint64_t version = 0;
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind] && run->inputs[kind]->content.version > version)
+            version = run->inputs[kind]->content.version;
+    return version ? version : run->frame->scene.serial;
 }
 
 // `next` is the request after it, NULL after the last.
@@ -190,8 +213,9 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     request->first_span = submission->timer.span_count;
     for (uint32_t i = 0; i < graph->image_count; ++i)
         set_cached(run, i,
-                   graph->images[i].input ? run->input
-                                          : vkb_image_cache_find(&frame->cache, &graph->images[i]));
+                   graph->images[i].input != VKB_INPUT_NONE
+                       ? run->inputs[graph->images[i].input]
+                       : vkb_image_cache_find(&frame->cache, &graph->images[i]));
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i)
@@ -215,8 +239,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
-    if (run->send_input)
-        record_input(run);
+    record_inputs(run);
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
                             error))
@@ -230,11 +253,8 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
                    struct vkb_request *requests, uint32_t request_count, struct vkb_error *error)
 {
     run->graph = &requests[0].plan->graph;
-    if (source->resident)
-        use_resident(run, source->resident);
     return (!source->scene || load_scene(run, source->scene, error))
-        && (!source->input || stage_input(run, source->input, error))
-        && reserve(run, requests, request_count, error)
+        && stage_inputs(run, source, error) && reserve(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }
 
@@ -291,9 +311,11 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     struct vkb_run run = {.device = device, .frame = frame};
     // All requests have the same images.
     const uint32_t image_count = requests[0].plan->graph.image_count;
-    const enum vkb_access access =
-        source->resident ? source->resident->cached.image.access : VKB_ACCESS_NONE;
+    enum vkb_access accesses[VKB_INPUT_COUNT];
     bool done;
+
+    for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
+        accesses[kind] = source->resident->inputs[kind].cached.image.access;
 
     if (!renew(device, frame, error)
         || !vkb_submissions_take(device, &frame->submissions, &run.submission, error))
@@ -312,8 +334,8 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
             source->resident->staged = false;
     } else {
         // What was recorded of it does not run.
-        if (source->resident)
-            source->resident->cached.image.access = access;
+        for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
+            source->resident->inputs[kind].cached.image.access = accesses[kind];
         fail_frame(device, frame, run.submission, error);
         vkb_submissions_give_back(device, &frame->submissions, run.submission);
     }
@@ -370,9 +392,14 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
 struct vkb_specials vkb_frame_specials(const struct vkb_frame *frame,
                                        const struct vkb_frame_source *source)
 {
-    return source->resident ? source->resident->specials
-         : source->input    ? frame->upload.specials
-                            : (struct vkb_specials){0};
+    struct vkb_specials sum = {0};
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        const struct vkb_upload *upload = &frame->uploads[kind];
+        sum.nan += source->inputs[kind] ? upload->specials.nan : 0;
+        sum.inf += source->inputs[kind] ? upload->specials.inf : 0;
+    }
+    return source->resident ? source->resident->specials : sum;
 }
 
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,

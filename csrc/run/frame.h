@@ -16,7 +16,7 @@ struct vkb_frame {
     struct vkb_submissions submissions;
     struct vkb_pipelines pipelines;
     struct vkb_scene scene;
-    struct vkb_upload upload;
+    struct vkb_upload uploads[VKB_INPUT_COUNT];  // by kind
     struct vkb_image_cache cache;
     struct vkb_planner planner;
     uint64_t submitted;  // submissions so far
@@ -26,8 +26,8 @@ struct vkb_frame {
 // What graphs start from; what they do not use is NULL.
 struct vkb_frame_source {
     const struct vkb_scene_data *scene;
-    const struct vkb_input *input;
-    struct vkb_resident *resident;
+    const struct vkb_input *inputs[VKB_INPUT_COUNT];  // by kind
+    struct vkb_resident *resident;                    // in place of them
 };
 
 struct vkb_timing {

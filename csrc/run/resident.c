@@ -19,8 +19,10 @@ static void destroy_images(const struct vkb_device *device, struct vkb_resident 
 {
     const struct vkb_messages *before = vkb_messages_begin(&device->messages);
 
-    vkb_image_destroy(device, &resident->cached.image);
-    vkb_upload_destroy(device, &resident->upload);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        vkb_image_destroy(device, &resident->inputs[kind].cached.image);
+        vkb_upload_destroy(device, &resident->inputs[kind].upload);
+    }
     vkb_messages_end(before);
 }
 
@@ -78,41 +80,51 @@ void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *
     --resident->uses;
     if (resident->uses == 0 && !resident->staged && !resident->recycled && residents->device) {
         const struct vkb_messages *before = vkb_messages_begin(&residents->device->messages);
-        vkb_upload_destroy(residents->device, &resident->upload);
+        for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+            vkb_upload_destroy(residents->device, &resident->inputs[kind].upload);
         vkb_messages_end(before);
     }
 }
 
-bool vkb_resident_stage(struct vkb_device *device, struct vkb_resident *resident,
-                        const struct vkb_input *input, uint64_t *clock, struct vkb_error *error)
+bool vkb_resident_begin(struct vkb_device *device, struct vkb_resident *resident,
+                        enum vkb_input_kind kind, const struct vkb_input *input, uint64_t *clock,
+                        struct vkb_error *error)
 {
     const struct vkb_image_row row = {
         .name = "image",
         .format = input->format,
         .width = input->width,
         .height = input->height,
-        .input = true,
+        .input = kind,
     };
-    struct vkb_image *image = &resident->cached.image;
-    bool changed;
+    struct vkb_cached_image *cached = &resident->inputs[kind].cached;
 
     if (!vkb_check_size(row.name, row.width, row.height, device->max_side, error)
         || !vkb_image_row_check(device, &row, error))
         return false;
-    if (!vkb_image_fits(image, &row)) {
-        vkb_image_destroy(device, image);
-        if (!vkb_image_create_row(device, &row, image, error))
+    if (!vkb_image_fits(&cached->image, &row)) {
+        vkb_image_destroy(device, &cached->image);
+        if (!vkb_image_create_row(device, &row, &cached->image, error))
             return false;
     }
-    vkb_upload_forget(&resident->upload);
-    if (!vkb_upload_stage(device, &resident->upload, NULL, input, image, &changed, error))
+    if (!vkb_upload_begin(device, &resident->inputs[kind].upload, input, &cached->image, error))
         return false;
-    resident->specials = resident->upload.specials;
-    resident->staged = !image->mapped;
-    resident->cached.content.version = ++*clock;
-    resident->cached.content.valid = true;
-    // What was packed for mapped memory is there; nothing compares it.
-    if (image->mapped && !resident->recycled)
-        vkb_upload_destroy(device, &resident->upload);
+    resident->staged = !cached->image.mapped;
+    cached->content.version = ++*clock;
+    cached->content.valid = true;
+    return true;
+}
+
+bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
+                       enum vkb_input_kind kind, const struct vkb_input *input, uint32_t first,
+                       struct vkb_error *error)
+{
+    if (!vkb_upload_rows(device, &resident->inputs[kind].upload, input, first, error))
+        return false;
+    resident->specials = (struct vkb_specials){0};
+    for (int i = 0; i < VKB_INPUT_COUNT; ++i) {
+        resident->specials.nan += resident->inputs[i].upload.specials.nan;
+        resident->specials.inf += resident->inputs[i].upload.specials.inf;
+    }
     return true;
 }

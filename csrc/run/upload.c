@@ -40,12 +40,20 @@ static inline void pack_rgb(unsigned char *to, const unsigned char *from, uint32
 static inline void pack_strided(unsigned char *to, const unsigned char *from,
                                 const struct vkb_input *input, const void *one, size_t size)
 {
-    for (uint32_t x = 0; x < input->width; ++x, to += 4 * size, from += input->pixel_stride) {
+    const size_t pixel_size = vkb_pixel_size(input->format);
+
+    for (uint32_t x = 0; x < input->width; ++x, to += pixel_size, from += input->pixel_stride) {
         for (uint32_t channel = 0; channel < input->channels; ++channel)
             memcpy(to + channel * size, from + channel * input->channel_stride, size);
         if (input->channels == 3)
             memcpy(to + 3 * size, one, size);
     }
+}
+
+// Whether the input has all channels of its format, which RGB has not.
+static bool is_complete(const struct vkb_input *input)
+{
+    return input->channels == vkb_formats[input->format].channels;
 }
 
 static bool is_contiguous(const struct vkb_input *input)
@@ -66,7 +74,7 @@ static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t 
     const void *one = channel_one(input->format);
     const bool contiguous = is_contiguous(input);
 
-    if (contiguous && input->channels == 4) {
+    if (contiguous && is_complete(input)) {
         memcpy(to, from, (size_t)input->width * vkb_pixel_size(input->format));
         return;
     }
@@ -95,7 +103,7 @@ static bool row_differs(const struct vkb_upload *upload, const struct vkb_input 
 {
     const size_t size = (size_t)input->width * vkb_pixel_size(input->format);
 
-    if (input->channels == 4 && is_contiguous(input))
+    if (is_complete(input) && is_contiguous(input))
         return memcmp(kept_row(upload, y), input_row(input, y), size) != 0;
     pack_row(upload->packed, input, y);
     return memcmp(kept_row(upload, y), upload->packed, size) != 0;
@@ -128,7 +136,7 @@ static struct vkb_specials count_singles(const uint32_t *bits, size_t count)
 
 static struct vkb_specials count_row(const struct vkb_upload *upload, uint32_t y)
 {
-    const size_t count = (size_t)upload->width * 4;
+    const size_t count = (size_t)upload->width * vkb_formats[upload->format].channels;
     const void *row = kept_row(upload, y);
     struct vkb_specials sum = {0};
 
@@ -156,9 +164,9 @@ static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *
 }
 
 // Memory for an image of another kind than the last.
-static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
-                    const struct vkb_input *input, const struct vkb_image *image,
-                    struct vkb_error *error)
+bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
+                      const struct vkb_input *input, const struct vkb_image *image,
+                      struct vkb_error *error)
 {
     const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
 
@@ -171,6 +179,8 @@ static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
         && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                row_size * input->height, &upload->staging, error))
         return false;
+    memset(upload->rows, 0, input->height * sizeof *upload->rows);
+    upload->specials = (struct vkb_specials){0};
     upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
     upload->row_pitch = image->mapped ? image->row_pitch : row_size;
     upload->format = input->format;
@@ -178,6 +188,29 @@ static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
     upload->height = input->height;
     upload->channels = input->channels;
     return true;
+}
+
+// Rows `from` to the last of the input, which is the image's from row `first` on.
+static void pack_rows(struct vkb_upload *upload, const struct vkb_input *input, uint32_t from,
+                      uint32_t first)
+{
+    for (uint32_t y = from; y < input->height; ++y) {
+        pack_row(kept_row(upload, first + y), input, y);
+        upload->rows[first + y] = count_row(upload, first + y);
+    }
+    upload->specials = (struct vkb_specials){0};
+    for (uint32_t y = 0; y < upload->height; ++y) {
+        upload->specials.nan += upload->rows[y].nan;
+        upload->specials.inf += upload->rows[y].inf;
+    }
+}
+
+bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
+                     const struct vkb_input *input, uint32_t first, struct vkb_error *error)
+{
+    pack_rows(upload, input, 0, first);
+    return upload->pixels != upload->staging.mapped
+        || vkb_buffer_flush(device, &upload->staging, error);
 }
 
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
@@ -192,18 +225,10 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     *changed = first < input->height;
     if (!*changed)
         return true;
-    if ((submissions && !vkb_submissions_wait(device, submissions, error))
-        || (fresh && !prepare(device, upload, input, image, error)))
+    if (!vkb_submissions_wait(device, submissions, error)
+        || (fresh && !vkb_upload_begin(device, upload, input, image, error)))
         return false;
-    for (uint32_t y = first; y < input->height; ++y) {
-        pack_row(kept_row(upload, y), input, y);
-        upload->rows[y] = count_row(upload, y);
-    }
-    upload->specials = (struct vkb_specials){0};
-    for (uint32_t y = 0; y < input->height; ++y) {
-        upload->specials.nan += upload->rows[y].nan;
-        upload->specials.inf += upload->rows[y].inf;
-    }
+    pack_rows(upload, input, first, 0);
     return image->mapped || vkb_buffer_flush(device, &upload->staging, error);
 }
 

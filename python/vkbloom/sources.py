@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from vkbloom import _core
-from vkbloom.checks import check_image, check_size, check_time
+from vkbloom.checks import check_emission, check_image, check_mask, check_size, check_time
 from vkbloom.image import Image
 from vkbloom.settings import check_shading
 
@@ -20,17 +20,30 @@ if TYPE_CHECKING:
 __all__ = ["image_kind", "image_source", "is_image", "scene_arguments", "scene_source"]
 
 
-def image_source(image: object) -> _core.Source:
-    """Return an image as the core takes it; an array must not change while it is used.
+def image_source(
+    image: object, mask: object | None = None, emission: object | None = None
+) -> _core.Source:
+    """Return an image as the core takes it; the arrays must not change while it is used.
 
     Raises
     ------
     TypeError, ValueError
-        As `check_image`.
+        As `check_image`, `check_mask` and `check_emission`.
     """
     if isinstance(image, Image):
+        for name, given in (("mask", mask), ("emission", emission)):
+            if given is not None:
+                raise ValueError(
+                    f"{name}: the image was uploaded already; upload it together with its {name}"
+                )
         return image._source
-    return _core.image_source(check_image(image))
+    checked = check_image(image)
+    height, width, _ = checked.shape
+    return _core.image_source(
+        checked,
+        None if emission is None else check_emission(emission, checked),
+        None if mask is None else check_mask(mask, (height, width)),
+    )
 
 
 def is_image(source: object) -> bool:

@@ -103,6 +103,58 @@ def test_special_values_of_a_handle_are_counted(renderer: Renderer) -> None:
     assert (info["nan"], info["inf"]) == (1, 4)
 
 
+@pytest.mark.parametrize("with_mask", [True, False])
+@pytest.mark.parametrize("with_emission", [True, False])
+def test_a_handle_has_its_mask_and_emission(
+    renderer: Renderer, with_mask: bool, with_emission: bool
+) -> None:
+    given: Any = {}
+    if with_mask:
+        given["mask"] = np.linspace(0, 1, 21 * 33, dtype=np.float32).reshape(21, 33)
+    if with_emission:
+        given["emission"] = picture(33, 21, 3, "float16", seed=11)
+        given["emission"][3, 3] = np.nan
+    image = picture(33, 21, 3, "float16", seed=12)
+    settings = Separable(threshold=0.25)
+    expected = renderer.apply(image, settings, **given)
+    handle = renderer.upload(image, **given)
+    other = renderer.upload(image)
+    for array in (image, *given.values()):
+        array[:] = 0
+    got = renderer.apply(handle, settings)
+    assert_same(got, expected)
+    assert got.info == expected.info
+    for frames in renderer.apply_each([handle, other, handle], settings):
+        assert (frames["final"] == expected["final"]).all() or frames.info["nan"] == 0
+    for name, array in {"mask": np.ones((21, 33), np.float32), "emission": image}.items():
+        with pytest.raises(ValueError, match=f"{name}: the image was uploaded already"):
+            renderer.apply(handle, settings, **{name: array})
+
+
+def test_rows_of_an_image(renderer: Renderer) -> None:
+    """The core takes an image in bands, and gives bands of a framebuffer."""
+    core = renderer._core
+    image = picture(33, 21, 3, "float32", seed=13)
+    image[18, 3] = np.nan
+    expected = renderer.apply(image, Separable())
+    source = core.upload(_core.image_source(image[:8]), None, False, 21)
+    core.fill(source, _core.image_source(image[8:16]), 8)
+    core.fill(source, _core.image_source(image[16:]), 16)
+    plan = core.plan(source, Separable(), ("bloom", "final"))
+    for first, count in ((0, 5), (5, 16), (20, 1), (0, 21)):
+        arrays = tuple(np.empty((count, 33, 4 - i), np.float32) for i in range(2))
+        _, counts = core.run(source, (plan,), (arrays,), first, count).wait()
+        assert counts == (3, 0)
+        for name, array in zip(("bloom", "final"), arrays, strict=True):
+            np.testing.assert_array_equal(array, expected[name][first : first + count])
+    for first, count in ((0, 22), (21, 1), (0, 0)):
+        with pytest.raises(ValueError, match="it does not have those rows"):
+            core.run(source, (plan,), (arrays,), first, count)
+    for rows, first in ((image[:8], 14), (image[:8, :30], 0), (image[:8].astype(np.float16), 0)):
+        with pytest.raises(ValueError, match="the rows do not go into the image"):
+            core.fill(source, _core.image_source(rows), first)
+
+
 def test_a_handle_belongs_to_its_renderer(new_renderer: Callable[[], Renderer]) -> None:
     mine, other = new_renderer(), new_renderer()
     handle = mine.upload(picture(16, 16))
