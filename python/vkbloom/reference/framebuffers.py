@@ -49,12 +49,28 @@ class Settings(CompositeSettings, Protocol):
 
 
 class _Method(NamedTuple):
-    # (glow, settings, size of the bloom, storing) -> framebuffers after the glow
+    """The functions of a method's module.
+
+    Parameters
+    ----------
+    passes : callable
+        ``passes(glow, settings, size, store)`` returns the framebuffers after the glow, in the
+        order of the data flow; the last one is "bloom". `glow` is the content of the first bloom
+        buffer, (H, W, C) of float64, with 1 or 3 channels where a method reads a luminance. `size`
+        is the width and height of the bloom. `store` converts values as storing in a bloom buffer
+        does.
+    gain : callable
+        ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns what a flat image of 1
+        becomes.
+    published : bool
+        Whether `passes` reduces the frame and applies the threshold itself.
+    sized : bool
+        Whether the gain depends on the size of the frame.
+    """
+
     passes: Callable[[Array, Any, tuple[int, int], Storage], dict[str, Array]]
     gain: Callable[..., float]
-    # Reduces and thresholds the frame in its own way, which its passes begin with.
     published: bool = False
-    # The number of levels that are added follows from the frame's size, and so does the gain.
     sized: bool = False
 
 

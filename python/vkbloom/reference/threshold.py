@@ -6,42 +6,53 @@ import numpy as np
 
 from .sampling import Array
 
-__all__ = ["apply_threshold", "luminance", "soften"]
+__all__ = ["apply_threshold", "firefly_weight", "luminance", "soften"]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def luminance(rgb: Array) -> Array:
-    """Return the Rec. 709 luminance 0.2126 r + 0.7152 g + 0.0722 b.
+def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
+    """Return the luminance, by default that of Rec. 709: 0.2126 r + 0.7152 g + 0.0722 b.
 
     Parameters
     ----------
-    rgb : ndarray of float64, shape (..., 3)
+    rgb : ndarray of float64, shape (..., 3) or (..., 1)
+        One channel is grey, whose luminance is itself.
+    coefficients : ndarray of float64, shape (3,)
+        Sources differ in the last digits.
 
     Returns
     -------
     ndarray of float64, shape (..., 1)
     """
-    weighted: Array = (rgb * _LUMINANCE).sum(axis=-1, keepdims=True)
+    if rgb.shape[-1] == 1:
+        return rgb
+    weighted: Array = (rgb * coefficients).sum(axis=-1, keepdims=True)
     return weighted
+
+
+def firefly_weight(brightness: Array) -> Array:
+    """Return 1 / (1 + brightness), with negative brightness as 0 (Karis, 2013)."""
+    weight: Array = 1 / (1 + np.maximum(brightness, 0.0))
+    return weight
 
 
 def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
     """Keep what is brighter than the threshold.
 
-    Without a knee, a colour stays whole where its luminance is greater than the threshold and
-    is 0 elsewhere. With one, with b = max(r, g, b), k = threshold * knee and
-    q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
-    max(q, b - threshold) / max(b, 1e-5): a quadratic that joins 0 at threshold - k to the line
-    b - threshold at threshold + k. Both formulas are those of the interface's table of
-    settings.
+    Without a knee, a colour does not change if its luminance is greater than the threshold, and
+    becomes 0 otherwise. With a knee, the colour is scaled by max(q, b - threshold) / max(b, 1e-5)
+    with b = max(r, g, b), k = threshold * knee and
+    q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5). This is a quadratic from 0 at
+    threshold - k to the line b - threshold at threshold + k. Both formulas are documented with
+    `vkbloom.Settings`.
 
     Parameters
     ----------
     rgb : ndarray of float64, shape (..., 3)
     threshold : float or None
-        In the image's units; None keeps everything.
+        In the units of the image; None keeps everything.
     knee : float
         Half-width of the soft part, as a fraction of the threshold; 0 for the hard one.
 
@@ -58,17 +69,19 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
 
 
 def soften(rgb: Array, threshold: float, half_width: float, divisor: float, least: float) -> Array:
-    """Scale colours by max(q, b - threshold) / max(b, least), b being their brightest channel.
+    """Scale colours by max(q, b - threshold) / max(b, least).
 
-    q = clamp(b - threshold + half_width, 0, 2 half_width)^2 / divisor.
+    b is the brightest channel, and q = clamp(b - threshold + half_width, 0, 2 half_width)^2 /
+    divisor.
 
     Parameters
     ----------
     rgb : ndarray of float64, shape (..., C)
     threshold, half_width : float
-        Middle and half-width of the soft part, in the image's units.
+        Middle and half-width of the soft part, in the units of the image.
     divisor, least : float
-        About 4 half_width, and the least brightness that is divided by: sources differ there.
+        About 4 half_width, and the lower bound of the brightness in the division. Sources differ
+        in both.
 
     Returns
     -------
