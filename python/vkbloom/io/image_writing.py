@@ -334,5 +334,10 @@ def _describe(
         # A profile describes encoded colours, not those of a picture that was written linear.
         if name == "ICCProfile" and encoding not in ("srgb", None):
             continue
-        if is_jpeg or not name.startswith("jpeg:"):
+        if name.startswith("jpeg:") and not is_jpeg:
+            continue
+        if isinstance(value, int):
+            # Of integers, OpenImageIO's Python sets those of 32 bits; Exif has 16 (ISO, flash).
+            spec.attribute(name, value)
+        else:
             spec.attribute(name, kind, value)
