@@ -15,7 +15,7 @@ import pytest
 
 import pytest_vkbloom
 import vkbloom
-from vkbloom import reductions, reference, testing
+from vkbloom import psf, reductions, reference, testing
 
 # Exceptions are documented in the core.
 WITHOUT_EXAMPLE = {
@@ -56,7 +56,7 @@ def test_examples_of_a_module(name: str) -> None:
 
 
 def public() -> Iterator[Any]:
-    for owner in (vkbloom, testing, reference, reductions):
+    for owner in (vkbloom, testing, reference, reductions, psf):
         for name in owner.__all__:
             member = getattr(owner, name)
             is_documented = inspect.isclass(member) or inspect.isfunction(member)
