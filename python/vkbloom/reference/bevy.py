@@ -16,7 +16,7 @@ from .image import Storage
 from .levels import halved
 from .pyramid import downsample, groups
 from .sampling import Array
-from .threshold import luminance, soften
+from .threshold import luminance, masked, soften
 from .upsampling import combine, flat_gain, tent
 
 if TYPE_CHECKING:
@@ -26,7 +26,11 @@ __all__ = ["gain", "passes"]
 
 
 def passes(
-    glow: Array, settings: BevyBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: BevyBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -42,7 +46,7 @@ def passes(
     scale = (settings.scale_x, settings.scale_y)
     up = partial(tent, x_step=settings.scale_x, y_step=settings.scale_y)
     level = (max(1, math.floor(width * limit / height + 0.5)), limit)
-    downs = [store(_prefilter(glow, level, settings))]
+    downs = [store(masked(_prefilter(glow, level, settings), mask))]
     for _ in range(1, _level_count(settings)):
         level = halved(level)
         downs.append(store(downsample(downs[-1], level, scale=scale)))
@@ -68,7 +72,9 @@ def _prefilter(image: Array, size: tuple[int, int], settings: BevyBloom) -> Arra
     for share, mean in groups(image, size, (settings.scale_x, settings.scale_y)):
         part = share * mean
         total += part / (1 + np.maximum(luminance(part), 0.0) / 4)
-    return _threshold(np.maximum(total, 1e-4), settings)
+    # The lower bound is not applied to alpha.
+    total[..., :3] = np.maximum(total[..., :3], 1e-4)
+    return _threshold(total, settings)
 
 
 def _threshold(rgb: Array, settings: BevyBloom) -> Array:

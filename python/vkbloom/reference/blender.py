@@ -15,7 +15,7 @@ from .image import Storage
 from .levels import halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
-from .threshold import firefly_weight
+from .threshold import brightest, firefly_weight, masked
 from .upsampling import combine, linear, tent_of_target
 
 if TYPE_CHECKING:
@@ -34,7 +34,11 @@ _GROUPS = (
 
 
 def passes(
-    glow: Array, settings: BlenderGlare, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: BlenderGlare,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -46,7 +50,7 @@ def passes(
     """
     height, width, _ = glow.shape
     count = max(1, math.floor(math.log2(max(1.0, min(width, height) * settings.size))))
-    downs = [store(_highlights(glow, settings))]
+    downs = [store(masked(_highlights(glow, settings), mask))]
     level = (width, height)
     for k in range(1, count):
         level = halved(level)
@@ -76,7 +80,7 @@ def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
         return rgb
     low = settings.threshold
     high = math.inf if settings.maximum is None else low + settings.maximum
-    value = rgb.max(axis=-1, keepdims=True)
+    value = brightest(rgb)
     # The soft parts must not extend below 0 or beyond the other end.
     at_low = min(settings.smoothness, low, high - low)
     at_high = min(settings.smoothness, high, high - low)
@@ -103,7 +107,5 @@ def _weighted_taps(image: Array, size: tuple[int, int]) -> Array:
     result = np.zeros((size[1], size[0], image.shape[2]))
     for places, group_share in _GROUPS:
         taps = [sample(image, size, [(float(x), 1.0)], [(float(y), 1.0)]) for x, y in places]
-        result += group_share * weighted_mean(
-            (firefly_weight(tap.max(axis=-1, keepdims=True)), tap) for tap in taps
-        )
+        result += group_share * weighted_mean((firefly_weight(brightest(tap)), tap) for tap in taps)
     return result

@@ -16,7 +16,7 @@ from .image import Storage
 from .levels import halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
-from .threshold import firefly_weight
+from .threshold import brightest, firefly_weight, masked
 from .upsampling import combine, linear, tent_of_target
 
 if TYPE_CHECKING:
@@ -26,7 +26,11 @@ __all__ = ["gain", "passes"]
 
 
 def passes(
-    glow: Array, settings: FilamentBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: FilamentBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -46,9 +50,9 @@ def passes(
     image, above, threshold = glow, (width, height), settings.threshold
     while level[0] * 2 < above[0] or level[1] * 2 < above[1]:
         above = halved(above)
-        image = store(_reduce(image, above, threshold, settings.highlight))
-        threshold = None
-    downs = [store(_reduce(image, level, threshold, settings.highlight))]
+        image = store(masked(_reduce(image, above, threshold, settings.highlight), mask))
+        threshold = mask = None
+    downs = [store(masked(_reduce(image, level, threshold, settings.highlight), mask))]
     longer = math.floor(max(top * width / height, top))
     count = min(settings.levels, math.floor(math.log2(longer)) + 1)
     for _ in range(1, count):
@@ -91,14 +95,17 @@ def _reduce(
             tap = columns.swapaxes(0, 1)
             share = row_share * column_share.swapaxes(0, 1)
             if threshold is not None:
-                share = share * firefly_weight(tap.max(axis=-1, keepdims=True))
+                share = share * firefly_weight(brightest(tap))
             taps.append((share, tap))
     mean = weighted_mean(taps)
     if threshold is None:
         return mean
-    kept = np.maximum(mean - threshold, 0)
-    compressed: Array = kept / (1 + kept.max(axis=-1, keepdims=True) / highlight)
-    return compressed
+    kept = np.maximum(mean[..., :3] - threshold, 0)
+    compressed = kept / (1 + brightest(kept) / highlight)
+    # This threshold subtracts. Alpha is multiplied by the factor of the brightest channel.
+    value = brightest(mean)
+    factor = np.where(value > 0, brightest(compressed) / np.where(value > 0, value, 1), 0)
+    return np.concatenate([compressed, factor * mean[..., 3:]], axis=-1)
 
 
 def _pairs(image: Array, count: int) -> list[tuple[Array, Array]]:

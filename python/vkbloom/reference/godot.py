@@ -12,7 +12,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
-from .threshold import luminance
+from .threshold import brightest, luminance, masked
 from .upsampling import cubic, linear
 
 if TYPE_CHECKING:
@@ -27,7 +27,11 @@ _LEAST_WEIGHT = 1e-4
 
 
 def passes(
-    glow: Array, settings: GodotBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: GodotBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -47,7 +51,10 @@ def passes(
     for level, weight in enumerate(_weights(settings)):
         level_size = (max(1, width // 2 >> level), max(1, height // 2 >> level))
         samples = sample(image, level_size)
-        image = store(_first(samples, settings) if level == 0 else _later(samples, settings))
+        if level == 0:
+            image = store(masked(_first(samples, settings), mask))
+        else:
+            image = store(_later(samples, settings))
         framebuffers[f"down_{level}"] = image
         total += weight * enlarge(image, size)
     framebuffers["bloom"] = store.end(total)
@@ -78,14 +85,16 @@ def _later(samples: Array, settings: GodotBloom) -> Array:
 def _first(samples: Array, settings: GodotBloom) -> Array:
     blurred = _blur(samples / (1 + _luminance(samples, settings)))
     blurred = blurred / (1 - _luminance(blurred, settings))
-    blurred = blurred * settings.strength * 2.0**settings.exposure
+    blurred = blurred * settings.strength
+    # Exposure and cap are not applied to alpha.
+    blurred[..., :3] *= 2.0**settings.exposure
     if settings.threshold is not None:
-        brightest = blurred.max(axis=-1, keepdims=True)
+        above = brightest(blurred) - settings.threshold
         # With a scale of 0, smoothstep is not defined; this is a step.
-        t = np.clip((brightest - settings.threshold) / max(settings.threshold_scale, 1e-6), 0, 1)
+        t = np.clip(above / max(settings.threshold_scale, 1e-6), 0, 1)
         blurred = blurred * np.maximum(t * t * (3 - 2 * t), settings.glow_bloom)
-    capped: Array = np.minimum(blurred, settings.luminance_cap)
-    return capped
+    blurred[..., :3] = np.minimum(blurred[..., :3], settings.luminance_cap)
+    return blurred
 
 
 def _luminance(rgb: Array, settings: GodotBloom) -> Array:

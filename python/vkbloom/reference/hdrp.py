@@ -15,7 +15,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, read_rows, sample, weighted_mean
-from .threshold import firefly_weight, luminance
+from .threshold import firefly_weight, luminance, masked
 from .upsampling import combine, cubic, spline_taps
 
 if TYPE_CHECKING:
@@ -31,7 +31,11 @@ _KERNEL = [math.comb(2 * _RADIUS, i) / 4**_RADIUS for i in range(2 * _RADIUS + 1
 
 
 def passes(
-    glow: Array, settings: HdrpBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: HdrpBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -55,7 +59,7 @@ def passes(
         (max(1, round(reduced_width / 2 ** (k + 1))), max(1, round(reduced_height / 2 ** (k + 1))))
         for k in range(count)
     ]
-    reduced = store(_prefilter(glow, sizes[0]))
+    reduced = store(masked(_prefilter(glow, sizes[0]), mask))
     downs = [_along_both(reduced, sizes[0], _blur_rows, store)]
     for level in sizes[1:]:
         downs.append(_along_both(downs[-1], level, _shrink_rows, store))

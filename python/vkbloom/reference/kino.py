@@ -14,7 +14,7 @@ import numpy as np
 from .image import Storage
 from .levels import halved
 from .sampling import Array, sample, weighted_mean
-from .threshold import firefly_weight, soften
+from .threshold import brightest, firefly_weight, masked, soften
 from .upsampling import combine, tent
 
 if TYPE_CHECKING:
@@ -24,7 +24,11 @@ __all__ = ["gain", "passes"]
 
 
 def passes(
-    glow: Array, settings: KinoBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: KinoBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -35,7 +39,7 @@ def passes(
     """
     height, width, _ = glow.shape
     count, step = _count_and_step(settings, height)
-    bright = store(_prefilter(glow, settings))
+    bright = store(masked(_prefilter(glow, settings), mask))
     image, level, downs = bright, (width, height), []
     for k in range(count):
         level = halved(level)
@@ -59,7 +63,8 @@ def _count_and_step(settings: KinoBloom, height: int) -> tuple[int, float]:
 
 
 def _prefilter(image: Array, settings: KinoBloom) -> Array:
-    padded = np.pad(np.minimum(image, 65000), ((1, 1), (1, 1), (0, 0)), mode="edge")
+    clamped = np.concatenate([np.minimum(image[..., :3], 65000), image[..., 3:]], axis=-1)
+    padded = np.pad(clamped, ((1, 1), (1, 1), (0, 0)), mode="edge")
     kept = padded[1:-1, 1:-1]
     if settings.anti_flicker:
         kept = np.median([kept, padded[1:-1, :-2], padded[1:-1, 2:]], axis=0)
@@ -81,6 +86,5 @@ def _box(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:
     """
     taps = [sample(image, size, [(x, 1.0)], [(y, 1.0)]) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
     return weighted_mean(
-        (firefly_weight(tap.max(axis=-1, keepdims=True)) if firefly_filter else 1.0, tap)
-        for tap in taps
+        (firefly_weight(brightest(tap)) if firefly_filter else 1.0, tap) for tap in taps
     )

@@ -14,7 +14,7 @@ from .image import Storage
 from .levels import halved
 from .pyramid import downsample, groups
 from .sampling import Array, weighted_mean
-from .threshold import firefly_weight, luminance
+from .threshold import firefly_weight, luminance, masked
 from .upsampling import combine, linear, tent
 
 if TYPE_CHECKING:
@@ -24,7 +24,11 @@ __all__ = ["gain", "passes"]
 
 
 def passes(
-    glow: Array, settings: PygfxBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: PygfxBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -38,7 +42,8 @@ def passes(
     for k in range(_level_count(settings, level)):
         level = halved(level)
         shrink = _averaged if settings.karis_average and k == 0 else downsample
-        image = store(np.maximum(shrink(image, level), 0))
+        image = np.maximum(shrink(image, level), 0)
+        image = store(masked(image, mask) if k == 0 else image)
         downs.append(image)
     ones = [1.0] * len(downs)
     return combine(

@@ -43,7 +43,7 @@ def passes(
     Raises
     ------
     ValueError
-        Firefly filter of an image with neither 1 nor 3 channels.
+        Firefly filter of an image with another number of channels than 1, 3 and 4.
     """
     height, width, _ = glow.shape
     downs: list[Array] = []
@@ -102,7 +102,7 @@ def downsample(
     With `firefly_filter`, the share of each group is multiplied by 1 / (1 + luminance of the
     group's mean), and the shares are divided by their sum. A negative luminance counts as 0.
     """
-    if firefly_filter and image.shape[2] not in (1, 3):
+    if firefly_filter and image.shape[2] not in (1, 3, 4):
         raise ValueError(
             f"firefly_filter needs an image of 1, 3 or 4 channels, not {image.shape[2]}"
         )

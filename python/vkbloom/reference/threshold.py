@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .sampling import Array
+from .sampling import Array, sample
 
-__all__ = ["apply_threshold", "firefly_weight", "luminance", "soften"]
+__all__ = ["apply_threshold", "brightest", "firefly_weight", "luminance", "masked", "soften"]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -17,8 +17,9 @@ def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
 
     Parameters
     ----------
-    rgb : ndarray of float64, shape (..., 3) or (..., 1)
-        One channel is grey, whose luminance is itself.
+    rgb : ndarray of float64, shape (..., 3), (..., 4) or (..., 1)
+        A fourth channel is alpha, which does not count. One channel is grey, whose luminance is
+        itself.
     coefficients : ndarray of float64, shape (3,)
         Sources differ in the last digits.
 
@@ -28,8 +29,28 @@ def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
     """
     if rgb.shape[-1] == 1:
         return rgb
-    weighted: Array = (rgb * coefficients).sum(axis=-1, keepdims=True)
+    weighted: Array = (rgb[..., :3] * coefficients).sum(axis=-1, keepdims=True)
     return weighted
+
+
+def brightest(image: Array) -> Array:
+    """Return the largest colour channel, (..., 1); a fourth channel is alpha."""
+    largest: Array = image[..., :3].max(axis=-1, keepdims=True)
+    return largest
+
+
+def masked(image: Array, mask: Array | None) -> Array:
+    """Return the image times the mask, which is read bilinearly at the image's pixel centres.
+
+    Parameters
+    ----------
+    image : ndarray of float64, shape (h, w, C)
+    mask : ndarray of float64, shape (H, W, 1), or None
+    """
+    if mask is None:
+        return image
+    height, width, _ = image.shape
+    return image * sample(mask, (width, height))
 
 
 def firefly_weight(brightness: Array) -> Array:
@@ -50,7 +71,8 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
 
     Parameters
     ----------
-    rgb : ndarray of float64, shape (..., 3)
+    rgb : ndarray of float64, shape (..., 3) or (..., 4)
+        Alpha is scaled like the colour.
     threshold : float or None
         In the units of the image; None keeps everything.
     knee : float
@@ -58,7 +80,7 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
 
     Returns
     -------
-    ndarray of float64, shape (..., 3)
+    ndarray of float64, of the same shape
     """
     if threshold is None:
         return rgb
@@ -87,7 +109,7 @@ def soften(rgb: Array, threshold: float, half_width: float, divisor: float, leas
     -------
     ndarray of float64, shape (..., C)
     """
-    brightness = rgb.max(axis=-1, keepdims=True)
+    brightness = brightest(rgb)
     soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2 / divisor
     scale: Array = np.maximum(soft, brightness - threshold) / np.maximum(brightness, least)
     return rgb * scale

@@ -13,7 +13,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
-from .threshold import luminance
+from .threshold import luminance, masked
 
 if TYPE_CHECKING:
     from vkbloom.published import UnrealBloom
@@ -27,7 +27,11 @@ _NODES_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def passes(
-    glow: Array, settings: UnrealBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: UnrealBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -39,7 +43,7 @@ def passes(
     """
     height, width, _ = glow.shape
     half = _halved((width, height), settings)
-    image = store(_prefilter(sample(glow, half), settings))
+    image = store(masked(_prefilter(sample(glow, half), settings), mask))
     framebuffers = {"bright": image}
     total = np.zeros_like(image)
     for k, factor in enumerate(_factors(settings.radius)):

@@ -15,7 +15,7 @@ import numpy as np
 from .image import Storage
 from .levels import halved
 from .sampling import Array, sample
-from .threshold import soften
+from .threshold import masked, soften
 from .upsampling import combine, flat_gain, linear
 
 if TYPE_CHECKING:
@@ -28,7 +28,11 @@ _WEIGHTS = (0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622)
 
 
 def passes(
-    glow: Array, settings: UrpBloom, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: UrpBloom,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -39,7 +43,7 @@ def passes(
     """
     height, width, _ = glow.shape
     level = halved((width, height))
-    downs = [store(_prefilter(sample(glow, level), settings))]
+    downs = [store(masked(_prefilter(sample(glow, level), settings), mask))]
     for _ in range(1, _level_count(settings, level)):
         level = halved(level)
         horizontal = store(sample(downs[-1], level, x_taps=_taps(2.0)))
@@ -66,11 +70,13 @@ def _shares(settings: UrpBloom, count: int) -> tuple[list[float], list[float]]:
 
 
 def _prefilter(rgb: Array, settings: UrpBloom) -> Array:
-    kept = np.minimum(rgb, settings.clamp_max)
+    # The clamp is not applied to alpha.
+    kept = np.concatenate([np.minimum(rgb[..., :3], settings.clamp_max), rgb[..., 3:]], axis=-1)
     if settings.threshold is not None:
         half_width = settings.threshold * settings.knee
         kept = soften(kept, settings.threshold, half_width, 4 * half_width + 1e-4, 1e-4)
-    return np.maximum(kept, 0)
+    positive: Array = np.maximum(kept, 0)
+    return positive
 
 
 def _taps(step: float) -> list[tuple[float, float]]:
