@@ -61,13 +61,13 @@
 // A blur pass: the distances of its taps in texels of the source, and the half-kernel w0.. of what
 // a texel at each tap counts, four to a vec4. `gain` is of a blur in both directions.
 #define BLUR_BLOCK(B, READS, INPUT, VEC4S) \
-    INPUT(B, float, step_across) \
-    INPUT(B, float, step_down) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y) \
     INPUT(B, float, gain) \
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, weights, BLUR_VEC4S)
 
-// The same blur where the source's pixels are the target's: one symmetric kernel on whole texels,
+// The same blur where the source's pixels are the target's: one symmetric kernel on integer texels,
 // from the first tap to the last, then zeros. `origin` is the place of the target's first pixel
 // along the line, in the source's.
 #define LINE_BLOCK(B, READS, INPUT, VEC4S) \
@@ -76,23 +76,24 @@
     INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 
-// An image's whole bloom in one pass: threshold, both blurs, composite. Kernels as above.
-#define WHOLE_BLOCK(B, READS, INPUT, VEC4S) \
+// The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as
+// above.
+#define FUSED_BLOOM_BLOCK(B, READS, INPUT, VEC4S) \
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
-    INPUT(B, int, down_radius) \
-    INPUT(B, int, across_radius) \
-    VEC4S(B, down, WHOLE_VEC4S) \
-    VEC4S(B, across, WHOLE_VEC4S)
+    INPUT(B, int, vertical_radius) \
+    INPUT(B, int, horizontal_radius) \
+    VEC4S(B, vertical, FUSED_VEC4S) \
+    VEC4S(B, horizontal, FUSED_VEC4S)
 
 // The reduction of an image to the bloom buffer, with the threshold.
-#define EXTRACT_BLOCK(B, READS, INPUT, VEC4S) \
+#define THRESHOLD_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
 // A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
 // the steps the distance of the taps in texels of the image that is read. `taps` are the same
-// weights on whole texels, where a level is exactly twice as large as the one below; the
+// weights on integer texels, where a level is exactly twice as large as the one below; the
 // threshold is of a first level that starts from the image itself.
 #define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
@@ -148,10 +149,10 @@
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
-    BLOCK(extract, EXTRACT_BLOCK) \
+    BLOCK(threshold, THRESHOLD_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(line, LINE_BLOCK) \
-    BLOCK(whole, WHOLE_BLOCK) \
+    BLOCK(fused_bloom, FUSED_BLOOM_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
     BLOCK(double_final, DOUBLE_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
@@ -162,7 +163,7 @@
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
 // Settings that no shader reads, for they shape the graph.
-// Whole numbers: COUNT(name, default, min, max); a flag is one of 0 and 1.
+// Integers: COUNT(name, default, min, max); a flag is one of 0 and 1.
 #define COUNT_ROWS(COUNT) \
     COUNT(bloom, 1, 0, 1) \
     COUNT(dither, 0, 0, 1) \
@@ -216,8 +217,8 @@
 #define ROW_INVOCATIONS   8
 #define PIXEL_INVOCATIONS 8
 
-// Kernels on whole texels, w0.. in vec4s: the longest half-kernel of a line, and of the whole bloom
-// in one pass. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
+// Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line, and of a fused
+// bloom. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
 #define LINE_RADIUS       64
 #define LINE_SHORT_RADIUS 8
 #define LINE_OUTPUTS      8
@@ -235,7 +236,7 @@
 #define TILE_ROWS         32
 #define TILE_RUNS         4
 #define TILE_RADIUS       16
-#define WHOLE_VEC4S       5
+#define FUSED_VEC4S       5
 
 // The most levels that one pass gathers, and the most of a chain.
 #define GATHERED_LEVELS 7
@@ -244,7 +245,7 @@
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
 // int, and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as
 // an image of that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for
-// loops that a compiler can unroll; with EXTRACT, halving starts from the image itself, past the
+// loops that a compiler can unroll; with FROM_IMAGE, halving reads the image itself and applies the
 // threshold. FIRST is of an engine's first level, LEVELS the number that a pass gathers.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
@@ -262,7 +263,7 @@
     CONSTANT(12, RADIUS, radius) \
     CONSTANT(13, ADD_OWN, add_own) \
     CONSTANT(14, UPSAMPLE, upsample) \
-    CONSTANT(15, EXTRACT, extract) \
+    CONSTANT(15, FROM_IMAGE, from_image) \
     CONSTANT(16, EMITTERS, emitters) \
     CONSTANT(17, FIRST, first) \
     CONSTANT(18, LEVELS, levels) \
@@ -309,7 +310,7 @@
     NAME(DIRECTION_VERTICAL, 0, vertical) \
     NAME(DIRECTION_HORIZONTAL, 1, horizontal) \
     NAME(DIRECTION_BOTH, 2, both) \
-    NAME(SAMPLING_WHOLE, 0, whole) \
+    NAME(SAMPLING_TEXEL, 0, texel) \
     NAME(SAMPLING_FILTER, 1, filter) \
     NAME(SAMPLING_FETCH, 2, fetch) \
     NAME(STORED_UNORM8, 0, unorm8) \

@@ -23,8 +23,8 @@ _SINGLE = 1e-4
 _HALF_ROUNDING = 2.0**-11
 _HALF_LEAST = 2.0**-25
 
-# What passes their threshold is their glow.
-_EXTRACTING = (Separable, Pyramid, DualKawase)
+# The threshold pass of these methods writes the glow.
+_WITH_THRESHOLD_PASS = (Separable, Pyramid, DualKawase)
 
 # Framebuffers in which one 8-bit stage's rounding arrives, or that of the glow and one more.
 _FIRST_STAGES = ("glow", "blur_vertical", "down_0")
@@ -92,7 +92,7 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
     expected = reference.apply(image, settings)
     assert list(frames) == list(expected)
     format = settings.format or FORMATS[image.dtype.name]
-    if settings.threshold is not None and not isinstance(settings, _EXTRACTING):
+    if settings.threshold is not None and not isinstance(settings, _WITH_THRESHOLD_PASS):
         # Its threshold comes after the glow, and magnifies what that was rounded by.
         limit = tolerance(_DTYPES[format], expected["glow"], stages_of_8_bits=1)
         assert_close("glow", frames["glow"], expected["glow"], limit)

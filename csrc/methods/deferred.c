@@ -94,7 +94,7 @@ static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
     if (!as_it_is
         && (!vkb_add_target(graph, "extracted", extracted, source.buffers, false, &source.glow,
                             error)
-            || !vkb_add_extract(settings, brightness, source.glow, graph, error)))
+            || !vkb_add_threshold(settings, brightness, source.glow, graph, error)))
         return false;
     return vkb_add_bloom(settings, &source, graph, bloom, error);
 }

@@ -25,7 +25,7 @@ bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image
         };
         if (!vkb_add_target(graph, "glow", vkb_end_format(settings, source.format), source.buffers,
                             true, &source.glow, error)
-            || !vkb_add_extract(settings, input, source.glow, graph, error)
+            || !vkb_add_threshold(settings, input, source.glow, graph, error)
             || !vkb_add_bloom(settings, &source, graph, &bloom, error))
             return false;
     }

@@ -35,7 +35,7 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
 {
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     const struct vkb_combination combination = scattered(settings, UPSAMPLE_LINEAR);
-    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .across = 2.0};
+    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .step_x = 2.0};
     struct vkb_size size = vkb_halved(source->buffers);
     const uint32_t count = level_count(size.width, size.height, 1.0, settings->values.iterations);
 

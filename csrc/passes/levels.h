@@ -57,7 +57,7 @@ struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_f
                                  uint32_t from, uint32_t to);
 
 // Whether a row is of those taps from a level of exactly twice the size, or of an upsampling to
-// exactly twice the size: then it needs whole texels alone. (Where fireflies are filtered, groups
+// exactly twice the size: then it needs integer texels alone. (Where fireflies are filtered, groups
 // of taps have weights of their own.)
 bool vkb_halves(const struct vkb_pass_row *pass);
 bool vkb_doubles(const struct vkb_pass_row *pass);
@@ -66,7 +66,7 @@ bool vkb_doubles(const struct vkb_pass_row *pass);
 struct vkb_kernel {
     const float *weights;  // w0..
     uint32_t count;
-    double across;  // distance of the taps of the first, horizontal, pass in texels of its source;
+    double step_x;  // distance of the taps of the first, horizontal, pass in texels of its source;
                     // 0: one pixel of the level
 };
 

@@ -97,7 +97,7 @@ int vkb_read_uint32(PyObject *object, void *number)
         return 1;
     }
     if (!PyLong_Check(object)) {
-        PyErr_Format(PyExc_TypeError, "%R is not a whole number", object);
+        PyErr_Format(PyExc_TypeError, "%R is not an integer", object);
         return 0;
     }
     PyErr_Clear();

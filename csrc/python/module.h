@@ -99,7 +99,7 @@ bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
 // Whether it is a tuple, as PyArg_ParseTuple must have it; else with a TypeError set.
 bool vkb_require_tuple(PyObject *object, const char *what);
 
-// Converters of PyArg_ParseTuple ("O&"), whose own codes for whole numbers without a sign take any
+// Converters of PyArg_ParseTuple ("O&"), whose own codes for unsigned integers take any
 // number modulo 2^32. 0 with an exception set.
 int vkb_read_uint32(PyObject *object, void *number);
 int vkb_read_serial(PyObject *object, void *number);  // 64 bits, not 0
@@ -124,7 +124,7 @@ struct vkb_held_scene {
 
 // (serial, body, glow or None, sky levels, textures); a mesh is (vertices, indices, emission or
 // None, texcoords or None, surfaces), a surface (index count, base texture, emission texture), a
-// texture (levels, address mode across, down, magnification, minification, mipmap filter).
+// texture (levels, address mode along u, v, magnification, minification, mipmap filter).
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
 void vkb_release_scene(struct vkb_held_scene *scene);
 

@@ -18,24 +18,24 @@ static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uin
     row->constants = (struct vkb_constants){0};
 }
 
-// Where the larger level is what is extracted of an image: from the image itself, as an alternative
-// to `halving`, which `pass` became.
+// If the threshold pass writes the larger level: adds a fused pass that starts from the image
+// itself. It may replace `halving`, the variant of `pass`.
 static bool add_halved_image(const struct vkb_variant_choice *choice,
                              const struct vkb_pass_row *pass, const struct vkb_pass_row *halving,
                              struct vkb_error *error)
 {
-    const struct vkb_pass_row *extract = vkb_extract_of(&choice->plain, pass->reads[0]);
+    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
     struct vkb_pass_row row;
 
-    if (!extract)
+    if (!threshold)
         return true;
     memcpy(&row, halving, sizeof row);
-    row.reads[0] = extract->reads[0];
+    row.reads[0] = threshold->reads[0];
     row.fused = true;
-    row.constants.extract = true;
+    row.constants.from_image = true;
     row.constants.format =
         vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
-    VKB_TAKE_THRESHOLD(&row, pyramid, extract);
+    VKB_TAKE_THRESHOLD(&row, pyramid, threshold);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 

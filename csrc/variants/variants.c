@@ -72,18 +72,18 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
     return writer;
 }
 
-const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_t image)
+const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image)
 {
     const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
 
-    return pass && vkb_is_extract(pass)
+    return pass && vkb_is_threshold(pass)
                 && graph->images[pass->reads[0]].format == graph->images[image].format
              ? pass
              : NULL;
 }
 
 static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(blend_comp);
-static const enum vkb_shader bright_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(bright_comp);
+static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(threshold_comp);
 
 // A composite whose images have one size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -113,8 +113,8 @@ bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
                           PIXEL_INVOCATIONS);
     else if (blends(graph, pass))
         load_texels(&row, blend_shaders[format]);
-    else if (vkb_is_extract(pass))
-        load_texels(&row, bright_shaders[format]);
+    else if (vkb_is_threshold(pass))
+        load_texels(&row, threshold_shaders[format]);
     return vkb_graph_add_pass(graph, &row, error);
 }
 

@@ -56,7 +56,7 @@ class Renderer:
         adapter: str,
         driver: str,
         validation: bool,
-        forms: str,
+        variants: str,
         frame_seconds: float,
         read_cache: Callable[[bytes], bytes | None],
         /,

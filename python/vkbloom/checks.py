@@ -35,7 +35,6 @@ FLT_MAX = (2 - 2**-23) * 2.0**127
 # Fast path for native byte order.
 _DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 
-
 _DTYPE_CURES = {
     "uint16": "; convert it: (image / 65535).astype(np.float32)",
     "bool": "; convert it: image.astype(np.float32)",

@@ -152,14 +152,14 @@ class Renderer:
             raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        forms = os.environ.get("VKBLOOM_FORM") or "auto"
+        variants = os.environ.get("VKBLOOM_FORM") or "auto"
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(
             adapter,
             bundled_driver(),
             bool(validation),
-            forms,
+            variants,
             _frame_seconds(),
             pipeline_cache.read,
         )

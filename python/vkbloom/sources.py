@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from vkbloom import _core
 from vkbloom.checks import check_image, check_size, check_time
-from vkbloom.settings import SHADINGS
+from vkbloom.settings import check_shading
 
 if TYPE_CHECKING:
     from vkbloom.scene import Mesh, Scene
@@ -43,8 +43,7 @@ def scene_source(
     TypeError, ValueError
         One of them is wrong.
     """
-    if shading not in SHADINGS:
-        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+    check_shading(shading)
     turns = check_time(time)
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 

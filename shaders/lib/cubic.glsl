@@ -9,13 +9,13 @@ vec4 cubic_weights(float part)
 
 vec3 sample_cubic(sampler2D image, Place place)
 {
-    vec4 across = cubic_weights(place.part.x);
-    vec4 down = cubic_weights(place.part.y);
+    vec4 weights_x = cubic_weights(place.part.x);
+    vec4 weights_y = cubic_weights(place.part.y);
     vec3 sum = vec3(0.0);
     for (int y = 0; y < 4; ++y)
         for (int x = 0; x < 4; ++x) {
             ivec2 texel = place.texel + ivec2(x - 1, y - 1);
-            sum += across[x] * down[y] * fetch_clamped(image, texel).rgb;
+            sum += weights_x[x] * weights_y[y] * fetch_clamped(image, texel).rgb;
         }
     return sum;
 }
@@ -24,12 +24,12 @@ vec3 sample_cubic(sampler2D image, Place place)
 // `furthest` (Sigg and Hadwiger, "Fast Third-Order Texture Filtering", GPU Gems 2, chapter 20).
 vec3 sample_cubic_within(sampler2D image, Place place, vec2 furthest, int sampling)
 {
-    vec4 across = cubic_weights(place.part.x);
-    vec4 down = cubic_weights(place.part.y);
-    vec2 left = vec2(across.x + across.y, down.x + down.y);
-    vec2 right = vec2(across.z + across.w, down.z + down.w);
-    vec2 near = min(vec2(across.y, down.y) / left - 1.0, furthest);
-    vec2 far = min(vec2(across.w, down.w) / right + 1.0, furthest);
+    vec4 weights_x = cubic_weights(place.part.x);
+    vec4 weights_y = cubic_weights(place.part.y);
+    vec2 left = vec2(weights_x.x + weights_x.y, weights_y.x + weights_y.y);
+    vec2 right = vec2(weights_x.z + weights_x.w, weights_y.z + weights_y.w);
+    vec2 near = min(vec2(weights_x.y, weights_y.y) / left - 1.0, furthest);
+    vec2 far = min(vec2(weights_x.w, weights_y.w) / right + 1.0, furthest);
     Place texel = Place(place.texel, vec2(0.0));
     return left.y * (left.x * sample_at(image, texel, near, sampling).rgb
                      + right.x * sample_at(image, texel, vec2(far.x, near.y), sampling).rgb)

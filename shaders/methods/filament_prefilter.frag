@@ -32,16 +32,16 @@ vec4 shade()
     vec4 shares = vec4(left_share.x, right_share.x, left_share.x, right_share.x)
                 * vec4(left_share.yy, right_share.yy);
     vec3 sum = vec3(0.0);
-    float whole = 0.0;
+    float total = 0.0;
     for (int i = 0; i < 4; ++i) {
         vec3 value = sample_at(source, place, offsets[i], SAMPLING).rgb;
         float share = shares[i];
         if (THRESHOLDED != 0)
             share /= 1.0 + brightest(value);
         sum += share * value;
-        whole += share;
+        total += share;
     }
-    sum /= whole;
+    sum /= total;
     if (THRESHOLDED != 0) {
         sum = max(sum - params.threshold, vec3(0.0));
         sum /= 1.0 + brightest(sum) / params.highlight;

@@ -42,7 +42,7 @@ vec3 halved()
 
 vec4 shade()
 {
-    if (SAMPLING == SAMPLING_WHOLE)
+    if (SAMPLING == SAMPLING_TEXEL)
         return vec4(storable(halved()), 1.0);
     vec3 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
     vec3 sum = vec3(0.0);

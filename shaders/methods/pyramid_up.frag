@@ -58,7 +58,7 @@ vec3 doubled()
 
 vec3 upsample(Place place)
 {
-    if (SAMPLING == SAMPLING_WHOLE)
+    if (SAMPLING == SAMPLING_TEXEL)
         return doubled();
     if (UPSAMPLE == UPSAMPLE_LINEAR)
         return sample_at(smaller, place, vec2(0.0), SAMPLING).rgb;

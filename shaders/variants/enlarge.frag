@@ -5,7 +5,7 @@
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
-UNIFORM_BLOCK(EXTRACT_BLOCK);
+UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D lines;

@@ -19,11 +19,11 @@ const int LOADED = 2 * HALVE_COLUMNS + 4;
 vec3 load(ivec2 texel)
 {
     vec3 value = imageLoad(source, texel).rgb;
-    if (EXTRACT == 0)
+    if (FROM_IMAGE == 0)
         return value;
-    vec3 bright =
+    vec3 kept =
         apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
-    return as_stored(bright, FORMAT);
+    return as_stored(kept, FORMAT);
 }
 
 void main()

@@ -1,8 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// An image's whole bloom for processors without fast shared memory: an invocation walks down a
+// The complete bloom of an image for processors without fast shared memory: an invocation walks down a
 // strip, with the vertical sums of the rows to come in registers.
-#include "variants/whole.glsl"
+#include "variants/fused_bloom.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
@@ -29,21 +29,21 @@ void main()
         int row = clamp(y, 0, last.y);
         // In small loops, each of which drivers unroll; in one large one the sums would be memory.
         for (int i = 0; i < LOADED; ++i)
-            line[i] = bright(imageLoad(image, ivec2(clamp(first.x + i - STRIP_RADIUS, 0, last.x), row)).rgb);
+            line[i] = thresholded(imageLoad(image, ivec2(clamp(first.x + i - STRIP_RADIUS, 0, last.x), row)).rgb);
         for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
-            line[i] = as_stored(sums[0][i] + down(STRIP_RADIUS) * added, FORMAT);
+            line[i] = as_stored(sums[0][i] + vertical_weight(STRIP_RADIUS) * added, FORMAT);
             for (int tap = 1; tap < SUMS; ++tap)
-                sums[tap - 1][i] = sums[tap][i] + down(STRIP_RADIUS - tap) * added;
-            sums[SUMS - 1][i] = down(STRIP_RADIUS) * added;
+                sums[tap - 1][i] = sums[tap][i] + vertical_weight(STRIP_RADIUS - tap) * added;
+            sums[SUMS - 1][i] = vertical_weight(STRIP_RADIUS) * added;
         }
         if (y < first.y + STRIP_RADIUS)
             continue;
         for (int i = 0; i < STRIP_COLUMNS; ++i) {
             vec3 sum = vec3(0.0);
             for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
-                sum += across(tap) * line[i + STRIP_RADIUS + tap];
+                sum += horizontal_weight(tap) * line[i + STRIP_RADIUS + tap];
             bloom[i] = as_stored(sum, FORMAT);
         }
         for (int i = 0; i < STRIP_COLUMNS; ++i) {

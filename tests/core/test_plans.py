@@ -80,13 +80,13 @@ def test_variants_are_seen_without_a_renderer() -> None:
         return [(one[1], one[4]) for one in rows]
 
     assert variants("fragment") == [
-        ("extract_frag", "fragment"),
+        ("threshold_frag", "fragment"),
         ("blur_frag", "fragment"),
         ("blur_frag", "fragment"),
         ("composite_frag", "fragment"),
     ]
     assert variants("cpu") == [
-        ("bright_comp_rgba16float", "pixels"),
+        ("threshold_comp_rgba16float", "pixels"),
         ("line_comp_rgba16float", "line"),
         ("line_comp_rgba16float", "line"),
         ("blend_comp_rgba16float", "pixels"),

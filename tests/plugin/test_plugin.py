@@ -479,12 +479,22 @@ def test_same(frame_regression):
     frame_regression.compare(frames(), frames(0.00005))
 
 def test_other(frame_regression):
+    names = {"info": {"adapter": "My engine"}, "expected_info": {"driver": "Mesa 25"}}
+    frame_regression.compare(frames(0.1), frames(), **names)
+
+def test_unnamed(frame_regression):
     frame_regression.compare(frames(0.1), frames())
 """,
         )
         result = run(project, "--bloom-report=report")
-        result.assert_outcomes(passed=1, failed=1)
-        result.stdout.fnmatch_lines(["*test_other: the first framebuffer that differs is bloom *"])
+        result.assert_outcomes(passed=1, failed=2)
+        result.stdout.fnmatch_lines(
+            [
+                "*test_other: the first framebuffer that differs is bloom *",
+                f"*reference: Mesa 25, {cpu_vendor()}; now: My engine, {cpu_vendor()}",
+                "*reference: arrays that name no adapter, *; now: arrays that name no adapter, *",
+            ]
+        )
         assert not (project.path / "bloom_references").exists()
 
     @pytest.mark.parametrize("folder", ["", "file", "file/below"])

@@ -189,8 +189,10 @@ def test_a_small_frame_sees_the_skys_mip_levels(
     camera = Camera(position=(0.0, 0.0, 1e4), rotation=(0.0, 0.0, 0.0), fov=90.0)
     sky = dataclasses.replace(scene, skybox=Cubemap(tuple(levels)), camera=camera)
     seen = renderer.render(sky, Separable(bloom=False), (side, side), shading="deferred")["albedo"]
-    # Linear between levels; devices approximate which, lavapipe to 0.04 here.
-    np.testing.assert_allclose(rgb(seen), level, atol=0.1)
+    # Linear between levels; devices approximate which, lavapipe to 0.04 here. The last column and row
+    # of an odd side share their quads with fragments beyond the face, which have other derivatives.
+    inner = rgb(seen)[: side // 2 * 2, : side // 2 * 2]
+    np.testing.assert_allclose(inner, level, atol=0.1)
 
 
 def test_no_sky_is_black(renderer: Renderer, scene: Scene) -> None:

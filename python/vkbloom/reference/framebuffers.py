@@ -26,7 +26,7 @@ from . import (
 from .compositing import CompositeSettings, check_settings, composite
 from .image import Storage, as_float, finite, format_of, storage
 from .sampling import Array, sample
-from .threshold import extract
+from .threshold import apply_threshold
 
 __all__ = ["apply", "blur", "gain", "passes"]
 
@@ -135,8 +135,8 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     store = storage(format_of(image, settings.format))
     reduced = sample(finite(scene[..., :3]), _bloom_size(settings, (width, height)))
     threshold = None if method.published else settings.threshold
-    extracted = extract(reduced, threshold, settings.knee)
-    glow = store.end(extracted) if method.published else store(extracted)
+    kept = apply_threshold(reduced, threshold, settings.knee)
+    glow = store.end(kept) if method.published else store(kept)
     blurred = method.passes(glow, settings, (width, height), store)
     framebuffers = {name: _with_alpha(rgb) for name, rgb in {"glow": glow, **blurred}.items()}
     framebuffers["final"] = composite(scene, framebuffers["bloom"], settings, dtype)
@@ -272,7 +272,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
     """
     method = _method(settings)
     threshold = None if method.published else settings.threshold
-    glow = float(extract(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
+    glow = float(apply_threshold(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
     return glow * (method.gain(settings, size) if method.sized else method.gain(settings))
 
 

@@ -1,4 +1,4 @@
-"""Extraction of what glows: by luminance, or by brightness with a soft knee."""
+"""The threshold: by luminance, or by brightness with a soft knee."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from .sampling import Array
 
-__all__ = ["extract", "luminance", "soften"]
+__all__ = ["apply_threshold", "luminance", "soften"]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -27,7 +27,7 @@ def luminance(rgb: Array) -> Array:
     return weighted
 
 
-def extract(rgb: Array, threshold: float | None, knee: float) -> Array:
+def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
     """Keep what is brighter than the threshold.
 
     Without a knee, a colour stays whole where its luminance is greater than the threshold and

@@ -66,7 +66,7 @@ class Origin:
         """All fields but the version on one line, and of the hash its start."""
         sha256 = f"SHA-256 {self.driver_sha256[:12]}" if self.driver_sha256 else None
         made_by = [text for text in (self.adapter, self.driver, sha256) if text]
-        return ", ".join([*(made_by or ["an unnamed adapter"]), self.cpu_vendor])
+        return ", ".join([*(made_by or ["arrays that name no adapter"]), self.cpu_vendor])
 
     @property
     def machine(self) -> tuple[str | None, ...]:

@@ -225,6 +225,8 @@ class FrameRegression:
         flip: float | None = None,
         warn: float | None = None,
         allow_nan: bool = False,
+        info: Mapping[str, Any] | None = None,
+        expected_info: Mapping[str, Any] | None = None,
     ) -> None:
         """Compare frames with others of the same test, and report as `check` does.
 
@@ -236,6 +238,9 @@ class FrameRegression:
             Name in messages and the report.
         atol, rtol, fail_percent, hard_fail, ssim, flip, warn, allow_nan
             As for `check`.
+        info, expected_info : mapping of str to object, optional
+            "adapter" and "driver" that made `actual` and `expected`, for messages and the report:
+            an engine's name, or `Frames.info`. `Frames` have their own.
 
         Raises
         ------
@@ -258,9 +263,11 @@ class FrameRegression:
         if name is not None:
             check_name(name)
         given = _Given(
-            name or self._name, _images("actual", actual), _origin(actual, None), tolerances
+            name or self._name, _images("actual", actual), _origin(actual, info), tolerances
         )
-        reference = Reference(images=_images("expected", expected), origin=_origin(expected, None))
+        reference = Reference(
+            images=_images("expected", expected), origin=_origin(expected, expected_info)
+        )
         self._conclude(given, reference, judge(reference.images, given.images, tolerances), None)
 
     def _chosen_name(self, name: str | None) -> str:
@@ -424,7 +431,7 @@ def _check_alone(**tolerances: float | None) -> None:
         raise ValueError(f"exact: True excludes tolerances; leave out {', '.join(given)}")
 
 
-def _origin(frames: object, info: Mapping[str, str] | None) -> Origin:
+def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
     known: Mapping[str, Any] = info or (frames.info if isinstance(frames, Frames) else {})
     return Origin(
         adapter=known.get("adapter"),

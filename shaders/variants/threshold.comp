@@ -1,12 +1,12 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// What of an image is bright enough, where the bloom buffers have its size: texels are loaded, past
-// the sampler.
+// The threshold pass if the bloom buffers have the size of the image. Texels are loaded directly,
+// without the sampler.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
-UNIFORM_BLOCK(EXTRACT_BLOCK);
+UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "lib/storage.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
@@ -18,6 +18,6 @@ layout(set = 0, binding = 2) uniform writeonly image2D target;
 vec4 shade(ivec2 pixel)
 {
     vec3 colour = finite_or_zero(imageLoad(image, pixel).rgb);
-    vec3 bright = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
-    return vec4(storable(bright), 1.0);
+    vec3 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
+    return vec4(storable(kept), 1.0);
 }

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// An image reduced to the size of the bloom buffers, then what of it is bright enough. NaN and
-// infinity count as 0 before they can reach a neighbour.
+// The threshold pass: reduces an image to the size of the bloom buffers, then applies the threshold.
+// NaN and infinity become 0 first, since the filter would spread them.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
@@ -9,7 +9,7 @@
 #define TEXEL(value) vec4(finite_or_zero((value).rgb), 1.0)
 #include "lib/sampling.glsl"
 
-UNIFORM_BLOCK(EXTRACT_BLOCK);
+UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D image;
@@ -20,10 +20,10 @@ layout(set = 0, binding = 1) uniform sampler2D image;
 vec4 shade()
 {
     Place place = PLACE_IN(image);
-    // A flat area at the threshold stays out of the bloom as a whole.
+    // Rounding in the filter must not lift pixels of a flat area over the threshold.
     bool within = THRESHOLD_MODE == THRESHOLD_HARD && SAMPLING == SAMPLING_FETCH;
     vec3 reduced = within ? fetch_within(image, place).rgb
                           : sample_at(image, place, vec2(0.0), SAMPLING).rgb;
-    vec3 bright = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
-    return vec4(storable(bright), 1.0);
+    vec3 kept = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
+    return vec4(storable(kept), 1.0);
 }
