@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from importlib.util import find_spec
 
+#: The status after Ctrl-C, as shells report it.
+INTERRUPTED = 130
+
 
 def main() -> None:
-    """Run the command line and exit with its status: 0, 1 (failed) or 2 (wrong use)."""
+    """Run the command line and exit with its status: 0, 1 (failed), 2 (wrong use) or 130."""
     missing = [name for name in ("click", "rich", "tqdm") if find_spec(name) is None]
     if missing:
         needed = " and ".join(missing)
@@ -19,4 +23,12 @@ def main() -> None:
     # File names may hold characters that the terminal's encoding cannot represent.
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
-    program()
+    try:
+        program()
+    except SystemExit as error:
+        if error.code == INTERRUPTED:
+            # All files are closed. Python would wait for threads, and they for the device.
+            for stream in filter(None, (sys.stdout, sys.stderr)):
+                stream.flush()
+            os._exit(INTERRUPTED)
+        raise

@@ -9,6 +9,7 @@ import itertools
 import json
 import sys
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import (
     COLOURS,
+    check_input_colour,
     input_colour_option,
     layer_option,
     note,
@@ -29,11 +31,13 @@ from vkbloom.cli.image_files import (
     subimage_option,
 )
 from vkbloom.cli.in_a_row import read_ahead, rendered, written_behind
+from vkbloom.cli.large import apply_by_rows, is_large
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.io import image_writing
-from vkbloom.io.images import Colour, Picture, SavedColour
+from vkbloom.interruptible import opened_renderer
+from vkbloom.io import image_reading, image_writing
+from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage
 from vkbloom.settings import Encoding
 
 
@@ -76,11 +80,18 @@ from vkbloom.settings import Encoding
     help="Do not decode or encode colours: use the values of an 8-bit file unchanged, in 8-bit "
     "buffers.",
 )
+@click.option(
+    "--half/--no-half",
+    "half",
+    default=None,
+    help="Hold large pictures in half floats, which takes half the memory [default of files of 8 "
+    "bits with 64 million pixels and more]",
+)
 @subimage_option
 @layer_option
 @device_options
 @settings_options
-def command(
+def command(  # noqa: PLR0915  one step after the other
     *,
     sources: tuple[str, ...],
     out: str | None,
@@ -90,6 +101,7 @@ def command(
     input_colour: Colour | None,
     output_colour: SavedColour | None,
     raw: bool,
+    half: bool | None,
     subimage: int,
     layer: str | None,
     adapter: str,
@@ -123,6 +135,9 @@ def command(
     is read, or --subimage, and of several layers the one that --layer names; channels other than
     R, G, B and A are left out.
 
+    Pictures of 16 million pixels and more are read and written by bands of rows, unless they are
+    turned; --half holds them in half floats.
+
     OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
     """
     if raw and (input_colour or output_colour):
@@ -133,6 +148,7 @@ def command(
         raise click.UsageError(
             f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
         )
+    check_input_colour(input_colour)
     given, out = _arguments(sources, out)
     if out == PIPE and attachments != "final":
         raise click.UsageError("standard output takes final alone, without --attachments")
@@ -162,26 +178,64 @@ def command(
                 for path in written:
                     click.echo(f"wrote {path}")
 
-        # Before the device is opened: the most likely failure comes at once.
-        first = taken(work[0][0])
-        pictures = itertools.chain([first], read_ahead(taken, [name for name, _ in work[1:]]))
+        def decode(rows: StoredImage) -> Picture:
+            return image_reading.decode(rows, input_colour, raw=raw)
+
+        def by_rows(name: str) -> bool:
+            is_plain = attachments == "final" and out != PIPE and not (layer or subimage or raw)
+            return is_plain and is_large(name)
+
+        def write_large(renderer: vkbloom.Renderer, name: str, target: str) -> None:
+            if several:
+                Path(target).parent.mkdir(exist_ok=True)
+            apply_by_rows(
+                renderer,
+                name,
+                Path(target),
+                settings,
+                decode=decode,
+                half=half,
+                colour=output_colour,
+                quality=quality,
+                disable=disable,
+            )
+            if not several:
+                click.echo(f"wrote {target}")
+
         # None: shown where standard error is a terminal.
-        disable = None if several and sys.stderr is not None else True
-        with vkbloom.Renderer(adapter, validation=validation) as renderer:
-            _say(f"Rendering on {renderer.info.summary}", out)
-            with as_wrong_use():
-                renderer.plan(first.pixels, settings, attachments=wanted)
-            results = rendered(renderer, pictures, settings, wanted)
-            del first
-            bar = tqdm(results, total=len(work), unit="image", leave=False, disable=disable)
-            with written_behind() as write_next, contextlib.closing(results):
-                for (picture, frames), (name, target) in zip(bar, work, strict=True):
-                    if no_bloom.is_without(frames):
-                        said = no_bloom.reason(settings, no_bloom.brightest_of(picture.pixels))
-                        note(f"{name}: {said}" if several else said)
-                    write_next(
-                        functools.partial(write, picture, no_bloom.only(frames, names), target)
-                    )
+        disable = None if sys.stderr is not None else True
+        with ExitStack() as stack:
+            renderer: vkbloom.Renderer | None = None
+            for is_alone, group in itertools.groupby(work, key=lambda pair: by_rows(pair[0])):
+                files = list(group)
+                # Before the device is opened: the most likely failure comes at once.
+                first = None if is_alone else taken(files[0][0])
+                if renderer is None:
+                    renderer = stack.enter_context(opened_renderer(adapter, validation))
+                    _say(f"Rendering on {renderer.info.summary}", out)
+                if first is None:
+                    for name, target in files:
+                        write_large(renderer, name, target)
+                    continue
+                with as_wrong_use():
+                    renderer.plan(first.pixels, settings, attachments=wanted)
+                ahead = read_ahead(taken, [name for name, _ in files[1:]])
+                results = rendered(renderer, itertools.chain([first], ahead), settings, wanted)
+                del first
+                bar = tqdm(
+                    results,
+                    total=len(files),
+                    unit="image",
+                    leave=False,
+                    disable=disable if several else True,
+                )
+                with written_behind() as write_next, contextlib.closing(results):
+                    for (picture, frames), (name, target) in zip(bar, files, strict=True):
+                        if no_bloom.is_without(frames):
+                            said = no_bloom.reason(settings, no_bloom.brightest_of(picture.pixels))
+                            note(f"{name}: {said}" if several else said)
+                        kept = no_bloom.only(frames, names)
+                        write_next(functools.partial(write, picture, kept, target))
     if several:
         click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
 

@@ -79,6 +79,16 @@ def note(text: str) -> None:
     click.echo(f"vkbloom: note: {text}", err=True)
 
 
+def check_input_colour(colour: Colour | None) -> None:
+    """Raise click.UsageError for a colour space that is not known."""
+    if colour in (None, *COLOURS):
+        return
+    try:
+        check_space(str(colour))
+    except ValueError as error:
+        raise click.UsageError(f"--input-colour: {error}") from error
+
+
 def read_picture(
     source: str,
     subimage: int,
@@ -96,11 +106,7 @@ def read_picture(
     OSError, ValueError
         The file cannot be read, or a renderer cannot take its pixels.
     """
-    if colour not in (None, *COLOURS):
-        try:
-            check_space(colour)
-        except ValueError as error:
-            raise click.UsageError(f"--input-colour: {error}") from error
+    check_input_colour(colour)
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
         raise click.UsageError(

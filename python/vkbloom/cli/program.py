@@ -12,12 +12,10 @@ import click
 from click.core import ParameterSource
 
 import vkbloom
+from vkbloom.cli import INTERRUPTED
 
 #: Names of the modules of this package that have a click command called `command`.
 COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", "doctor")
-
-#: As shells report a program that Ctrl-C has ended.
-_INTERRUPTED: Final = 130
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
@@ -52,10 +50,10 @@ class Program(click.Group):
         except click.ClickException as error:
             _exit(1, error.format_message())
         except click.Abort:
-            _exit(_INTERRUPTED, "interrupted")
+            _exit(INTERRUPTED, "interrupted")
         except Exception as error:
             if _is_from_interrupt(error):
-                _exit(_INTERRUPTED, "interrupted")
+                _exit(INTERRUPTED, "interrupted")
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))
             raise

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 from vkbloom.grid.filling import Tally
 from vkbloom.grid.plan import Grid, Layout, lay_out
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.running import Sink, run_here
+from vkbloom.interruptible import opened_renderer
 from vkbloom.renderer import Renderer
 
 __all__ = ["render_grid"]
@@ -47,7 +47,7 @@ def render_grid(
     with ExitStack() as stack:
         renderer: Renderer | None = None
         if client is None:
-            renderer = stack.enter_context(_opened(adapter, validation))
+            renderer = stack.enter_context(opened_renderer(adapter, validation))
             layout = lay_out(grid, renderer)
         else:
             from vkbloom.grid import cluster  # noqa: PLC0415  Dask is optional
@@ -74,20 +74,3 @@ def render_grid(
                 validation=validation,
             )
     return shown.tally
-
-
-@contextmanager
-def _opened(adapter: str, validation: bool) -> Iterator[Renderer]:
-    """Open a renderer; if a signal ends the grid, close it without waiting for the device."""
-    renderer = Renderer(adapter, validation=validation)
-    try:
-        yield renderer
-    except Exception:
-        renderer.close()
-        raise
-    except BaseException:
-        # The device finishes its submissions first, which may take many seconds.
-        threading.Thread(target=renderer.close, name="vkbloom-close").start()
-        raise
-    else:
-        renderer.close()

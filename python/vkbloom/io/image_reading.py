@@ -171,28 +171,45 @@ def _read(
         whole = np.zeros((height, width, spec.nchannels), dtype)
         whole[row : row + spec.height, column : column + spec.width] = pixels
         pixels = whole
-    names = list(spec.channelnames)
-    formats = [str(spec.channelformat(index)) for index in range(spec.nchannels)]
+    described = describe(reader)
+    names, formats = described.channels, described.numbers
     if layer is not None:
         own = [index for index, of in enumerate(_layers(spec)) if of == layer]
         pixels = pixels[:, :, own]
-        names = [names[index].rpartition(".")[2] for index in own]
-        formats = [formats[index] for index in own]
-    # Before the other parts are looked at.
-    is_signalled = spec.getattribute("CICP") is not None
-    profile_name = spec.get_string_attribute("ICCProfile:profile_description")
+        names = tuple(names[index].rpartition(".")[2] for index in own)
+        formats = tuple(formats[index] for index in own)
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
         x, y = display[0] - left, display[1] - top
         pixels = _upright(pixels[y : y + display[3], x : x + display[2]], orientation)
         left, top = 0, 0
         display = (0, 0, pixels.shape[1], pixels.shape[0])
-    return StoredImage(
+    return replace(
+        described,
         pixels=np.ascontiguousarray(pixels),
-        channels=tuple(names),
-        numbers=tuple(formats),
+        channels=names,
+        numbers=formats,
         origin=(left, top),
         display=display,
+    )
+
+
+def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
+    """Return what a file says of its current part, without pixels; another may be current then.
+
+    Parameters
+    ----------
+    reader : OpenImageIO.ImageInput
+        From `opened`.
+    """
+    spec = reader.spec()
+    # Before the other parts are looked at.
+    found = StoredImage(
+        pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
+        channels=tuple(spec.channelnames),
+        numbers=tuple(str(spec.channelformat(index)) for index in range(spec.nchannels)),
+        origin=(spec.x, spec.y),
+        display=(spec.full_x, spec.full_y, spec.full_width, spec.full_height),
         associated=spec.alpha_channel >= 0 and not spec.get_int_attribute("oiio:UnassociatedAlpha"),
         space=spec.get_string_attribute("oiio:ColorSpace"),
         attributes={
@@ -200,10 +217,10 @@ def _read(
             for attribute in spec.extra_attribs
             if is_kept(attribute.name)
         },
-        parts=tuple(_parts(reader)),
-        profile_name=profile_name,
-        is_signalled=is_signalled,
+        profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
+        is_signalled=spec.getattribute("CICP") is not None,
     )
+    return replace(found, parts=tuple(_parts(reader)))
 
 
 def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:

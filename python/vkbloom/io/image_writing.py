@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import check_index, import_extra
 from vkbloom.io import safe_writing
-from vkbloom.io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, SavedColour, is_exr
+from vkbloom.io.images import (
+    DTYPES,
+    PIXEL_TYPES,
+    SPACES,
+    Encoding,
+    Picture,
+    SavedColour,
+    is_exr,
+)
 from vkbloom.io.srgb import encode_srgb
 
 if TYPE_CHECKING:
@@ -145,27 +153,35 @@ def _write(
     attributes: Mapping[str, str | int],
 ) -> tuple[str, ...]:
     writer = oiio.ImageOutput.create(str(temporary))
-    chosen = _chosen_layout(oiio, picture, writer, temporary)
-    if chosen is None:
-        raise ValueError(
-            f"{target}: {writer.format_name()} cannot hold this picture; use another format"
-        )
-    values, numbers = chosen
+    layout = chosen_layout(oiio, picture, writer, temporary, target)
+    values, encoding, notes = prepared(picture, *layout, colour, target)
+    described = dataclasses.replace(picture, encoding=encoding)
+    put(oiio, values, described, temporary, target, attributes=attributes)
+    return notes
+
+
+def prepared(
+    picture: Picture, channels: int, numbers: str, colour: SavedColour | None, target: Path
+) -> tuple[NDArray[Any], Encoding | None, tuple[str, ...]]:
+    """Return the values to write in a layout, their encoding, and notes on what is lost.
+
+    Parameters
+    ----------
+    picture : Picture
+        All of the file's rows, or some.
+    channels, numbers
+        From `chosen_layout`.
+    colour, target
+        As for `save`.
+    """
+    values = next(one for one in _layouts(picture, True) if one.shape[2] == channels)
     integer = numbers.startswith("uint")
-    has_alpha = values.shape[2] in (2, 4)
+    has_alpha = channels in (2, 4)
     notes = _losses(picture, target, values, has_alpha, integer)
     encoding = picture.encoding
     if encoding == "linear" and (colour or ("srgb" if integer else "linear")) == "srgb":
         values, encoding = encoded(values, "srgb"), "srgb"
-    put(
-        oiio,
-        as_numbers(values, numbers),
-        dataclasses.replace(picture, encoding=encoding),
-        temporary,
-        target,
-        attributes=attributes,
-    )
-    return tuple(notes)
+    return as_numbers(values, numbers), encoding, tuple(notes)
 
 
 def put(
@@ -203,19 +219,15 @@ def put(
     if not writer.supports("displaywindow"):
         row, column = y - stored.origin[1], x - stored.origin[0]
         values = values[row : row + height, column : column + width]
-    spec = oiio.ImageSpec(
-        values.shape[1], values.shape[0], values.shape[2], PIXEL_TYPES[values.dtype.name]
+    spec = spec_of(
+        oiio,
+        writer,
+        values.shape,
+        values.dtype,
+        picture=picture,
+        target=target,
+        attributes=attributes,
     )
-    if values.shape[2] < 3:
-        has_alpha = values.shape[2] == 2
-        spec.channelnames = ("Y", "A")[: values.shape[2]]
-        spec.alpha_channel = 1 if has_alpha else -1
-    if writer.supports("displaywindow"):
-        spec.x, spec.y = stored.origin
-        spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
-    _describe(spec, picture, writer.format_name(), target)
-    for name, value in attributes.items():
-        spec.attribute(name, value)
     is_written = (
         writer.open(str(temporary), spec)
         and writer.write_image(np.ascontiguousarray(values))
@@ -227,15 +239,54 @@ def put(
     writer.geterror()
 
 
-def _chosen_layout(
-    oiio: ModuleType, picture: Picture, writer: OpenImageIO.ImageOutput, temporary: Path
-) -> tuple[NDArray[Any], str] | None:
-    """Return the channels and the number type to write: the closest ones that the format has."""
+def spec_of(
+    oiio: ModuleType,
+    writer: OpenImageIO.ImageOutput,
+    shape: tuple[int, ...],
+    dtype: np.dtype[Any],
+    *,
+    picture: Picture,
+    target: Path,
+    attributes: Mapping[str, str | int],
+) -> OpenImageIO.ImageSpec:
+    """Return what a file of values of that shape and dtype says; the rest is as for `put`."""
+    stored = picture.stored
+    height, width, channels = shape
+    spec: OpenImageIO.ImageSpec = oiio.ImageSpec(width, height, channels, PIXEL_TYPES[dtype.name])
+    if channels < 3:
+        has_alpha = channels == 2
+        spec.channelnames = ("Y", "A")[:channels]
+        spec.alpha_channel = 1 if has_alpha else -1
+    if writer.supports("displaywindow"):
+        spec.x, spec.y = stored.origin
+        spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
+    _describe(spec, picture, writer.format_name(), target)
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    return spec
+
+
+def chosen_layout(
+    oiio: ModuleType,
+    picture: Picture,
+    writer: OpenImageIO.ImageOutput,
+    temporary: Path,
+    target: Path,
+) -> tuple[int, str]:
+    """Return the number of channels and the number type to write: the closest that there are.
+
+    Raises
+    ------
+    ValueError
+        The format can hold none.
+    """
     for values in _layouts(picture, writer.supports("alpha") != 0):
         for numbers in _PREFERENCES[picture.numbers]:
             if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
-                return values, numbers
-    return None
+                return values.shape[2], numbers
+    raise ValueError(
+        f"{target}: {writer.format_name()} cannot hold this picture; use another format"
+    )
 
 
 def _layouts(picture: Picture, with_alpha: bool) -> Iterator[NDArray[Any]]:

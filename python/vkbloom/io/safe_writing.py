@@ -44,6 +44,7 @@ __all__ = [
 _FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
 
 _LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
+_READ_BYTES: Final = 64 << 20  # bytes read at a time
 _ZEROS: Final = 1 << 20  # bytes written at a time
 
 
@@ -294,7 +295,20 @@ def _is_readable(oiio: ModuleType, file: Path) -> bool:
         oiio.geterror()
         return False
     spec = reader.spec()
-    readable = reader.read_image(0, 0, 0, spec.nchannels, spec.format) is not None
+    # Some rows at a time: large files are not held as a whole.
+    rows = max(_READ_BYTES // max(spec.scanline_bytes(True), 1), 1)
+    place, bottom = (0, 0), spec.y + spec.height
+    readable = (
+        reader.read_image(*place, 0, spec.nchannels, spec.format) is not None
+        if spec.tile_width
+        else all(
+            reader.read_scanlines(
+                *place, y, min(y + rows, bottom), 0, 0, spec.nchannels, spec.format
+            )
+            is not None
+            for y in range(spec.y, bottom, rows)
+        )
+    )
     reader.geterror()
     reader.close()
     return readable
