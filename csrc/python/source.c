@@ -17,7 +17,8 @@ static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind
     if (kind == VKB_INPUT_MASK)
         PyErr_SetString(PyExc_ValueError, "mask: its size is not that of the image");
     else
-        PyErr_SetString(PyExc_ValueError, "emission: its shape and dtype are not those of the image");
+        PyErr_SetString(PyExc_ValueError,
+                        "emission: its shape and dtype are not those of the image");
     return false;
 }
 
