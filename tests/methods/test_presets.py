@@ -310,7 +310,7 @@ def test_filaments_other_settings(renderer: Renderer, settings: Settings, format
 
 
 def test_filament_has_no_knee() -> None:
-    with pytest.raises(ValueError, match=r"knee: 0\.5 is out of range"):
+    with pytest.raises(ValueError, match=r"knee: 0\.5 is not 0"):
         FilamentBloom(knee=0.5)
 
 
