@@ -93,7 +93,8 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
 static PyMethodDef functions[] = {
     {"adapters", adapters, METH_VARARGS,
      "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
-    {"image_source", vkb_image_source, METH_O, "image_source(array) -> Source"},
+    {"image_source", vkb_image_source, METH_VARARGS,
+     "image_source(image, emission=None, mask=None) -> Source"},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
     {"plan", vkb_any_plan, METH_VARARGS,
@@ -218,6 +219,22 @@ static PyObject *new_error(const struct vkb_module_state *state, const struct er
     Py_XDECREF(bases);
     Py_XDECREF(members);
     return type;
+}
+
+void *vkb_new_object(PyObject *type)
+{
+    const allocfunc allocate = (allocfunc)PyType_GetSlot((PyTypeObject *)type, Py_tp_alloc);
+
+    return allocate((PyTypeObject *)type, 0);
+}
+
+void vkb_free_object(PyObject *object)
+{
+    PyTypeObject *type = Py_TYPE(object);
+    const freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
+
+    release(object);
+    Py_DECREF(type);
 }
 
 static bool add_type(PyObject *module, PyType_Spec *spec, const char *name, PyObject **type)

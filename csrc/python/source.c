@@ -1,33 +1,54 @@
-// The Source type: what frames are made from, an image or a scene, read once from Python's objects.
+// The Source type: an image or a scene, converted once from Python objects.
 #include "python/module.h"
 
 #include <stdio.h>
 
-static struct vkb_source_object *new_source(PyObject *module)
+// Whether the emission or the mask fits the image. A missing one does.
+static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind kind)
 {
-    PyTypeObject *type = (PyTypeObject *)vkb_module_state(module)->source_type;
-    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
+    const struct vkb_input *image = &self->images[VKB_INPUT_IMAGE].input;
+    const struct vkb_input *other = &self->images[kind].input;
 
-    return (struct vkb_source_object *)allocate(type, 0);
+    if (!self->images[kind].held
+        || (other->width == image->width && other->height == image->height
+            && (kind == VKB_INPUT_MASK
+                || (other->format == image->format && other->channels == image->channels))))
+        return true;
+    if (kind == VKB_INPUT_MASK)
+        PyErr_SetString(PyExc_ValueError, "mask: its size is not that of the image");
+    else
+        PyErr_SetString(PyExc_ValueError,
+                        "emission: its shape and dtype are not those of the image");
+    return false;
 }
 
-PyObject *vkb_image_source(PyObject *module, PyObject *array)
+PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
 {
-    struct vkb_source_object *self = new_source(module);
+    PyObject *image, *emission = Py_None, *mask = Py_None;
 
+    if (!PyArg_ParseTuple(arguments, "O|OO:image_source", &image, &emission, &mask))
+        return NULL;
+    struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
         return NULL;
-    if (!vkb_read_image(array, &self->image)) {
+    if (!vkb_read_image(image, "image", &self->images[VKB_INPUT_IMAGE])
+        || (emission != Py_None
+            && !vkb_read_image(emission, "emission", &self->images[VKB_INPUT_EMISSION]))
+        || (mask != Py_None && !vkb_read_mask(mask, &self->images[VKB_INPUT_MASK]))
+        || !fits_image(self, VKB_INPUT_EMISSION) || !fits_image(self, VKB_INPUT_MASK)) {
         Py_DECREF(self);
         return NULL;
     }
+    const struct vkb_input *input = &self->images[VKB_INPUT_IMAGE].input;
     self->source = (struct vkb_source){
         .kind = VKB_SOURCE_IMAGE,
         .image =
             {
-                .format = self->image.input.format,
-                .size = {self->image.input.width, self->image.input.height},
-                .channels = self->image.input.channels,
+                .format = input->format,
+                .size = {input->width, input->height},
+                .channels = input->channels,
+                .has_emission = emission != Py_None,
+                .has_mask = mask != Py_None,
             },
     };
     return (PyObject *)self;
@@ -56,7 +77,7 @@ PyObject *vkb_scene_source(PyObject *module, PyObject *arguments)
                           &scene->glow_intensity)
         || !vkb_read_camera(camera, &scene->camera) || !read_shading(shading, &source))
         return NULL;
-    struct vkb_source_object *self = new_source(module);
+    struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
         return NULL;
     if (!vkb_read_scene(scene_tuple, &self->scene)) {
@@ -78,40 +99,38 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     struct vkb_source_object *self = (struct vkb_source_object *)object;
 
     Py_VISIT(Py_TYPE(object));
-    if (self->image.held)
-        Py_VISIT(self->image.view.obj);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (self->images[kind].held)
+            Py_VISIT(self->images[kind].view.obj);
     for (size_t i = 0; i < self->scene.view_count; ++i)
         Py_VISIT(self->scene.views[i].obj);
     return 0;
 }
 
-// What is left is of no kind, so that nothing runs on it.
+// The cleared source has no kind, so that no plan fits it.
 static int clear(PyObject *object)
 {
     struct vkb_source_object *self = (struct vkb_source_object *)object;
 
     self->source = (struct vkb_source){0};
     vkb_release_scene(&self->scene);
-    vkb_release_image(&self->image);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        vkb_release_image(&self->images[kind]);
     return 0;
 }
 
 static void dealloc(PyObject *object)
 {
-    PyTypeObject *type = Py_TYPE(object);
-    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
-
     PyObject_GC_UnTrack(object);
     clear(object);
-    release(object);
-    Py_DECREF(type);
+    vkb_free_object(object);
 }
 
 static PyType_Slot slots[] = {
     {Py_tp_dealloc, dealloc},
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
-    {Py_tp_doc, "What frames are made from: an image or a scene."},
+    {Py_tp_doc, "The input of frames: an image or a scene."},
     {0},
 };
 
