@@ -46,11 +46,11 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
 }
 
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       enum vkb_format format, uint32_t width, uint32_t height,
-                       struct vkb_output *output, struct vkb_error *error)
+                       enum vkb_format format, uint32_t width, struct vkb_output *output,
+                       struct vkb_error *error)
 {
     output->format = format;
-    output->pixels = (size_t)width * height;
+    output->pixels = (size_t)width * output->row_count;
     output->imported = VK_NULL_HANDLE;
     const size_t size = output->pixels * vkb_pixel_size(format);
     if (size >= VKB_IMPORTED_BYTES) {
@@ -80,7 +80,8 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
     VkBufferImageCopy copy = {
         .bufferOffset = output->offset,
         .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
-        .imageExtent = {image->width, image->height, 1},
+        .imageOffset = {0, (int32_t)output->first_row, 0},
+        .imageExtent = {image->width, output->row_count, 1},
     };
 
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);

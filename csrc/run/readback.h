@@ -15,6 +15,7 @@ enum { VKB_IMPORTED_BYTES = 1 << 20 };
 // of each pixel.
 struct vkb_output {
     uint32_t channels;
+    uint32_t first_row, row_count;  // of the image
     void *memory;
     struct vkb_page_run
         *pages;  // that the memory is in; NULL: none of the renderer's, or too little
@@ -34,10 +35,10 @@ struct vkb_readback {
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback);
 
-// Decides how the output, an image of that format and size, comes back.
+// Decides how the output, rows of an image of that format and width, comes back.
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       enum vkb_format format, uint32_t width, uint32_t height,
-                       struct vkb_output *output, struct vkb_error *error);
+                       enum vkb_format format, uint32_t width, struct vkb_output *output,
+                       struct vkb_error *error);
 // After all of them: makes room for what goes through the staging memory.
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error);

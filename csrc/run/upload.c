@@ -164,9 +164,9 @@ static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *
 }
 
 // Memory for an image of another kind than the last.
-static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
-                    const struct vkb_input *input, const struct vkb_image *image,
-                    struct vkb_error *error)
+bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
+                      const struct vkb_input *input, const struct vkb_image *image,
+                      struct vkb_error *error)
 {
     const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
 
@@ -179,6 +179,8 @@ static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
         && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                row_size * input->height, &upload->staging, error))
         return false;
+    memset(upload->rows, 0, input->height * sizeof *upload->rows);
+    upload->specials = (struct vkb_specials){0};
     upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
     upload->row_pitch = image->mapped ? image->row_pitch : row_size;
     upload->format = input->format;
@@ -186,6 +188,29 @@ static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
     upload->height = input->height;
     upload->channels = input->channels;
     return true;
+}
+
+// Rows `from` to the last of the input, which is the image's from row `first` on.
+static void pack_rows(struct vkb_upload *upload, const struct vkb_input *input, uint32_t from,
+                      uint32_t first)
+{
+    for (uint32_t y = from; y < input->height; ++y) {
+        pack_row(kept_row(upload, first + y), input, y);
+        upload->rows[first + y] = count_row(upload, first + y);
+    }
+    upload->specials = (struct vkb_specials){0};
+    for (uint32_t y = 0; y < upload->height; ++y) {
+        upload->specials.nan += upload->rows[y].nan;
+        upload->specials.inf += upload->rows[y].inf;
+    }
+}
+
+bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
+                     const struct vkb_input *input, uint32_t first, struct vkb_error *error)
+{
+    pack_rows(upload, input, 0, first);
+    return upload->pixels != upload->staging.mapped
+        || vkb_buffer_flush(device, &upload->staging, error);
 }
 
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
@@ -201,17 +226,9 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     if (!*changed)
         return true;
     if (!vkb_submissions_wait(device, submissions, error)
-        || (fresh && !prepare(device, upload, input, image, error)))
+        || (fresh && !vkb_upload_begin(device, upload, input, image, error)))
         return false;
-    for (uint32_t y = first; y < input->height; ++y) {
-        pack_row(kept_row(upload, y), input, y);
-        upload->rows[y] = count_row(upload, y);
-    }
-    upload->specials = (struct vkb_specials){0};
-    for (uint32_t y = 0; y < input->height; ++y) {
-        upload->specials.nan += upload->rows[y].nan;
-        upload->specials.inf += upload->rows[y].inf;
-    }
+    pack_rows(upload, input, first, 0);
     return image->mapped || vkb_buffer_flush(device, &upload->staging, error);
 }
 

@@ -44,6 +44,14 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       struct vkb_submissions *submissions, const struct vkb_input *input,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error);
 
+// The same in steps, for an image that nothing compares: memory for an image of the input's kind,
+// whatever its pixels; then rows of it, from `first` on.
+bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
+                      const struct vkb_input *input, const struct vkb_image *image,
+                      struct vkb_error *error);
+bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
+                     const struct vkb_input *input, uint32_t first, struct vkb_error *error);
+
 // Records the copy of what is staged to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,
                        const struct vkb_upload *upload, struct vkb_image *image);

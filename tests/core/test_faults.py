@@ -54,8 +54,8 @@ def show(rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]) ->
 
 
 OTHERS = (
-    *("create", "close", "render forward", "render deferred", "mask and emission"),
-    *("batch", "grid", "grid in memory", "grid to Zarr", "readback"),
+    *("create", "close", "render forward", "render deferred", "mask and emission", "batch"),
+    *("grid", "grid in memory", "grid to Zarr", "readback", "handles"),
 )
 
 
