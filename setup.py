@@ -19,6 +19,7 @@ STAGES = (".vert", ".frag", ".comp")
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
+CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
 
 class Module(NamedTuple):
@@ -32,11 +33,28 @@ class Module(NamedTuple):
 def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to.
 
-    A pass over all pixels has a compute form too; a shader that loads texels without a sampler
-    is compiled for each format that it may load from.
+    A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
+    is compiled for each format that it may load from: for images as words and, if it mentions
+    WORDS, for storage images, too. With words, it is also compiled for three channels, if it
+    mentions IMAGE_CHANNELS.
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
+    if '#include "variants/pixels.glsl"' in text:
+        found = []
+        for ours, glsl in FORMATS.items():
+            if "#ifdef WORDS" in text:
+                images = (f"-DSOURCE_FORMAT={glsl}", "-DIMAGE_CHANNELS=4")
+                found.append(Module(f"{name}_{ours}", shader, images))
+            words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
+            found.append(
+                Module(f"{shader.stem}_words_{ours}", shader, (*words, "-DIMAGE_CHANNELS=4"))
+            )
+            if "IMAGE_CHANNELS" in text:
+                found.append(
+                    Module(f"{shader.stem}_packed_{ours}", shader, (*words, "-DIMAGE_CHANNELS=3"))
+                )
+        return found
     if "SOURCE_FORMAT" in text:
         return [
             Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",))
@@ -118,17 +136,20 @@ def write_spirv() -> None:
     rows = ""
     for module in built:
         dispatch = f"{module.shader.stem}_dispatch"
-        twin = dispatch if dispatch in names else module.name
+        packed = module.name.replace("_words_", "_packed_")
+        twins = (name if name in names else module.name for name in (dispatch, packed))
+        twin_names = ", ".join(f"VKB_SHADER_{twin}" for twin in twins)
         rows += (
-            f'    {{"{module.name}", {module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n'
+            f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twin_names}}},\n'
         )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
         "#include <stddef.h>\n#include <stdint.h>\n\n"
         f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
-        "// `dispatch`: the same pass as a compute shader, or itself where there is none.\n"
+        "// `dispatch`: the same pass as a compute shader; `packed`: the same for packed images;\n"
+        "// itself where there is none.\n"
         "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
-        "    enum vkb_shader dispatch;\n};\n"
+        "    enum vkb_shader dispatch, packed;\n};\n"
         "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
     )
     (SPIRV / "spirv.c").write_text(

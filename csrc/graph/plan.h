@@ -19,6 +19,7 @@ struct vkb_content {
     unsigned char *recipe;  // byte by byte comparable
     size_t recipe_size, recipe_capacity;
     bool valid;  // once the device has run all that was recorded, it holds what the recipe says
+    bool repeated;  // the writing before had the same recipe
 };
 
 // From here until the caller, having recorded the writing, sets `valid`, the image holds nothing

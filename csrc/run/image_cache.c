@@ -57,8 +57,7 @@ static void destroy_image(const struct vkb_device *device, struct vkb_image_cach
 
 static uint64_t image_size(const struct vkb_image *image)
 {
-    return image->handle ? (uint64_t)image->width * image->height * vkb_pixel_size(image->format)
-                         : 0;
+    return image->memory ? (uint64_t)image->width * image->height * vkb_image_pixel_size(image) : 0;
 }
 
 uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache)
@@ -80,7 +79,7 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
     while (size > left) {
         struct vkb_cached_image *oldest = NULL;
         for (size_t i = 0; i < cache->count; ++i)
-            if (cache->images[i]->image.handle
+            if (cache->images[i]->image.memory
                 && (!oldest || cache->images[i]->used < oldest->used))
                 oldest = cache->images[i];
         if (!oldest || !vkb_is_old(oldest->used, age))
@@ -130,18 +129,6 @@ bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_gra
     return true;
 }
 
-// The image from the host: written by it in place where the device reads that as fast.
-static bool is_mapped(const struct vkb_device *device, const struct vkb_image_row *row)
-{
-    const VkFormatFeatureFlags features = VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT
-                                        | VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT
-                                        | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
-
-    return row->input
-        && vkb_device_shares_image(device, vkb_formats[row->format].vk, image_usage(row->format),
-                                   features, row->width, row->height);
-}
-
 static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache, const char *name)
 {
     for (size_t i = 0; i < cache->count; ++i)
@@ -166,15 +153,15 @@ static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache, const 
 
 static bool fits(const struct vkb_image *image, const struct vkb_image_row *row)
 {
-    return image->handle && image->format == row->format && image->width == row->width
-        && image->height == row->height;
+    return image->memory && image->format == row->format && image->width == row->width
+        && image->height == row->height && image->packed == row->packed;
 }
 
 bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
 {
     const struct vkb_cached_image *cached = find_cached(cache, row->name);
 
-    return cached && cached->image.handle && !fits(&cached->image, row);
+    return cached && cached->image.memory && !fits(&cached->image, row);
 }
 
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
@@ -207,7 +194,9 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
                                 .layers = 1,
                                 .levels = 1,
                                 .usage = image_usage(row->format),
-                                .mapped = is_mapped(device, row),
+                                .mapped = device->words
+                                       && row->format != VKB_FORMAT_DEPTH32_FLOAT,
+                                .packed = row->packed,
                             },
                             &cached->image, error);
 }

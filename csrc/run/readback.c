@@ -2,7 +2,19 @@
 
 #include <string.h>
 
-#define READBACK_USAGE VK_BUFFER_USAGE_TRANSFER_DST_BIT
+enum { COPIED_AT_ONCE = 64 };  // rows of a packed image
+
+// Channels of the image, which may be more than those of the output.
+static uint32_t image_channels(const struct vkb_output *output)
+{
+    return output->packed ? 3 : vkb_formats[output->format].channels;
+}
+
+static size_t row_size(const struct vkb_output *output)
+{
+    return (size_t)output->width * image_channels(output)
+         * vkb_formats[output->format].channel_size;
+}
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback)
 {
@@ -19,7 +31,8 @@ static bool import_pages(const struct vkb_device *device, struct vkb_output *out
     VkDeviceSize start = 0;
 
     if (!run->buffer.handle
-        && !vkb_buffer_import(device, READBACK_USAGE, run->memory, run->size, &run->buffer, &start))
+        && !vkb_buffer_import(device, vkb_device_import_usage(device), run->memory, run->size,
+                              &run->buffer, &start))
         return false;
     output->imported = run->buffer.handle;
     output->offset = start + (VkDeviceSize)((char *)output->memory - (char *)run->memory);
@@ -33,12 +46,13 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
     struct vkb_buffer *buffer = &readback->imports[readback->import_count];
 
     // The device writes whole pixels, to multiples of their size.
-    if (output->channels != vkb_formats[output->format].channels
-        || (uintptr_t)output->memory % pixel_size != 0)
+    if (output->channels != image_channels(output)
+        || (!output->packed && (uintptr_t)output->memory % pixel_size != 0))
         return false;
     if (output->pages)
         return import_pages(device, output);
-    if (!vkb_buffer_import(device, READBACK_USAGE, output->memory, size, buffer, &output->offset))
+    if (!vkb_buffer_import(device, vkb_device_import_usage(device), output->memory, size, buffer,
+                           &output->offset))
         return false;
     output->imported = buffer->handle;
     ++readback->import_count;
@@ -46,13 +60,16 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
 }
 
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       enum vkb_format format, uint32_t width, uint32_t height,
-                       struct vkb_output *output, struct vkb_error *error)
+                       const struct vkb_image_row *row, struct vkb_output *output,
+                       struct vkb_error *error)
 {
-    output->format = format;
-    output->pixels = (size_t)width * height;
+    output->format = row->format;
+    output->width = row->width;
+    output->height = row->height;
+    output->packed = row->packed;
     output->imported = VK_NULL_HANDLE;
-    const size_t size = output->pixels * vkb_pixel_size(format);
+    output->stored = false;
+    const size_t size = row_size(output) * row->height;
     if (size >= VKB_IMPORTED_BYTES) {
         if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
                       readback->import_count + 1, sizeof *readback->imports))
@@ -66,27 +83,63 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     return true;
 }
 
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output)
+{
+    const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
+
+    return output->imported && row_size(output) % VKB_WORD_SIZE == 0
+        && output->offset % VKB_WORD_SIZE == 0 && output->offset % align == 0;
+}
+
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error)
 {
-    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, READBACK_USAGE, readback->used,
+    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_DST_BIT, readback->used,
                               &readback->staging, error);
+}
+
+static void copy_packed(const struct vkb_device *device, VkCommandBuffer commands,
+                        const struct vkb_image *image, const struct vkb_output *output,
+                        VkBuffer to)
+{
+    const size_t size = row_size(output);
+    // Rows without a gap between them are one.
+    const size_t part = size == image->row_pitch ? size * output->height : size;
+    const uint32_t count = part == size ? output->height : 1;
+    VkBufferCopy copies[COPIED_AT_ONCE];
+
+    for (uint32_t first = 0; first < count; first += COPIED_AT_ONCE) {
+        uint32_t i = 0;
+        for (; i < COPIED_AT_ONCE && first + i < count; ++i)
+            copies[i] = (VkBufferCopy){
+                .srcOffset = (first + i) * image->row_pitch,
+                .dstOffset = output->offset + (first + i) * part,
+                .size = part,
+            };
+        device->vk.vkCmdCopyBuffer(commands, image->buffer, to, i, copies);
+    }
 }
 
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          const struct vkb_readback *readback, struct vkb_image *image,
                          const struct vkb_output *output)
 {
+    const VkBuffer to = output->imported ? output->imported : readback->staging.handle;
     VkBufferImageCopy copy = {
         .bufferOffset = output->offset,
         .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
         .imageExtent = {image->width, image->height, 1},
     };
 
+    if (output->stored)
+        return;
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
-    device->vk.vkCmdCopyImageToBuffer(
-        commands, image->handle, vkb_access_layout(VKB_ACCESS_COPY_SOURCE),
-        output->imported ? output->imported : readback->staging.handle, 1, &copy);
+    if (output->packed)
+        copy_packed(device, commands, image, output, to);
+    else
+        device->vk.vkCmdCopyImageToBuffer(commands, image->handle,
+                                          vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1,
+                                          &copy);
 }
 
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
@@ -108,24 +161,24 @@ static inline void drop_alpha(unsigned char *to, const unsigned char *from, size
 
 void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
 {
-    const struct vkb_format_info *format = &vkb_formats[output->format];
+    const size_t pixels = (size_t)output->width * output->height;
 
     if (output->imported)
         return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
-    if (output->channels == format->channels) {
-        memcpy(output->memory, from, output->pixels * vkb_pixel_size(output->format));
+    if (output->channels == image_channels(output)) {
+        memcpy(output->memory, from, row_size(output) * output->height);
         return;
     }
-    switch (format->channel_size) {
+    switch (vkb_formats[output->format].channel_size) {
     case 1:
-        drop_alpha(output->memory, from, output->pixels, 1);
+        drop_alpha(output->memory, from, pixels, 1);
         break;
     case 2:
-        drop_alpha(output->memory, from, output->pixels, 2);
+        drop_alpha(output->memory, from, pixels, 2);
         break;
     default:
-        drop_alpha(output->memory, from, output->pixels, 4);
+        drop_alpha(output->memory, from, pixels, 4);
         break;
     }
 }

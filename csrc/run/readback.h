@@ -3,6 +3,7 @@
 #ifndef VKB_READBACK_H
 #define VKB_READBACK_H
 
+#include "graph/graph.h"
 #include "run/pages.h"
 
 // From so many bytes on the device writes to the caller's memory itself. On lavapipe 22.3.6 (two
@@ -20,9 +21,13 @@ struct vkb_output {
         *pages;  // that the memory is in; NULL: none of the renderer's, or too little
     // What vkb_readback_plan decides.
     enum vkb_format format;
-    size_t pixels;
+    uint32_t width, height;
+    bool packed;          // the image is
     VkBuffer imported;    // the caller's memory as a buffer; VK_NULL_HANDLE: through the staging
     VkDeviceSize offset;  // in either
+    // Decided while its passes are recorded: the last of them stores to the imported memory, so
+    // there is no copy.
+    bool stored;
 };
 
 struct vkb_readback {
@@ -34,15 +39,17 @@ struct vkb_readback {
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback);
 
-// Decides how the output, an image of that format and size, comes back.
+// Decides how the output, an image of that row, comes back.
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       enum vkb_format format, uint32_t width, uint32_t height,
-                       struct vkb_output *output, struct vkb_error *error);
+                       const struct vkb_image_row *row, struct vkb_output *output,
+                       struct vkb_error *error);
+// Whether a pass can store words to the output's memory.
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output);
 // After all of them: makes room for what goes through the staging memory.
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error);
 
-// Records the copy of the output's image.
+// Records the copy of the output's image, unless a pass stored it.
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          const struct vkb_readback *readback, struct vkb_image *image,
                          const struct vkb_output *output);

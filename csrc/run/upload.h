@@ -25,6 +25,7 @@ struct vkb_upload {
     size_t row_pitch;
     enum vkb_format format;  // of what it holds; NONE: nothing
     uint32_t width, height, channels;
+    uint32_t kept_channels;        // 3 of a packed image, else 4
     struct vkb_specials *rows;     // in each row of what it holds
     struct vkb_specials specials;  // in all
     unsigned char *packed;         // one row, to be compared
@@ -36,7 +37,7 @@ void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *uplo
 // What it holds is not compared with the next image.
 void vkb_upload_forget(struct vkb_upload *upload);
 
-// Packs the image to RGBA, alpha 1 where it has none; *changed: it is another one than the last.
+// Packs the image to RGBA, alpha 1 where it has none, or to RGB, if `image` is packed; *changed: it is another one than the last.
 // The submissions may still read the last one: they are waited for before it is written over.
 // `image` is where the device will read it; if that is mapped, it has it now, else
 // vkb_upload_record brings it there.

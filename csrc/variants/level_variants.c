@@ -14,7 +14,7 @@ static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uin
                            uint32_t rows)
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
-    row->loads = true;
+    row->reading = VKB_READING_LOADED;
     row->constants = (struct vkb_constants){0};
 }
 
@@ -90,7 +90,7 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     memset(&row.params, 0, sizeof row.params);
     vkb_make_dispatch(&row, double_final_shaders[plain->images[up->reads[0]].format],
                       ROW_INVOCATIONS * DOUBLE_COLUMNS, DOUBLE_ROWS);
-    row.loads = true;
+    row.reading = VKB_READING_LOADED;
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];

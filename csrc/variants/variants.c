@@ -62,6 +62,24 @@ void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_
     row->block_height = block_height;
 }
 
+void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t invocations,
+                    uint32_t columns, uint32_t rows)
+{
+    vkb_make_dispatch(row, shader, invocations * columns, rows);
+    row->reading = VKB_READING_WORDS;
+}
+
+bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    bool fits = choice->device->words;
+
+    for (uint32_t i = 0; i < pass->read_count; ++i) {
+        const struct vkb_image_row *row = &choice->graph->images[pass->reads[i]];
+        fits = fits && vkb_image_fits_words(choice->device, row->format, row->width, row->height);
+    }
+    return fits;
+}
+
 const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image)
 {
     const struct vkb_pass_row *writer = NULL;
@@ -98,7 +116,7 @@ static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pas
 static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader)
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * TEXEL_COLUMNS, TEXEL_ROWS);
-    row->loads = true;
+    row->reading = VKB_READING_LOADED;
 }
 
 bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,

@@ -1,56 +1,82 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // An image's whole bloom for processors without fast shared memory: an invocation walks down a
 // strip, with the vertical sums of the rows to come in registers.
 #include "variants/whole.glsl"
+#include "variants/pixels.glsl"
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
-layout(set = 0, binding = 2) uniform writeonly image2D target;
-
+const int COLUMNS = CHANNEL_BYTES == 1 ? 2 * STRIP_COLUMNS : STRIP_COLUMNS;
 const int SUMS = 2 * STRIP_RADIUS;
-const int LOADED = STRIP_COLUMNS + 2 * STRIP_RADIUS;
+const int LOADED = COLUMNS + 2 * STRIP_RADIUS;
+
+layout(local_size_x = STRIP_INVOCATIONS) in;
+READ_IMAGE(1, image);
+WRITE_IMAGE(2);
+
+#define LOAD load_wide
+#define LOAD_IMAGE image
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS IMAGE_CHANNELS
+#define LOAD_FROM -STRIP_RADIUS
+#define LOAD_COUNT LOADED
+#include "variants/load.glsl"
+
+#define LOAD load_own
+#define LOAD_IMAGE image
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS IMAGE_CHANNELS
+#define LOAD_FROM 0
+#define LOAD_COUNT COLUMNS
+#include "variants/load.glsl"
+
+#define STORE_COUNT COLUMNS
+#define STORE_CHANNELS IMAGE_CHANNELS
+#include "variants/store.glsl"
 
 void main()
 {
-    ivec2 last = imageSize(image) - 1;
-    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(STRIP_COLUMNS, STRIP_ROWS);
-    int end = min(first.y + STRIP_ROWS, last.y + 1);
+    ivec2 size = READ_SIZE(image, 1);
+    ivec2 first = first_pixel(ivec2(COLUMNS, STRIP_ROWS));
+    int end = min(first.y + STRIP_ROWS, size.y);
     vec3 sums[SUMS][LOADED];
     vec3 line[LOADED];
-    vec3 bloom[STRIP_COLUMNS];
+    uvec4 raw[LOADED], own[COLUMNS];
+    float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
 
-    if (any(greaterThan(first, last)))
+    if (any(greaterThanEqual(first, size)))
         return;
-    for (int row = 0; row < SUMS; ++row)
-        for (int i = 0; i < LOADED; ++i)
+    [[unroll]] for (int i = 0; i <= STRIP_RADIUS; ++i) {
+        weights[i] = down(i);
+        row_weights[i] = across(i);
+    }
+    [[unroll]] for (int row = 0; row < SUMS; ++row)
+        [[unroll]] for (int i = 0; i < LOADED; ++i)
             sums[row][i] = vec3(0.0);
+    // Every loop but this is unrolled: else the sums would be memory.
     for (int y = first.y - STRIP_RADIUS; y < end + STRIP_RADIUS; ++y) {
-        int row = clamp(y, 0, last.y);
-        // In small loops, each of which drivers unroll; in one large one the sums would be memory.
-        for (int i = 0; i < LOADED; ++i)
-            line[i] = bright(imageLoad(image, ivec2(clamp(first.x + i - STRIP_RADIUS, 0, last.x), row)).rgb);
-        for (int i = 0; i < LOADED; ++i) {
+        load_wide(first.x, clamp(y, 0, size.y - 1), raw);
+        [[unroll]] for (int i = 0; i < LOADED; ++i)
+            line[i] = bright(colour_of(raw[i]));
+        [[unroll]] for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
-            line[i] = as_stored(sums[0][i] + down(STRIP_RADIUS) * added, FORMAT);
-            for (int tap = 1; tap < SUMS; ++tap)
-                sums[tap - 1][i] = sums[tap][i] + down(STRIP_RADIUS - tap) * added;
-            sums[SUMS - 1][i] = down(STRIP_RADIUS) * added;
+            line[i] = as_stored(sums[0][i] + weights[STRIP_RADIUS] * added, FORMAT);
+            [[unroll]] for (int tap = 1; tap < SUMS; ++tap)
+                sums[tap - 1][i] = sums[tap][i] + weights[abs(STRIP_RADIUS - tap)] * added;
+            sums[SUMS - 1][i] = weights[STRIP_RADIUS] * added;
         }
         if (y < first.y + STRIP_RADIUS)
             continue;
-        for (int i = 0; i < STRIP_COLUMNS; ++i) {
-            vec3 sum = vec3(0.0);
-            for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
-                sum += across(tap) * line[i + STRIP_RADIUS + tap];
-            bloom[i] = as_stored(sum, FORMAT);
-        }
-        for (int i = 0; i < STRIP_COLUMNS; ++i) {
+        load_own(first.x, y - STRIP_RADIUS, own);
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             ivec2 pixel = ivec2(first.x + i, y - STRIP_RADIUS);
-            if (pixel.x <= last.x)
-                imageStore(target, pixel,
-                           finish(imageLoad(image, pixel), bloom[i], pixel));
+            vec3 sum = vec3(0.0);
+            [[unroll]] for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
+                sum += row_weights[abs(tap)] * line[i + STRIP_RADIUS + tap];
+            vec4 scene = vec4(colour_of(own[i]), 1.0);
+            own[i] = with_colour(own[i], finish(scene, as_stored(sum, FORMAT), pixel).rgb);
         }
+        store(first.x, y - STRIP_RADIUS, own);
     }
 }
