@@ -19,6 +19,9 @@ STAGES = (".vert", ".frag", ".comp")
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
+# Shaders whose images are always words.
+WORDS_ALONE = {"strip.comp", "bright.comp", "blend.comp"}
+
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
 
@@ -34,16 +37,15 @@ def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to.
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
-    is compiled for each format that it may load from: for images as words and, if it mentions
-    WORDS, for storage images, too. With words, it is also compiled for three channels, if it
-    mentions IMAGE_CHANNELS.
+    is compiled for each format that it may load from: for images as words, with four channels and,
+    if it mentions IMAGE_CHANNELS, with three; and for storage images, unless only CPUs run it.
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
     if '#include "variants/pixels.glsl"' in text:
         found = []
         for ours, glsl in FORMATS.items():
-            if "#ifdef WORDS" in text:
+            if shader.name not in WORDS_ALONE:
                 images = (f"-DSOURCE_FORMAT={glsl}", "-DIMAGE_CHANNELS=4")
                 found.append(Module(f"{name}_{ours}", shader, images))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")

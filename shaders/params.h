@@ -216,14 +216,19 @@
 #define LINE_OUTPUTS 8
 #define LINE_VEC4S 34
 #define STRIP_RADIUS 4
-#define STRIP_INVOCATIONS 8
-#define STRIP_COLUMNS 8
+#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
 #define STRIP_ROWS 135
 #define HALVE_COLUMNS 4
 #define HALVE_ROWS 16
 #define DOUBLE_COLUMNS 4
 #define DOUBLE_ROWS 32
-#define TEXEL_COLUMNS 4
+// Of variants that load words: pixels of three channels, too, fill them. CHANNEL is the bytes of a
+// channel.
+#define HALVE_WORDS_COLUMNS 8
+#define HALVE_WORDS_ROWS 32
+#define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
+#define DOUBLE_WORDS_ROWS 64
+#define TEXEL_COLUMNS(CHANNEL) (16 / (CHANNEL))
 #define TEXEL_ROWS 16
 #define TILE_LOADED 64
 #define TILE_ROWS 32

@@ -45,8 +45,8 @@ static inline bool vkb_is_mesh(enum vkb_geometry geometry)
     return geometry == VKB_GEOMETRY_BODY || geometry == VKB_GEOMETRY_GLOW;
 }
 
-// How a pass reads its images. A dispatch writes its target in the same way, except that a pass that
-// reads sampled images writes a storage image.
+// How a pass reads its images. A dispatch writes its target in the same way, except that a pass
+// that reads sampled images writes a storage image.
 enum vkb_reading {
     VKB_READING_SAMPLED,
     VKB_READING_LOADED,  // as storage images

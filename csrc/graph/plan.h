@@ -18,7 +18,7 @@ struct vkb_content {
     uint64_t version;       // given anew each time that the image is written
     unsigned char *recipe;  // byte by byte comparable
     size_t recipe_size, recipe_capacity;
-    bool valid;  // once the device has run all that was recorded, it holds what the recipe says
+    bool valid;     // once the device has run all that was recorded, it holds what the recipe says
     bool repeated;  // the writing before had the same recipe
 };
 

@@ -194,8 +194,7 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
                                 .layers = 1,
                                 .levels = 1,
                                 .usage = image_usage(row->format),
-                                .mapped = device->words
-                                       && row->format != VKB_FORMAT_DEPTH32_FLOAT,
+                                .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
                                 .packed = row->packed,
                             },
                             &cached->image, error);

@@ -22,7 +22,7 @@ enum vkb_binding_kind {
 
 // Images as words, as variants/words.glsl has them.
 struct vkb_words {
-    int32_t target[4];               // width, height, words in a row, first row of what is bound
+    int32_t target[4];                // width, height, words in a row, first row of what is bound
     int32_t reads[VKB_MAX_LOADS][4];  // width, height, words in a row
     uint32_t zero;
 };

@@ -94,13 +94,12 @@ bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error)
 {
-    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_DST_BIT, readback->used,
-                              &readback->staging, error);
+    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                              readback->used, &readback->staging, error);
 }
 
 static void copy_packed(const struct vkb_device *device, VkCommandBuffer commands,
-                        const struct vkb_image *image, const struct vkb_output *output,
-                        VkBuffer to)
+                        const struct vkb_image *image, const struct vkb_output *output, VkBuffer to)
 {
     const size_t size = row_size(output);
     // Rows without a gap between them are one.
@@ -137,9 +136,8 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
     if (output->packed)
         copy_packed(device, commands, image, output, to);
     else
-        device->vk.vkCmdCopyImageToBuffer(commands, image->handle,
-                                          vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1,
-                                          &copy);
+        device->vk.vkCmdCopyImageToBuffer(
+            commands, image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1, &copy);
 }
 
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,

@@ -37,9 +37,8 @@ static inline void pack_rgb(unsigned char *to, const unsigned char *from, uint32
     memcpy(to + 3 * size, one, size);
 }
 
-static inline void pack_strided(unsigned char *to, uint32_t to_channels,
-                                const unsigned char *from, const struct vkb_input *input,
-                                const void *one, size_t size)
+static inline void pack_strided(unsigned char *to, uint32_t to_channels, const unsigned char *from,
+                                const struct vkb_input *input, const void *one, size_t size)
 {
     for (uint32_t x = 0; x < input->width;
          ++x, to += to_channels * size, from += input->pixel_stride) {
@@ -101,8 +100,7 @@ static unsigned char *kept_row(const struct vkb_upload *upload, uint32_t y)
 
 static size_t row_size(const struct vkb_upload *upload)
 {
-    return (size_t)upload->width * upload->kept_channels
-         * vkb_formats[upload->format].channel_size;
+    return (size_t)upload->width * upload->kept_channels * vkb_formats[upload->format].channel_size;
 }
 
 static bool row_differs(const struct vkb_upload *upload, const struct vkb_input *input, uint32_t y)

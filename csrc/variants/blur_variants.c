@@ -95,7 +95,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.params.extract.target_height = sampling.height;
     row.params.extract.limit = sampling.limit;
     return vkb_graph_add_pass(choice->graph, &line, error)
-        && vkb_add_fullscreen(choice->variants, choice->graph, &row, error);
+        && vkb_add_fullscreen(choice, &row, error);
 }
 
 // The chain of passes that gives an image its bloom where all have its size.
@@ -167,10 +167,9 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
     if (!*fits)
         return true;
     struct vkb_pass_row row = whole_row(choice, &chain);
-    vkb_make_words(&row, strip_shaders[format], STRIP_INVOCATIONS,
-                   format == VKB_FORMAT_RGBA8_UNORM ? 2 * STRIP_COLUMNS : STRIP_COLUMNS,
+    vkb_make_words(&row, strip_shaders[format], STRIP_COLUMNS(vkb_formats[format].channel_size),
                    STRIP_ROWS);
-    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
+    return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -194,8 +193,7 @@ bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vk
     row.constants.format =
         vkb_stored_as(choice->device, choice->plain.images[pass->reads[1]].format);
     row.fused = true;
-    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
-        && vkb_add_fullscreen(choice->variants, choice->graph, &row, error);
+    return vkb_add_fullscreen(choice, pass, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
 // The same in tiles, for kernels of up to TILE_RADIUS in three steps.
@@ -216,6 +214,6 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
     struct vkb_pass_row row = whole_row(choice, &chain);
     vkb_make_dispatch(&row, VKB_SHADER_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row.constants.radius = radius;
-    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
+    return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

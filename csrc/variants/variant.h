@@ -50,15 +50,15 @@ const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_
 // Makes a dispatch of a pass over all pixels.
 void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
                        uint32_t block_height);
-// Makes a dispatch of a pass whose images are words: blocks of so many columns and rows for each of
-// `invocations`.
-void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t invocations,
-                    uint32_t columns, uint32_t rows);
+// Makes a dispatch of a pass whose images are words, by a block of so many columns and rows for
+// each of ROW_INVOCATIONS.
+void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
+                    uint32_t rows);
 // Whether the images that a pass of words accesses are small enough for that.
 bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 // A pass over all pixels of one target: on processors drawn, where its texels cannot be loaded, on
 // GPUs a compute shader, for some of them (made to compute) draw slowly.
-bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
-                        const struct vkb_pass_row *pass, struct vkb_error *error);
+bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_error *error);
 
 #endif

@@ -62,10 +62,10 @@ void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_
     row->block_height = block_height;
 }
 
-void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t invocations,
-                    uint32_t columns, uint32_t rows)
+void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
+                    uint32_t rows)
 {
-    vkb_make_dispatch(row, shader, invocations * columns, rows);
+    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
     row->reading = VKB_READING_WORDS;
 }
 
@@ -100,8 +100,14 @@ const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_
              : NULL;
 }
 
-static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(blend_comp);
-static const enum vkb_shader bright_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(bright_comp);
+static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
+static const enum vkb_shader bright_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(bright);
+
+// Whether the pixels of both have the same bytes. (Single floats hold R11G11B10.)
+static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
+{
+    return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
+}
 
 // A composite whose images have one size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -109,31 +115,37 @@ static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pas
     return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
-        && graph->images[pass->reads[0]].format == graph->images[pass->reads[1]].format;
+        && has_format_of(graph, pass->reads[0], pass->reads[1])
+        && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-// A pass that needs the texels at each pixel's own place alone, by a shader that loads them.
-static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader)
+static bool brightens(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * TEXEL_COLUMNS, TEXEL_ROWS);
-    row->reading = VKB_READING_LOADED;
+    return vkb_is_extract(pass) && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
-                        const struct vkb_pass_row *pass, struct vkb_error *error)
+// A pass that needs the pixels at each pixel's own place alone.
+static void load_pixels(struct vkb_pass_row *row, enum vkb_shader shader, enum vkb_format format)
 {
+    vkb_make_words(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
+}
+
+bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    const struct vkb_graph *graph = choice->graph;
     const enum vkb_format format = graph->images[pass->reads[0]].format;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    if (variants == VKB_VARIANTS_GPU)
+    if (choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
                           PIXEL_INVOCATIONS);
-    else if (blends(graph, pass))
-        load_texels(&row, blend_shaders[format]);
-    else if (vkb_is_extract(pass))
-        load_texels(&row, bright_shaders[format]);
-    return vkb_graph_add_pass(graph, &row, error);
+    else if (vkb_fits_words(choice, pass) && blends(graph, pass))
+        load_pixels(&row, blend_shaders[format], format);
+    else if (vkb_fits_words(choice, pass) && brightens(graph, pass))
+        load_pixels(&row, bright_shaders[format], format);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -142,7 +154,7 @@ static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb
     *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
          && vkb_spirv[pass->shader].dispatch != pass->shader
          && vkb_is_written_once(&choice->plain, pass->targets[0]);
-    return !*fits || vkb_add_fullscreen(choice->variants, choice->graph, pass, error);
+    return !*fits || vkb_add_fullscreen(choice, pass, error);
 }
 
 struct variant {
@@ -208,6 +220,38 @@ static bool add_variant(const struct vkb_variant_choice *choice, const struct vk
     return vkb_graph_add_pass(choice->graph, pass, error);
 }
 
+static bool touches(const struct vkb_pass_row *pass, const struct vkb_image_row *row,
+                    const struct vkb_graph *graph)
+{
+    const uint32_t image = (uint32_t)(row - graph->images);
+
+    return row->channels == 3 && (vkb_pass_reads(pass, image) || vkb_pass_writes(pass, image));
+}
+
+static bool touches_any(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    bool found = false;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        found = found || touches(pass, &graph->images[i], graph);
+    return found;
+}
+
+// Packs the images of three channels, if every pass that accesses one has a shader for that.
+static void pack_images(struct vkb_graph *graph)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (touches_any(graph, &graph->passes[i])
+            && (graph->passes[i].reading != VKB_READING_WORDS
+                || vkb_spirv[graph->passes[i].shader].packed == graph->passes[i].shader))
+            return;
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (touches_any(graph, &graph->passes[i]))
+            graph->passes[i].shader = vkb_spirv[graph->passes[i].shader].packed;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        graph->images[i].packed = graph->images[i].channels == 3;
+}
+
 bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *device,
                          struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -231,5 +275,6 @@ bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *de
         done = add_variant(&choice, &choice.plain.passes[i], error);
     }
     vkb_free(choice.plain.passes);
+    pack_images(graph);
     return done;
 }

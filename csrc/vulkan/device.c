@@ -147,10 +147,10 @@ static bool is_linear(const struct vkb_device *device, VkFormat format)
         VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT
         | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT
         | VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT;
-    const VkImageUsageFlags usage =
-        VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
-        | VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT
-        | VK_IMAGE_USAGE_STORAGE_BIT;
+    const VkImageUsageFlags usage = VK_IMAGE_USAGE_TRANSFER_SRC_BIT
+                                  | VK_IMAGE_USAGE_TRANSFER_DST_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
+                                  | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT
+                                  | VK_IMAGE_USAGE_STORAGE_BIT;
     const struct vkb_instance_table *vk = &device->instance->vk;
     VkFormatProperties properties;
     VkImageFormatProperties limits;

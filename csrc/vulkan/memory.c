@@ -302,16 +302,15 @@ static bool create_buffer(const struct vkb_device *device, struct vkb_image *ima
             device->handle, image->handle,
             &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
     image->row_pitch = (size_t)layout.rowPitch;
-    if (!VK(error, device->vk.vkCreateBuffer(
-                       device->handle,
-                       &(VkBufferCreateInfo){
-                           .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
-                           .size = image->row_pitch * image->height,
-                           .usage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
-                                  | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
-                                  | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                       },
-                       NULL, &image->buffer)))
+    if (!VK(error, device->vk.vkCreateBuffer(device->handle,
+                                             &(VkBufferCreateInfo){
+                                                 .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                                                 .size = image->row_pitch * image->height,
+                                                 .usage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
+                                                        | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+                                                        | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                             },
+                                             NULL, &image->buffer)))
         return false;
     device->vk.vkGetBufferMemoryRequirements(device->handle, image->buffer, &own);
     requirements->memoryTypeBits &= own.memoryTypeBits;
@@ -328,15 +327,15 @@ static bool map_image(const struct vkb_device *device, struct vkb_image *image,
                                              &image->mapped)))
         return false;
     return !vkb_image_fits_words(device, image->format, image->width, image->height)
-        || VK(error, device->vk.vkCreateBufferView(
-                         device->handle,
-                         &(VkBufferViewCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
-                             .buffer = image->buffer,
-                             .format = VKB_WORD_FORMAT,
-                             .range = image->row_pitch * image->height,
-                         },
-                         NULL, &image->words));
+        || VK(error,
+              device->vk.vkCreateBufferView(device->handle,
+                                            &(VkBufferViewCreateInfo){
+                                                .sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                                .buffer = image->buffer,
+                                                .format = VKB_WORD_FORMAT,
+                                                .range = image->row_pitch * image->height,
+                                            },
+                                            NULL, &image->words));
 }
 
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
@@ -363,8 +362,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         || !allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE, &requirements,
                      &image->memory, &flags, error)
         || (image->handle
-            && !VK(error,
-                   vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0)))
+            && !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0)))
         || (spec->mapped && !map_image(device, image, error))
         || (image->handle && !create_view(device, image, error))) {
         vkb_image_destroy(device, image);

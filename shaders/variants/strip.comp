@@ -6,11 +6,11 @@
 #include "variants/whole.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = CHANNEL_BYTES == 1 ? 2 * STRIP_COLUMNS : STRIP_COLUMNS;
+const int COLUMNS = STRIP_COLUMNS(CHANNEL_BYTES);
 const int SUMS = 2 * STRIP_RADIUS;
 const int LOADED = COLUMNS + 2 * STRIP_RADIUS;
 
-layout(local_size_x = STRIP_INVOCATIONS) in;
+layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, image);
 WRITE_IMAGE(2);
 
