@@ -141,9 +141,7 @@ def write_spirv() -> None:
         packed = module.name.replace("_words_", "_packed_")
         twins = (name if name in names else module.name for name in (dispatch, packed))
         twin_names = ", ".join(f"VKB_SHADER_{twin}" for twin in twins)
-        rows += (
-            f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twin_names}}},\n'
-        )
+        rows += f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twin_names}}},\n'
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
         "#include <stddef.h>\n#include <stdint.h>\n\n"
