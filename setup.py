@@ -20,7 +20,7 @@ STAGES = (".vert", ".frag", ".comp")
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
 # Shaders whose images are always words.
-WORDS_ALONE = {"strip.comp", "bright.comp", "blend.comp"}
+WORDS_ALONE = {"strip.comp", "threshold.comp", "blend.comp"}
 
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 

@@ -50,11 +50,11 @@ def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None
 )
 @click.option("--rounds", type=int, help="Rounds for each contender, 3 or more.")
 @click.option(
-    "--points",
+    "--requests",
     type=int,
-    default=Plan.points,
+    default=Plan.requests,
     show_default=True,
-    help="Requests of the benchmark points.",
+    help="Number of requests in the benchmark requests.",
 )
 @click.option(
     "--threads",
@@ -68,7 +68,7 @@ def command(
     out: str,
     quick: bool,
     rounds: int | None,
-    points: int,
+    requests: int,
     threads: int | None,
     adapter: str,
 ) -> None:
@@ -93,7 +93,7 @@ def command(
                 adapter=adapter,
                 quick=quick,
                 rounds=rounds,
-                points=points,
+                requests=requests,
                 threads=usable_cores() if threads is None else threads,
                 only=tuple(dict.fromkeys(only)),
                 tell=lambda text: status.update(f"Timing {text}"),

@@ -22,7 +22,7 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "image": "an image's bloom, NumPy in and out, against image libraries",
         "pyramid": "a pyramid of five levels against pygfx and a Gaussian of the same spread",
         "forward": "the time that bloom adds to a forward frame, against the source's variant",
-        "points": "many requests with one image, against single calls",
+        "requests": "many requests with one image, against single calls",
         "cost": "cost against pixels, kernel length and levels",
         "overhead": "the constant cost of a call",
         "startup": "import, renderer and first frame, in fresh processes",

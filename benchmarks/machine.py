@@ -57,8 +57,8 @@ def command(plan: Plan) -> str:
         words.append("--quick")
     if plan.rounds is not None:
         words += ["--rounds", str(plan.rounds)]
-    if plan.points != Plan.points:
-        words += ["--points", str(plan.points)]
+    if plan.requests != Plan.requests:
+        words += ["--requests", str(plan.requests)]
     if plan.threads != usable_cores():
         words += ["--threads", str(plan.threads)]
     return shlex.join(words)

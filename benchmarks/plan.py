@@ -36,8 +36,8 @@ class Plan:
         Small images and few rounds: a check that everything runs. The figures mean nothing.
     rounds : int or None
         Rounds for each contender, at least 3. None: the benchmark's own number.
-    points : int
-        Requests of the benchmark "points", at least 1.
+    requests : int
+        Number of requests of the benchmark "requests", at least 1.
     threads : int
         Threads of the peers that have such a setting, at least 1.
     only : tuple of str
@@ -54,13 +54,13 @@ class Plan:
     adapter: str = "auto"
     quick: bool = False
     rounds: int | None = None
-    points: int = 10_000
+    requests: int = 10_000
     threads: int = field(default_factory=usable_cores)
     only: tuple[str, ...] = ()
     tell: Callable[[str], None] = _silent
 
     def __post_init__(self) -> None:
-        for name, least in (("rounds", 3), ("points", 1), ("threads", 1)):
+        for name, least in (("rounds", 3), ("requests", 1), ("threads", 1)):
             value = getattr(self, name)
             if value is not None and value < least:
                 raise ValueError(f"{name}: {value!r} is out of range, {least} or more")

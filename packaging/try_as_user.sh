@@ -1,5 +1,6 @@
 #!/bin/sh
 # Runs in the fresh root, as an unprivileged user: what the README shows, from the wheels alone.
+# Argument: the Python.
 set -eu
 rm -rf try && mkdir try && cd try
 start=$(date +%s)
@@ -36,9 +37,24 @@ import vkbloom
 def test_bloom(bloom_renderer, frame_regression):
     image = np.zeros((32, 32, 4), np.float32)
     image[16, 16] = 8
-    frame_regression.check(bloom_renderer.apply(image, vkbloom.Pyramid()))
+    frame_regression.check(bloom_renderer.apply(image, vkbloom.Pyramid()), exact=True)
 END
 python -m pytest -q --bloom-update test_bloom.py
 python -m pytest -q test_bloom.py
-END_TIME=$(date +%s)
-echo "all of it in $((END_TIME - start)) s"
+echo "all of it in $(($(date +%s) - start)) s"
+
+# Without a loader the message says what is missing.
+python - <<END
+import numpy as np
+import vkbloom
+
+try:
+    with vkbloom.Renderer("software", validation=True) as renderer:
+        renderer.apply(np.ones((40, 60, 3), np.float32), vkbloom.Pyramid(threshold=0.5))
+        print("validated:", renderer.info.summary)
+except vkbloom.Error as error:
+    print("not validated:", error)
+END
+python "$1/pip" install --quiet --no-index --find-links /srv/llvmlite llvmlite
+python -c "import llvmlite, vkbloom_lavapipe"  # else the test is skipped
+python -m pytest -q -p no:cacheprovider /srv/test_beside_llvm.py

@@ -1,9 +1,10 @@
 // Every parameter of the pipeline, declared once.
 //
-// SETTING_ROWS, COUNT_ROWS and REAL_ROWS are the numbers that a user sets: C makes struct vkb_values
-// of them and the table of names, defaults and ranges that Python builds its settings from
-// (csrc/graph/params.c). Each pass has a block of parameters: GLSL expands its rows into a std140
-// uniform block (block.glsl), C into the matching struct. A row names its block B and is one of
+// SETTING_ROWS, COUNT_ROWS and REAL_ROWS are the numbers that a user sets: C makes struct
+// vkb_values of them and the table of names, defaults and ranges that Python builds its settings
+// from (csrc/graph/params.c). Each pass has a block of parameters: GLSL expands its rows into a
+// std140 uniform block (block.glsl), C into the matching struct. A row names its block B and is one
+// of
 //
 //   READS(B, name)         a setting of SETTING_ROWS, which the pass is out of date without
 //   INPUT(B, type, name)   a float or int that the core fills in for each pass
@@ -47,8 +48,8 @@
     INPUT(B, float, limit) \
     INPUT(B, int, noise_seed)
 
-// The matrices of a mesh or skybox draw, and the largest value that the colour targets hold; the glow
-// mesh's colours, times their intensity, pass the threshold.
+// The matrices of a mesh or skybox draw, and the largest value that the colour targets hold; the
+// glow mesh's colours, times their intensity, pass the threshold.
 #define MESH_BLOCK(B, READS, INPUT, VEC4S) \
     VEC4S(B, projection, 4) \
     VEC4S(B, view, 4) \
@@ -57,41 +58,42 @@
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, READS)
 
-// A blur pass: the distances of its taps in texels of the source, and the half-kernel w0.. of what a
-// texel at each tap counts, four to a vec4. `gain` is of a blur in both directions.
+// A blur pass: the distances of its taps in texels of the source, and the half-kernel w0.. of what
+// a texel at each tap counts, four to a vec4. `gain` is of a blur in both directions.
 #define BLUR_BLOCK(B, READS, INPUT, VEC4S) \
-    INPUT(B, float, step_across) \
-    INPUT(B, float, step_down) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y) \
     INPUT(B, float, gain) \
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, weights, BLUR_VEC4S)
 
-// The same blur where the source's pixels are the target's: one symmetric kernel on whole texels,
-// from the first tap to the last, then zeros. `origin` is the place of the target's first pixel along the
-// line, in the source's.
+// The same blur where the source's pixels are the target's: one symmetric kernel on integer texels,
+// from the first tap to the last, then zeros. `origin` is the place of the target's first pixel
+// along the line, in the source's.
 #define LINE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, radius) \
     INPUT(B, int, origin) \
     INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 
-// An image's whole bloom in one pass: threshold, both blurs, composite. Kernels as above.
-#define WHOLE_BLOCK(B, READS, INPUT, VEC4S) \
+// The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as
+// above.
+#define FUSED_BLOOM_BLOCK(B, READS, INPUT, VEC4S) \
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
-    INPUT(B, int, down_radius) \
-    INPUT(B, int, across_radius) \
-    VEC4S(B, down, WHOLE_VEC4S) \
-    VEC4S(B, across, WHOLE_VEC4S)
+    INPUT(B, int, vertical_radius) \
+    INPUT(B, int, horizontal_radius) \
+    VEC4S(B, vertical, FUSED_VEC4S) \
+    VEC4S(B, horizontal, FUSED_VEC4S)
 
 // The reduction of an image to the bloom buffer, with the threshold.
-#define EXTRACT_BLOCK(B, READS, INPUT, VEC4S) \
+#define THRESHOLD_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
 // A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
-// the steps the distance of the tent's taps in texels of the smaller level. `taps` are the same
-// weights on whole texels, where a level is exactly twice as large as the one below; the
+// the steps the distance of the taps in texels of the image that is read. `taps` are the same
+// weights on integer texels, where a level is exactly twice as large as the one below; the
 // threshold is of a first level that starts from the image itself.
 #define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
@@ -108,9 +110,12 @@
     COMPOSITE_ROWS(B, READS, INPUT) \
     VEC4S(B, taps, 1)
 
-// The first pass of a published method, from the frame.
+// The first pass of a published method, from the frame. The steps are the distance of taps in
+// texels of the frame.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y) \
     THRESHOLD_ROWS(B, READS) \
     READS(B, highlight) \
     READS(B, clamp_max) \
@@ -144,10 +149,10 @@
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
-    BLOCK(extract, EXTRACT_BLOCK) \
+    BLOCK(threshold, THRESHOLD_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(line, LINE_BLOCK) \
-    BLOCK(whole, WHOLE_BLOCK) \
+    BLOCK(fused_bloom, FUSED_BLOOM_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
     BLOCK(double_final, DOUBLE_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
@@ -158,7 +163,7 @@
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
 // Settings that no shader reads, for they shape the graph.
-// Whole numbers: COUNT(name, default, min, max); a flag is one of 0 and 1.
+// Integers: COUNT(name, default, min, max); a flag is one of 0 and 1.
 #define COUNT_ROWS(COUNT) \
     COUNT(bloom, 1, 0, 1) \
     COUNT(dither, 0, 0, 1) \
@@ -186,12 +191,15 @@
     REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
     REAL(high_pass_frequency, 1.0, 0.001, 1.0) \
     REAL(scatter, 0.7, 0.0, 1.0) \
+    REAL(scale_x, 1.0, 0.0, 16.0) \
+    REAL(scale_y, 1.0, 0.0, 16.0) \
+    REAL(anamorphism, 0.0, -1.0, 1.0) \
     REAL(size, 0.5, 0.0, 1.0) \
     REAL(filter_radius, 0.005, 0.0, 1.0)
 
 // The largest values of 8 bits, of half floats and of floats.
-#define UNORM_LIMIT 1.0
-#define HALF_LIMIT 65504.0
+#define UNORM_LIMIT  1.0
+#define HALF_LIMIT   65504.0
 #define SINGLE_LIMIT 3.402823466e38
 // The largest float of 11 bits; that of 10 bits is less.
 #define UFLOAT11_LIMIT 65024.0
@@ -199,52 +207,51 @@
 
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
-#define BLUR_VEC4S 17
-#define MAX_LAYERS 8
+#define BLUR_VEC4S  17
+#define MAX_LAYERS  8
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
 
 // Invocations of a workgroup: in a row, of shaders that write several pixels each; a side, of those
 // that write one.
-#define ROW_INVOCATIONS 8
+#define ROW_INVOCATIONS   8
 #define PIXEL_INVOCATIONS 8
 
-// Kernels on whole texels, w0.. in vec4s: the longest half-kernel of a line, and of the whole bloom
-// in one pass. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
-#define LINE_RADIUS 64
+// Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line, and of a fused
+// bloom. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
+#define LINE_RADIUS       64
 #define LINE_SHORT_RADIUS 8
-#define LINE_OUTPUTS 8
-#define LINE_VEC4S 34
-#define STRIP_RADIUS 4
+#define LINE_OUTPUTS      8
+#define LINE_VEC4S        34
+#define STRIP_RADIUS      4
 #define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
-#define STRIP_ROWS 135
-#define HALVE_COLUMNS 4
-#define HALVE_ROWS 16
-#define DOUBLE_COLUMNS 4
-#define DOUBLE_ROWS 32
-// Of variants that load words: pixels of three channels, too, fill them. CHANNEL is the bytes of a
-// channel.
+#define STRIP_ROWS        135
+#define HALVE_COLUMNS     4
+#define HALVE_ROWS        16
+#define DOUBLE_COLUMNS    4
+#define DOUBLE_ROWS       32
+// Blocks of words, which pixels of three channels fill, too. CHANNEL is the bytes of a channel.
 #define HALVE_WORDS_COLUMNS 8
-#define HALVE_WORDS_ROWS 32
+#define HALVE_WORDS_ROWS    32
 #define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
-#define DOUBLE_WORDS_ROWS 64
+#define DOUBLE_WORDS_ROWS   64
 #define TEXEL_COLUMNS(CHANNEL) (16 / (CHANNEL))
-#define TEXEL_ROWS 16
-#define TILE_LOADED 64
-#define TILE_ROWS 32
-#define TILE_RUNS 4
-#define TILE_RADIUS 16
-#define WHOLE_VEC4S 5
+#define TEXEL_ROWS          16
+#define TILE_LOADED       64
+#define TILE_ROWS         32
+#define TILE_RUNS         4
+#define TILE_RADIUS       16
+#define FUSED_VEC4S       5
 
 // The most levels that one pass gathers, and the most of a chain.
 #define GATHERED_LEVELS 7
-#define MAX_LEVELS 16
+#define MAX_LEVELS      16
 
-// The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an int,
-// and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as an image of
-// that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for loops that a compiler
-// can unroll; with EXTRACT, halving starts from the image itself, past the threshold. FIRST is of an
-// engine's first level, LEVELS the number that a pass gathers.
+// The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
+// int, and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as
+// an image of that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for
+// loops that a compiler can unroll; with FROM_IMAGE, halving reads the image itself and applies the
+// threshold. FIRST is of an engine's first level, LEVELS the number that a pass gathers.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -261,12 +268,14 @@
     CONSTANT(12, RADIUS, radius) \
     CONSTANT(13, ADD_OWN, add_own) \
     CONSTANT(14, UPSAMPLE, upsample) \
-    CONSTANT(15, EXTRACT, extract) \
+    CONSTANT(15, FROM_IMAGE, from_image) \
     CONSTANT(16, EMITTERS, emitters) \
     CONSTANT(17, FIRST, first) \
     CONSTANT(18, LEVELS, levels) \
     CONSTANT(19, KARIS_AVERAGE, karis_average) \
-    CONSTANT(20, NODE, node)
+    CONSTANT(20, NODE, node) \
+    CONSTANT(21, ALPHA, alpha) \
+    CONSTANT(22, MASKED, masked)
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -289,6 +298,11 @@
     NAME(ENCODING_GAMMA22, 1, gamma22) \
     NAME(ENCODING_SRGB, 2, srgb)
 
+#define ALPHA_NAMES(NAME) \
+    NAME(ALPHA_KEEP, 0, keep) \
+    NAME(ALPHA_MAX, 1, max) \
+    NAME(ALPHA_BLUR, 2, blur)
+
 #define TEXEL_NAMES(NAME) \
     NAME(TEXEL_OWN, 0, own) \
     NAME(TEXEL_X, 1, x)
@@ -297,6 +311,7 @@
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
     CHOICE(encoding, ENCODING_NAMES) \
+    CHOICE(alpha, ALPHA_NAMES) \
     CHOICE(texel, TEXEL_NAMES)
 
 // Modes that the core chooses, named in both languages.
@@ -308,7 +323,7 @@
     NAME(DIRECTION_VERTICAL, 0, vertical) \
     NAME(DIRECTION_HORIZONTAL, 1, horizontal) \
     NAME(DIRECTION_BOTH, 2, both) \
-    NAME(SAMPLING_WHOLE, 0, whole) \
+    NAME(SAMPLING_TEXEL, 0, texel) \
     NAME(SAMPLING_FILTER, 1, filter) \
     NAME(SAMPLING_FETCH, 2, fetch) \
     NAME(STORED_UNORM8, 0, unorm8) \

@@ -39,7 +39,8 @@ static struct vkb_dry_image *add_image(struct vkb_dry_run *dry_run, struct vkb_e
     return image;
 }
 
-// What an image of that row would hold; one of another size or format is replaced.
+// Returns the content of the image with that row's name. An image of another size or format is
+// replaced, as the image cache does it.
 static struct vkb_content *resolve(struct vkb_dry_run *dry_run, const struct vkb_image_row *row,
                                    struct vkb_error *error)
 {

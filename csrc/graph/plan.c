@@ -45,8 +45,8 @@ static bool append(struct vkb_planner *planner, const void *bytes, size_t size,
     return true;
 }
 
-// What passes first..end-1 make their targets from: their rows, with the versions of what they read
-// in place of the graph's indices.
+// Writes the recipe of the targets of passes first..end-1: the rows of these passes, with the
+// versions of the images that they read instead of the indices in the graph.
 static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step *step,
                          uint32_t first, uint32_t end, struct vkb_error *error)
 {
@@ -70,12 +70,12 @@ static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step
     return true;
 }
 
-// Whether the image is there and holds what a pass before `end` would make.
+// Whether the image exists and holds the result of a current pass before `end`, or is the input.
 static bool is_current(const struct vkb_planner *planner, const struct vkb_plan_step *step,
                        uint32_t image, uint32_t end)
 {
     const struct vkb_graph *graph = &step->plan->graph;
-    bool current = graph->images[image].input;
+    bool current = graph->images[image].input != VKB_INPUT_NONE;
 
     for (uint32_t i = 0; i < end; ++i)
         current = current || (planner->current[i] && vkb_pass_writes(&graph->passes[i], image));
@@ -88,7 +88,8 @@ static bool holds_recipe(const struct vkb_planner *planner, const struct vkb_con
         && memcmp(content->recipe, planner->recipe, planner->recipe_size) == 0;
 }
 
-// Whether the targets of the passes first..end-1 hold what these would make; leaves their recipe.
+// Sets *same if the targets of passes first..end-1 already hold the result of these passes. The
+// recipe stays in planner->recipe.
 static bool compare_recipe(struct vkb_planner *planner, const struct vkb_plan_step *step,
                            uint32_t first, uint32_t end, bool *same, struct vkb_error *error)
 {
@@ -103,8 +104,8 @@ static bool compare_recipe(struct vkb_planner *planner, const struct vkb_plan_st
     return true;
 }
 
-// Finds out which passes have nothing to do, from the first to the last: their targets hold what
-// the recipe says, and all that they read is so too.
+// Marks the passes that are up to date, from the first to the last: their targets were made from
+// the same recipe, and the images that they read are up to date too.
 static bool mark_current(struct vkb_planner *planner, const struct vkb_plan_step *step,
                          struct vkb_error *error)
 {
@@ -145,7 +146,8 @@ static bool writes_wanted(const struct vkb_pass_row *pass, const bool *wanted)
     return found;
 }
 
-// From the last pass to the first; `skipped` are the passes that others stand for.
+// Marks needed passes and wanted images, from the last pass to the first. `skipped` passes are
+// replaced by fused passes, or are fused passes that are not selected.
 static void mark(const struct vkb_plan *plan, const bool *skipped, bool *needed, bool *wanted)
 {
     const struct vkb_graph *graph = &plan->graph;
@@ -181,21 +183,21 @@ static bool same_pass(const struct vkb_graph *a, const struct vkb_graph *b, uint
     return size == vkb_pass_pack(&b->passes[i], second) && memcmp(first, second, size) == 0;
 }
 
-// Whether the neighbour has what the alternative spares, the same, but not the pass before it,
-// which reads that.
-static bool shares(const struct vkb_graph *graph, const struct vkb_graph *neighbour,
-                   uint32_t alternative, const bool *plain, const bool *needed, const bool *current)
+// Whether the plan before or after (`neighbour`) has the same passes as those that the fused pass
+// saves, except the pass that it replaces. Then running them once serves both plans.
+static bool shares(const struct vkb_graph *graph, const struct vkb_graph *neighbour, uint32_t fused,
+                   const bool *plain, const bool *needed, const bool *current)
 {
-    if (!neighbour || same_pass(graph, neighbour, alternative - 1))
+    if (!neighbour || same_pass(graph, neighbour, fused - 1))
         return false;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (plain[i] && !needed[i] && !current[i] && i != alternative - 1
+        if (plain[i] && !needed[i] && !current[i] && i != fused - 1
             && !same_pass(graph, neighbour, i))
             return false;
     return true;
 }
 
-// Takes the fused passes that are worth it.
+// Selects each fused pass that reduces the number of passes to run.
 static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step *step,
                         struct vkb_error *error)
 {
@@ -231,7 +233,7 @@ static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step 
     return true;
 }
 
-// A copy of the plan's passes, for it may be gone when the next one comes.
+// Copies the plan's passes: the plan may be destroyed before the next one arrives.
 static bool keep_previous(struct vkb_planner *planner, const struct vkb_plan_step *step,
                           struct vkb_error *error)
 {

@@ -1,5 +1,5 @@
-// A plan is a graph and the framebuffers that are wanted of it. A planner finds out which of its
-// passes have to run: those that the framebuffers need, and whose images do not hold their result.
+// A plan is a graph and its requested framebuffers. A planner determines which of its passes must
+// run: the passes that the framebuffers need and that are out of date.
 #ifndef VKB_PLAN_H
 #define VKB_PLAN_H
 
@@ -13,55 +13,55 @@ struct vkb_plan {
 
 void vkb_plan_destroy(struct vkb_plan *plan);
 
-// What an image was made from.
+// The content of an image, described by what it was made from.
 struct vkb_content {
-    uint64_t version;       // given anew each time that the image is written
-    unsigned char *recipe;  // byte by byte comparable
+    uint64_t version;       // new each time that the image is written
+    unsigned char *recipe;  // without padding, to be compared with memcmp
     size_t recipe_size, recipe_capacity;
-    bool valid;     // once the device has run all that was recorded, it holds what the recipe says
+    bool valid;     // once the device has run all recorded commands, the image matches the recipe
     bool repeated;  // the writing before had the same recipe
 };
 
-// From here until the caller, having recorded the writing, sets `valid`, the image holds nothing
-// that counts. The clock gives out the versions.
+// Makes the content invalid and gives it a new recipe and version. The caller sets `valid` once it
+// has recorded the passes that write the image. The clock counts the versions.
 bool vkb_content_begin_writing(struct vkb_content *content, uint64_t *clock, const void *recipe,
                                size_t size, struct vkb_error *error);
 
-// A plan in its place among those of a renderer.
+// A plan within the sequence of plans that a renderer runs.
 struct vkb_plan_step {
     const struct vkb_plan *plan;
-    const struct vkb_graph *next;   // of the plan after it, with the same source; NULL: not known
-    struct vkb_content **contents;  // by image; NULL: the image is not there
-    uint64_t source;                // version of what the graph starts from
+    const struct vkb_graph *next;   // graph of the next plan with the same source; NULL: not known
+    struct vkb_content **contents;  // by image; NULL: there is no cached image
+    uint64_t source;                // version of the source's data
     uint64_t scene;                 // serial of the meshes and textures that draws read
 };
 
-// What it found out about the last plan, and that plan's passes.
+// The planner's result for the last plan, and a copy of that plan's passes.
 struct vkb_planner {
-    bool *current;  // by pass: its images hold its result
-    bool *needed;   // by pass: the framebuffers need it
-    bool *wanted;   // by image: a framebuffer, or what a needed pass reads or writes
+    bool *current;  // by pass: its images are up to date
+    bool *needed;   // by pass: a requested framebuffer needs it
+    bool *wanted;   // by image: a requested framebuffer, or read or written by a needed pass
     unsigned char *recipe;
     size_t current_capacity, needed_capacity, wanted_capacity, recipe_size, recipe_capacity;
     struct vkb_graph previous;  // without images
     uint64_t previous_source;
 };
 
-// Destroying a zeroed or half-built object is fine.
+// Destroying a zeroed or half-created planner is safe.
 void vkb_planner_destroy(struct vkb_planner *planner);
 
-// Marks the passes that the step's framebuffers need, and the images that those passes read or
-// write. A fused pass is taken in place of the pass before it where fewer passes have to run for
-// it; but not where the plan before or after shares all that it spares, for another pass: what a
-// sequence shares is made once, then only what changes.
+// Marks the passes that the step's framebuffers need, and the images that these passes read or
+// write. A fused pass replaces the pass before it if fewer passes run then. It does not if the plan
+// before or after shares all passes that it would save: in a sequence, shared passes run once, and
+// then only the passes that change.
 bool vkb_planner_mark(struct vkb_planner *planner, const struct vkb_plan_step *step,
                       struct vkb_error *error);
 
 // Records passes first..end-1, which have the same targets.
 typedef bool vkb_record(void *context, uint32_t first, uint32_t end, struct vkb_error *error);
 
-// Calls `record` for each group of passes that is needed and out of date, in the graph's order. The
-// wanted images must be there.
+// Calls `record` for each group of passes that is needed and out of date, in the graph's order.
+// Every wanted image must have a content.
 bool vkb_planner_run(struct vkb_planner *planner, const struct vkb_plan_step *step, uint64_t *clock,
                      vkb_record *record, void *context, struct vkb_error *error);
 

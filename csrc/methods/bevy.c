@@ -31,6 +31,32 @@ static void choose_sizes(struct vkb_levels *levels)
         levels->sizes[levels->count++] = size;
 }
 
+// The first level, from the frame.
+static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t from)
+{
+    struct vkb_pass_row row =
+        vkb_prefilter_row(levels, VKB_SHADER_bevy_prefilter_frag, from, levels->downs[0]);
+
+    row.params.prefilter.step_x = (float)levels->settings->values.scale_x;
+    row.params.prefilter.step_y = (float)levels->settings->values.scale_y;
+    vkb_mask_prefilter(levels, &row);
+    return row;
+}
+
+static struct vkb_pass_row further_row(const struct vkb_levels *levels, uint32_t from, uint32_t to)
+{
+    const struct vkb_values *values = &levels->settings->values;
+    struct vkb_pass_row row = vkb_down_row(levels, false, from, to);
+
+    if (values->scale_x != 1.0 || values->scale_y != 1.0) {
+        // The taps no longer lie in the middle between texels.
+        row.constants.sampling = SAMPLING_FETCH;
+        row.params.pyramid.step_x = (float)values->scale_x;
+        row.params.pyramid.step_y = (float)values->scale_y;
+    }
+    return row;
+}
+
 bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
@@ -44,9 +70,8 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
         if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
                               error))
             return false;
-        struct vkb_pass_row row = level ? vkb_down_row(&levels, false, from, levels.downs[level])
-                                        : vkb_prefilter_row(&levels, VKB_SHADER_bevy_prefilter_frag,
-                                                            from, levels.downs[level]);
+        const struct vkb_pass_row row =
+            level ? further_row(&levels, from, levels.downs[level]) : first_row(&levels, from);
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }
@@ -55,5 +80,7 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
         combination.own[level] = mixed ? 1.0 - factor : 1.0;
         combination.coarse[level] = factor;
     }
+    combination.radius_x = settings->values.scale_x;
+    combination.radius_y = settings->values.scale_y;
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }

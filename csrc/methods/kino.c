@@ -26,12 +26,13 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
     uint32_t from;
 
-    combination.radius = choose_sizes(&levels);
+    combination.radius_x = combination.radius_y = choose_sizes(&levels);
     if (!vkb_levels_image(&levels, "bright", 0, source->buffers, &from, error))
         return false;
     struct vkb_pass_row prefilter =
         vkb_prefilter_row(&levels, VKB_SHADER_kino_prefilter_frag, source->glow, from);
     prefilter.constants.anti_flicker = settings->values.anti_flicker;
+    vkb_mask_prefilter(&levels, &prefilter);
     if (!vkb_graph_add_pass(graph, &prefilter, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {

@@ -26,7 +26,7 @@ bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom
     for (uint32_t level = 0; level < levels.count; ++level)
         if (!add_down(&levels, level, error))
             return false;
-    combination.radius = settings->values.radius;
+    combination.radius_x = combination.radius_y = settings->values.radius;
     combination.gain = 1.0 / levels.count;
     if (settings->level_weight_count) {
         for (uint32_t level = 0; level < levels.count; ++level)

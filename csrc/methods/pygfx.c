@@ -31,12 +31,15 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
         struct vkb_pass_row row =
             level ? vkb_down_row(&levels, false, from, levels.downs[level])
                   : vkb_pyramid_row(&levels, VKB_SHADER_pygfx_down_frag, from, levels.downs[0]);
-        row.constants.karis_average = level == 0 && settings->values.karis_average;
+        if (level == 0) {
+            row.constants.karis_average = settings->values.karis_average;
+            vkb_mask_prefilter(&levels, &row);
+        }
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }
     combination.last_kernel = UPSAMPLE_LINEAR;
-    combination.radius = settings->values.filter_radius;
+    combination.radius_x = combination.radius_y = settings->values.filter_radius;
     combination.width_step = true;
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }

@@ -24,8 +24,8 @@ static struct vkb_pass_row blur_row(const struct vkb_settings *settings,
         .direction = direction,
         .count = settings->weight_count,
         .gain = strength,
-        .across = scale,
-        .down = width_steps ? scale * read->height / read->width : scale,
+        .step_x = scale,
+        .step_y = width_steps ? scale * read->height / read->width : scale,
         .filter = source->format == VKB_FORMAT_RGBA8_UNORM,
     };
 
@@ -83,17 +83,17 @@ static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
                          struct vkb_error *error)
 {
     struct vkb_pass_row row =
-        vkb_fullscreen_row(graph->images[to].name, VKB_SHADER_extract_frag, to);
+        vkb_fullscreen_row(graph->images[to].name, VKB_SHADER_threshold_frag, to);
     const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
 
     row.constants.threshold_mode = THRESHOLD_NONE;
-    row.constants.sampling = SAMPLING_WHOLE;
+    row.constants.sampling = SAMPLING_TEXEL;
     row.reads[0] = from;
-    row.read_count = 1;
-    row.block = VKB_BLOCK_extract;
-    row.params.extract.target_width = sampling.width;
-    row.params.extract.target_height = sampling.height;
-    row.params.extract.limit = sampling.limit;
+    vkb_apply_mask(&row, VKB_NO_IMAGE);
+    row.block = VKB_BLOCK_threshold;
+    row.params.threshold.target_width = sampling.width;
+    row.params.threshold.target_height = sampling.height;
+    row.params.threshold.limit = sampling.limit;
     return vkb_graph_add_pass(graph, &row, error);
 }
 
@@ -119,10 +119,12 @@ bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_blo
             settings, source, name, settings->values.direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
             layer, settings->layers[layer].strength, ends[layer], sum, graph);
         // Blending does not clamp: sums of the largest floats must not overflow. (Half floats keep
-        // their whole range; what overflows there, the composite clamps.)
+        // their complete range; what overflows there, the composite clamps.)
         if (format == VKB_FORMAT_RGBA32_FLOAT)
             row.params.blur.limit /= (float)settings->layer_count;
-        row.blend = layer ? VKB_BLEND_ADD : VKB_BLEND_NONE;
+        row.blend = layer == 0          ? VKB_BLEND_NONE
+                  : source->blurs_alpha ? VKB_BLEND_ADD_RGBA
+                                        : VKB_BLEND_ADD;
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

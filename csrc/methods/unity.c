@@ -35,7 +35,7 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
 {
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     const struct vkb_combination combination = scattered(settings, UPSAMPLE_LINEAR);
-    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .across = 2.0};
+    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .step_x = 2.0};
     struct vkb_size size = vkb_halved(source->buffers);
     const uint32_t count = level_count(size.width, size.height, 1.0, settings->values.iterations);
 
@@ -45,6 +45,7 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_urp_prefilter_frag, source->glow, levels.downs[0]);
+    vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 1; level < count; ++level)
@@ -53,10 +54,10 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }
 
-// W / 2^(k + 1), rounded, halves to even.
-static uint32_t rounded(uint32_t side, uint32_t level)
+// scale * W / 2^(k + 1), rounded, halves to even.
+static uint32_t rounded(uint32_t side, double scale, uint32_t level)
 {
-    const double size = rint(ldexp(side, -(int)level - 1));
+    const double size = rint(ldexp(side * scale, -(int)level - 1));
     return size < 1.0 ? 1 : (uint32_t)size;
 }
 
@@ -95,15 +96,19 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
     struct vkb_combination combination =
         scattered(settings, cubic ? UPSAMPLE_INSET_CUBIC : UPSAMPLE_INSET_LINEAR);
     const uint32_t count = level_count(frame.width, frame.height, 2.0, MAX_LEVELS);
+    // Narrow levels stretch the bloom along x, low ones along y.
+    const double anamorphism = 0.5 * settings->values.anamorphism;
+    const double across = 1.0 + fmin(anamorphism, 0.0), down = 1.0 - fmax(anamorphism, 0.0);
     uint32_t from;
 
     for (; levels.count < count; ++levels.count)
-        levels.sizes[levels.count] = (struct vkb_size){rounded(frame.width, levels.count),
-                                                       rounded(frame.height, levels.count)};
+        levels.sizes[levels.count] = (struct vkb_size){rounded(frame.width, across, levels.count),
+                                                       rounded(frame.height, down, levels.count)};
     if (!vkb_levels_step(&levels, "reduced", 0, levels.sizes[0], &from, error))
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_hdrp_prefilter_frag, source->glow, from);
+    vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 0; level < count; from = levels.downs[level++])

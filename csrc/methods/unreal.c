@@ -38,25 +38,26 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     double shares[UNREAL_LEVELS];
     struct vkb_size size = source->buffers;
-    double whole = 0.0;
+    double total = 0.0;
     uint32_t from, sum;
 
     for (; levels.count < UNREAL_LEVELS; ++levels.count) {
         const double factor = bloom_factors[levels.count];
         levels.sizes[levels.count] = size = half_of(settings, size);
         shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
-        whole += shares[levels.count];
+        total += shares[levels.count];
     }
-    // What ends at 1 holds the mean.
+    // An rgba8unorm image ends at 1: it holds the mean, and the bloom is multiplied by `total`.
     if (source->format != VKB_FORMAT_RGBA8_UNORM)
-        whole = 1.0;
+        total = 1.0;
     for (uint32_t level = 0; level < UNREAL_LEVELS; ++level)
-        shares[level] /= whole;
+        shares[level] /= total;
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_unreal_prefilter_frag, source->glow, from);
     row.constants.node = settings->values.node;
+    vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])
@@ -64,5 +65,5 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
             return false;
     return vkb_levels_image(&levels, "up_%u", 0, levels.sizes[0], &sum, error)
         && vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, sum, error)
-        && vkb_levels_enlarge(&levels, sum, whole, bloom, error);
+        && vkb_levels_enlarge(&levels, sum, total, bloom, error);
 }

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-static bool is_whole(double number)
+static bool is_integer(double number)
 {
     return floor(number) == number;
 }
@@ -40,19 +40,19 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
     const bool same_size = vkb_same_size(graph, from, to);
     const bool vertical = blur->direction == DIRECTION_VERTICAL;
-    const double step = vertical ? blur->down : blur->across;
+    const double step = vertical ? blur->step_y : blur->step_x;
     struct vkb_blur_params *params = &row.params.blur;
     struct vkb_blur moved = *blur;
 
     // Taps of one place are one tap, whatever the sizes are.
-    if (blur->direction != DIRECTION_BOTH && (step == 0.0 || (same_size && !is_whole(step)))
+    if (blur->direction != DIRECTION_BOTH && (step == 0.0 || (same_size && !is_integer(step)))
         && move_to_texels(blur, step, moved.weights, &moved.count))
-        moved.across = moved.down = 1.0;
+        moved.step_x = moved.step_y = 1.0;
     row.reads[0] = from;
     row.read_count = 1;
     row.block = VKB_BLOCK_blur;
-    params->step_across = blur->direction == DIRECTION_VERTICAL ? 0.0f : (float)moved.across;
-    params->step_down = blur->direction == DIRECTION_HORIZONTAL ? 0.0f : (float)moved.down;
+    params->step_x = blur->direction == DIRECTION_VERTICAL ? 0.0f : (float)moved.step_x;
+    params->step_y = blur->direction == DIRECTION_HORIZONTAL ? 0.0f : (float)moved.step_y;
     params->target_width = sampling.width;
     params->target_height = sampling.height;
     params->limit = sampling.limit;
@@ -64,10 +64,10 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     }
     row.constants.direction = blur->direction;
     row.constants.radius = (int32_t)moved.count - 1;
-    row.constants.sampling =
-        same_size && is_whole(params->step_across) && is_whole(params->step_down) ? SAMPLING_WHOLE
-        : blur->filter                                                            ? SAMPLING_FILTER
-                                                                                  : SAMPLING_FETCH;
+    row.constants.sampling = same_size && is_integer(params->step_x) && is_integer(params->step_y)
+                               ? SAMPLING_TEXEL
+                           : blur->filter ? SAMPLING_FILTER
+                                          : SAMPLING_FETCH;
     return row;
 }
 
@@ -86,10 +86,10 @@ bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texe
 {
     const struct vkb_blur_params *params = &pass->params.blur;
     const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
-    const double step = vertical ? params->step_down : params->step_across;
+    const double step = vertical ? params->step_y : params->step_x;
     const int taps = pass->constants.radius;
 
-    if (!is_whole(step) || step < 0.0 || taps * step > limit)
+    if (!is_integer(step) || step < 0.0 || taps * step > limit)
         return false;
     memset(kernel, 0, sizeof *kernel);
     kernel->radius = taps * (int)step;

@@ -6,7 +6,7 @@
 
 // A kernel whose taps lie on the texels of its source.
 struct vkb_texel_kernel {
-    float weights[LINE_RADIUS + 4];  // the half-kernel, then zeros, in whole vec4s
+    float weights[LINE_RADIUS + 4];  // the half-kernel, then zeros, to a multiple of four
     int radius;
 };
 
@@ -14,9 +14,9 @@ struct vkb_blur {
     enum vkb_mode direction;
     double weights[MAX_WEIGHTS];  // of the taps 0, 1, ... to each side
     uint32_t count;
-    double gain;          // of what is added up
-    double across, down;  // the distance of two taps in a row and in a column, in source texels
-    bool filter;          // taps between texels go through the sampler, else they are fetched
+    double gain;            // of what is added up
+    double step_x, step_y;  // the distance of two taps in a row and in a column, in source texels
+    bool filter;            // taps between texels go through the sampler, else they are fetched
 };
 
 // The row of a blur from one image to another. Where all pixels of the target lie on texels, taps

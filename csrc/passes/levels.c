@@ -10,7 +10,8 @@ struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coar
     struct vkb_combination combination = {
         .kernel = kernel,
         .last_kernel = kernel,
-        .radius = 1.0,
+        .radius_x = 1.0,
+        .radius_y = 1.0,
         .smallest = 1.0,
         .gain = 1.0,
     };
@@ -109,20 +110,21 @@ struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_f
     struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_down_frag, from, to);
 
     if (!firefly_filter && is_twice(levels->graph, from, to))
-        row.constants.sampling = SAMPLING_WHOLE;
+        row.constants.sampling = SAMPLING_TEXEL;
     row.constants.firefly_filter = firefly_filter;
+    row.params.pyramid.step_x = row.params.pyramid.step_y = 1.0f;
     return row;
 }
 
 bool vkb_halves(const struct vkb_pass_row *pass)
 {
     return pass->shader == VKB_SHADER_pyramid_down_frag
-        && pass->constants.sampling == SAMPLING_WHOLE;
+        && pass->constants.sampling == SAMPLING_TEXEL;
 }
 
 bool vkb_doubles(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_pyramid_up_frag && pass->constants.sampling == SAMPLING_WHOLE;
+    return pass->shader == VKB_SHADER_pyramid_up_frag && pass->constants.sampling == SAMPLING_TEXEL;
 }
 
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
@@ -142,7 +144,13 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_
     row.params.prefilter.target_width = sampling.width;
     row.params.prefilter.target_height = sampling.height;
     row.params.prefilter.limit = sampling.limit;
+    vkb_apply_mask(&row, VKB_NO_IMAGE);
     return row;
+}
+
+void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row)
+{
+    vkb_apply_mask(row, levels->source->mask);
 }
 
 static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *kernel,
@@ -153,8 +161,8 @@ static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *k
         .direction = direction,
         .count = kernel->count,
         .gain = 1.0,
-        .across = step,
-        .down = step,
+        .step_x = step,
+        .step_y = step,
     };
 
     for (uint32_t tap = 0; tap < kernel->count; ++tap)
@@ -169,16 +177,16 @@ bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
 {
     const struct vkb_size size = levels->sizes[level];
     const uint32_t width = levels->graph->images[from].width;
-    const double across = kernel->across > 0.0 ? kernel->across : (double)width / size.width;
+    const double step_x = kernel->step_x > 0.0 ? kernel->step_x : (double)width / size.width;
     uint32_t step;
 
     return vkb_levels_step(levels, "down_%u_across", level, size, &step, error)
-        && add_blur(levels, kernel, DIRECTION_HORIZONTAL, across, from, step, error)
+        && add_blur(levels, kernel, DIRECTION_HORIZONTAL, step_x, from, step, error)
         && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
         && add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, levels->downs[level], error);
 }
 
-// What the taps of an upsampling to twice the size are on whole texels: those of a pixel at a
+// What the taps of an upsampling to twice the size are on integer texels: those of a pixel at a
 // quarter of a texel after a texel's centre, from the texel before it. The tent's outer taps are up
 // to one texel away; a bilinear sample is a tent of no width.
 static void find_up_taps(double radius, float taps[4])
@@ -212,8 +220,9 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = own != VKB_NO_IMAGE ? own : from;
     row.read_count = 2;
-    params->step_x = params->step_y =
-        (float)(combination->radius * (combination->width_step ? smaller->width : 1));
+    const double unit = combination->width_step ? smaller->width : 1;
+    params->step_x = (float)(combination->radius_x * unit);
+    params->step_y = (float)(combination->radius_y * unit);
     if (combination->target_step) {
         params->step_x = (float)((double)smaller->width / larger->width);
         params->step_y = (float)((double)smaller->height / larger->height);
@@ -222,7 +231,7 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
         && (kernel == UPSAMPLE_LINEAR
             || (kernel == UPSAMPLE_TENT && params->step_x == params->step_y
                 && fabsf(params->step_x) <= 1.0f))) {
-        row.constants.sampling = SAMPLING_WHOLE;
+        row.constants.sampling = SAMPLING_TEXEL;
         find_up_taps(kernel == UPSAMPLE_TENT ? params->step_x : 0.0, params->taps[0]);
     }
     params->own = (float)own_share;
@@ -231,7 +240,7 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
 }
 
 // Sums of levels where the format holds them. In rgba8unorm, which ends at 1, each image holds its
-// sum divided by what a flat 1 becomes there (`whole`; negative shares count as positive ones), and
+// sum divided by what a flat 1 becomes there (`flat`; negative shares count as positive ones), and
 // the bloom is multiplied by it.
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
                         uint32_t *bloom, struct vkb_error *error)
@@ -243,12 +252,12 @@ bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combin
     for (uint32_t level = levels->count - 1; level-- > 0;) {
         const uint32_t from = top;
         const double own = combination->own[level], coarse = combination->coarse[level] * below;
-        const double sum = fabs(own) + fabs(coarse), whole = means && sum > 0.0 ? sum : 1.0;
+        const double sum = fabs(own) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
         if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &top, error)
             || !add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
-                       own / whole, coarse / whole, error))
+                       own / flat, coarse / flat, error))
             return false;
-        below = whole;
+        below = flat;
     }
     return vkb_levels_bloom(levels, bloom, error)
         && add_up(levels, combination, combination->last_kernel, top, *bloom, VKB_NO_IMAGE, 0.0,

@@ -18,8 +18,8 @@ struct vkb_levels {
 // up_N-1 = smallest * down_N-1, bloom = gain * V(up_0).
 struct vkb_combination {
     enum vkb_mode kernel, last_kernel;  // U and V, of UPSAMPLE_*
-    double radius;                      // of a tent, in texels of the smaller level
-    bool width_step;                    // the radius is a share of the smaller level's width
+    double radius_x, radius_y;          // of a tent, in texels of the smaller level
+    bool width_step;                    // the radii are shares of the smaller level's width
     bool target_step;                   // instead, one texel of the larger level
     double own[MAX_LEVELS], coarse[MAX_LEVELS];
     double smallest, gain;
@@ -52,12 +52,15 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_sh
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                       uint32_t from, uint32_t to);
 
+// Has a prefilter multiply what it writes by the mask of the source, if there is one.
+void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row);
+
 // The 13 taps of a pyramid's way down, fireflies filtered or not.
 struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
                                  uint32_t from, uint32_t to);
 
 // Whether a row is of those taps from a level of exactly twice the size, or of an upsampling to
-// exactly twice the size: then it needs whole texels alone. (Where fireflies are filtered, groups
+// exactly twice the size: then it needs integer texels alone. (Where fireflies are filtered, groups
 // of taps have weights of their own.)
 bool vkb_halves(const struct vkb_pass_row *pass);
 bool vkb_doubles(const struct vkb_pass_row *pass);
@@ -66,7 +69,7 @@ bool vkb_doubles(const struct vkb_pass_row *pass);
 struct vkb_kernel {
     const float *weights;  // w0..
     uint32_t count;
-    double across;  // distance of the taps of the first, horizontal, pass in texels of its source;
+    double step_x;  // distance of the taps of the first, horizontal, pass in texels of its source;
                     // 0: one pixel of the level
 };
 

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 
 // Every method: METHOD(name in C, name in Python and of its vkb_add_ function, published). A
-// published method starts from the whole frame: it reduces and thresholds in its own way.
+// published method starts from the complete frame: it reduces and thresholds in its own way.
 #define VKB_METHODS(METHOD) \
     METHOD(SEPARABLE, separable, false) \
     METHOD(PYRAMID, pyramid, false) \

@@ -9,8 +9,8 @@ enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
     return settings->values.knee > 0.0f ? THRESHOLD_KNEE : THRESHOLD_HARD;
 }
 
-// The luminances of 8-bit colours, (2126 r + 7152 g + 722 b) / 10000 / 255, are whole multiples of
-// 1 / 1275000. Half way between two of them, the threshold is out of reach of the rounding of
+// The luminances of 8-bit colours, (2126 r + 7152 g + 722 b) / 10000 / 255, are integer multiples
+// of 1 / 1275000. Half way between two of them, the threshold is out of reach of the rounding of
 // samplers and shaders, which else lift some colours over it that are no brighter than it.
 static float between_levels(float threshold)
 {
@@ -19,32 +19,33 @@ static float between_levels(float threshold)
     return (float)((floor(threshold * steps + 0.1) + 0.5) / steps);
 }
 
-bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
-                     struct vkb_graph *graph, struct vkb_error *error)
+bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
+                       uint32_t glow, struct vkb_graph *graph, struct vkb_error *error)
 {
     struct vkb_pass_row row =
-        vkb_fullscreen_row(graph->images[glow].name, VKB_SHADER_extract_frag, glow);
+        vkb_fullscreen_row(graph->images[glow].name, VKB_SHADER_threshold_frag, glow);
     const struct vkb_sampling sampling = vkb_sampling_into(graph, glow);
     const enum vkb_mode mode = vkb_threshold_mode(settings);
 
     row.constants.threshold_mode = mode;
     // Never the sampler's filter: it would spread NaN, and a threshold magnifies what it rounds.
-    row.constants.sampling = vkb_same_size(graph, image, glow) ? SAMPLING_WHOLE : SAMPLING_FETCH;
+    row.constants.sampling = vkb_same_size(graph, image, glow) ? SAMPLING_TEXEL : SAMPLING_FETCH;
     row.reads[0] = image;
-    row.read_count = 1;
-    row.block = VKB_BLOCK_extract;
+    vkb_apply_mask(&row, vkb_is_published(settings) ? VKB_NO_IMAGE : mask);
+    row.block = VKB_BLOCK_threshold;
     // Where there is no threshold its settings stay 0: the pass does not depend on them.
     if (mode != THRESHOLD_NONE)
         vkb_params_read(row.block, &settings->values, &row.params);
     if (mode == THRESHOLD_HARD && graph->images[image].format == VKB_FORMAT_RGBA8_UNORM)
-        row.params.extract.threshold = between_levels(row.params.extract.threshold);
-    row.params.extract.target_width = sampling.width;
-    row.params.extract.target_height = sampling.height;
-    row.params.extract.limit = sampling.limit;
+        row.params.threshold.threshold = between_levels(row.params.threshold.threshold);
+    row.params.threshold.target_width = sampling.width;
+    row.params.threshold.target_height = sampling.height;
+    row.params.threshold.limit = sampling.limit;
     return vkb_graph_add_pass(graph, &row, error);
 }
 
-bool vkb_is_extract(const struct vkb_pass_row *pass)
+bool vkb_is_threshold(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_extract_frag && pass->constants.sampling == SAMPLING_WHOLE;
+    return pass->shader == VKB_SHADER_threshold_frag && pass->constants.sampling == SAMPLING_TEXEL
+        && !pass->constants.masked && !pass->constants.alpha;
 }

@@ -1,4 +1,4 @@
-// The threshold pass: what of an image is bright enough, at the size of the bloom buffers.
+// The threshold pass: reduces an image to the size of the bloom buffers, and applies the threshold.
 #ifndef VKB_THRESHOLD_H
 #define VKB_THRESHOLD_H
 
@@ -6,12 +6,14 @@
 
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
 
-// A pass that reduces `image` to the size of `glow` and keeps what the threshold lets through.
-bool vkb_add_extract(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
-                     struct vkb_graph *graph, struct vkb_error *error);
+// A pass that reduces `image` to the size of `glow` and keeps what the threshold lets through,
+// times the mask (VKB_NO_IMAGE: none). A published method has its threshold and the mask later.
+bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
+                       uint32_t glow, struct vkb_graph *graph, struct vkb_error *error);
 
-// Whether a row is of that pass, and needs the image's texels at each pixel's own place alone.
-bool vkb_is_extract(const struct vkb_pass_row *pass);
+// Whether a row is of that pass, and needs the colours of the image's texels at each pixel's own
+// place alone.
+bool vkb_is_threshold(const struct vkb_pass_row *pass);
 
 // Gives the row of a fused pass, whose block is B, all that the threshold pass has. A block without
 // THRESHOLD_ROWS does not compile.
@@ -22,6 +24,6 @@ bool vkb_is_extract(const struct vkb_pass_row *pass);
         to->constants.threshold_mode = from->constants.threshold_mode; \
         THRESHOLD_ROWS(B, VKB_TAKE_THRESHOLD_SETTING) \
     } while (0)
-#define VKB_TAKE_THRESHOLD_SETTING(B, name) to->params.B.name = from->params.extract.name;
+#define VKB_TAKE_THRESHOLD_SETTING(B, name) to->params.B.name = from->params.threshold.name;
 
 #endif

@@ -93,7 +93,8 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
 static PyMethodDef functions[] = {
     {"adapters", adapters, METH_VARARGS,
      "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
-    {"image_source", vkb_image_source, METH_O, "image_source(array) -> Source"},
+    {"image_source", vkb_image_source, METH_VARARGS,
+     "image_source(image, emission=None, mask=None) -> Source"},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
     {"plan", vkb_any_plan, METH_VARARGS,
@@ -180,7 +181,7 @@ static const struct error_row {
     {VKB_ERROR_ADAPTER_NOT_FOUND, "AdapterNotFoundError",
      "No adapter fits; says what was found, what is missing and what to install."},
     {VKB_ERROR_DEVICE_LOST, "DeviceLostError",
-     "The device went away or hung; the renderer can only be closed."},
+     "The device was lost or did not answer; the renderer can only be closed."},
     {VKB_ERROR_OUT_OF_MEMORY, "OutOfMemoryError", "The host or the device has no memory left."},
     {VKB_ERROR_VALIDATION, "ValidationError", "The validation layer objected to a Vulkan call."},
     {VKB_ERROR_SHADER, "ShaderError", "The driver refused a shader."},

@@ -22,9 +22,9 @@ static bool require_ours(const struct vkb_renderer *self, struct vkb_error *erro
 }
 
 // The device's question between the slices of a wait: whether a signal's handler raised.
-static bool interrupted(void *asked)
+static bool interrupted(void *context)
 {
-    struct vkb_renderer *self = asked;
+    struct vkb_renderer *self = context;
 
     PyEval_RestoreThread(self->thread);
     const bool raised = PyErr_CheckSignals() < 0;
@@ -201,7 +201,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         self->open = create(self, adapter, driver, validation, variants, read_cache, &error);
     if (self->open) {
         self->device.interrupted = interrupted;
-        self->device.asked = self;
+        self->device.context = self;
         self->device.frame_seconds = frame_seconds;
         return (PyObject *)self;
     }
@@ -218,7 +218,7 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
 {
     if (!self->open)
         return true;
-    if (self->device.hung)
+    if (self->device.timed_out)
         self->device.frame_seconds = 0.0;  // it has been waited for: one slice
     if (!vkb_frame_end(&self->device, &self->frame, error)) {
         if (error->kind == VKB_ERROR_INTERRUPTED)
@@ -239,9 +239,9 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
 
 // The device's question while nobody can be told of an exception: a Ctrl-C ends the wait, and its
 // handler runs as soon as Python's code goes on.
-static bool interrupted_at_the_end(void *asked)
+static bool interrupted_at_the_end(void *context)
 {
-    struct vkb_renderer *self = asked;
+    struct vkb_renderer *self = context;
 
     PyEval_RestoreThread(self->thread);
     const bool pressed = PyOS_InterruptOccurred();

@@ -197,16 +197,16 @@ static bool read_texture(struct vkb_held_scene *scene, PyObject *tuple,
         {"linear", VK_SAMPLER_MIPMAP_MODE_LINEAR},
         {0},
     };
-    const char *across, *down, *magnified, *minified, *between;
+    const char *along_u, *along_v, *magnified, *minified, *between;
     int modes[2], filter[3];
     PyObject *levels;
 
     if (!vkb_require_tuple(tuple, "texture")
-        || !PyArg_ParseTuple(tuple, "O!sssss", &PyTuple_Type, &levels, &across, &down, &magnified,
-                             &minified, &between)
-        || !find_name(address_modes, across, &modes[0])
-        || !find_name(address_modes, down, &modes[1]) || !find_name(filters, magnified, &filter[0])
-        || !find_name(filters, minified, &filter[1])
+        || !PyArg_ParseTuple(tuple, "O!sssss", &PyTuple_Type, &levels, &along_u, &along_v,
+                             &magnified, &minified, &between)
+        || !find_name(address_modes, along_u, &modes[0])
+        || !find_name(address_modes, along_v, &modes[1])
+        || !find_name(filters, magnified, &filter[0]) || !find_name(filters, minified, &filter[1])
         || !find_name(mipmap_filters, between, &filter[2]))
         return false;
     *texture = (struct vkb_texture_data){

@@ -45,7 +45,7 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
     const size_t pixel_size = vkb_pixel_size(output->format);
     struct vkb_buffer *buffer = &readback->imports[readback->import_count];
 
-    // The device writes whole pixels, to multiples of their size.
+    // The device writes complete pixels, to multiples of their size.
     if (output->channels != image_channels(output)
         || (!output->packed && (uintptr_t)output->memory % pixel_size != 0))
         return false;

@@ -163,7 +163,7 @@ void vkb_upload_forget(struct vkb_upload *upload)
 
 static uint32_t kept_channels(const struct vkb_image *image)
 {
-    return image->packed ? 3 : 4;
+    return image->packed ? 3 : vkb_formats[image->format].channels;
 }
 
 static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *input,

@@ -25,7 +25,7 @@ struct vkb_upload {
     size_t row_pitch;
     enum vkb_format format;  // of what it holds; NONE: nothing
     uint32_t width, height, channels;
-    uint32_t kept_channels;        // 3 of a packed image, else 4
+    uint32_t kept_channels;        // 3 of a packed image, else the format's
     struct vkb_specials *rows;     // in each row of what it holds
     struct vkb_specials specials;  // in all
     unsigned char *packed;         // one row, to be compared
@@ -37,10 +37,10 @@ void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *uplo
 // What it holds is not compared with the next image.
 void vkb_upload_forget(struct vkb_upload *upload);
 
-// Packs the image to RGBA, alpha 1 where it has none, or to RGB, if `image` is packed; *changed: it
-// is another one than the last. The submissions may still read the last one: they are waited for
-// before it is written over. `image` is where the device will read it; if that is mapped, it has it
-// now, else vkb_upload_record brings it there.
+// Packs the image to its format, alpha 1 where it has none, or to RGB, if `image` is packed;
+// *changed: it is another one than the last. The submissions may still read the last one: they are
+// waited for before it is written over. `image` is where the device will read it; if that is
+// mapped, it has it now, else vkb_upload_record brings it there.
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       struct vkb_submissions *submissions, const struct vkb_input *input,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error);

@@ -1,4 +1,4 @@
-// Variants of blurs, and of an image's whole bloom by one.
+// Variants of blurs, and fused passes for the complete bloom of an image.
 #include "variants/variant.h"
 
 #include "passes/blur.h"
@@ -20,7 +20,7 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, blur, sizeof row);
-    row.constants = (struct vkb_constants){0};
+    row.constants = (struct vkb_constants){.alpha = blur->constants.alpha};
     memset(&row.params, 0, sizeof row.params);
     vkb_make_dispatch(&row, line_shaders[graph->images[blur->reads[0]].format],
                       vertical ? ROW_INVOCATIONS : ROW_INVOCATIONS * LINE_OUTPUTS,
@@ -54,7 +54,7 @@ bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// A horizontal blur into a target of another size, its taps whole texels apart: such a blur
+// A horizontal blur into a target of another size, its taps integer texels apart: such a blur
 // commutes with the filter between the sizes, so it runs in the source's size, and every pixel of
 // the target takes one sample of it instead of one a tap.
 bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -88,20 +88,21 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, VKB_SHADER_enlarge_frag, pass->targets[0]);
     row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
+    row.constants.alpha = pass->constants.alpha;
     row.reads[0] = lines;
     row.read_count = 1;
-    row.block = VKB_BLOCK_extract;
-    row.params.extract.target_width = sampling.width;
-    row.params.extract.target_height = sampling.height;
-    row.params.extract.limit = sampling.limit;
+    row.block = VKB_BLOCK_threshold;
+    row.params.threshold.target_width = sampling.width;
+    row.params.threshold.target_height = sampling.height;
+    row.params.threshold.limit = sampling.limit;
     return vkb_graph_add_pass(choice->graph, &line, error)
         && vkb_add_fullscreen(choice, &row, error);
 }
 
 // The chain of passes that gives an image its bloom where all have its size.
 struct chain {
-    const struct vkb_pass_row *extract, *down, *across, *composite;
-    struct vkb_texel_kernel down_kernel, across_kernel;
+    const struct vkb_pass_row *threshold, *vertical, *horizontal, *composite;
+    struct vkb_texel_kernel vertical_kernel, horizontal_kernel;
 };
 
 // The one blur of that direction that writes the image.
@@ -122,41 +123,40 @@ static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row 
     *chain = (struct chain){.composite = pass};
     if (!vkb_is_composite(pass) || !graph->images[pass->reads[0]].input)
         return false;
-    chain->across = blur_of(graph, pass->reads[1], DIRECTION_HORIZONTAL);
-    if (chain->across)
-        chain->down = blur_of(graph, chain->across->reads[0], DIRECTION_VERTICAL);
-    if (chain->down)
-        chain->extract = vkb_extract_of(graph, chain->down->reads[0]);
-    return chain->extract && chain->extract->reads[0] == pass->reads[0]
-        && vkb_blur_kernel(chain->down, radius, &chain->down_kernel)
-        && vkb_blur_kernel(chain->across, radius, &chain->across_kernel);
+    chain->horizontal = blur_of(graph, pass->reads[1], DIRECTION_HORIZONTAL);
+    if (chain->horizontal)
+        chain->vertical = blur_of(graph, chain->horizontal->reads[0], DIRECTION_VERTICAL);
+    if (chain->vertical)
+        chain->threshold = vkb_threshold_of(graph, chain->vertical->reads[0]);
+    return chain->threshold && chain->threshold->reads[0] == pass->reads[0]
+        && vkb_blur_kernel(chain->vertical, radius, &chain->vertical_kernel)
+        && vkb_blur_kernel(chain->horizontal, radius, &chain->horizontal_kernel);
 }
 
-static struct vkb_pass_row whole_row(const struct vkb_variant_choice *choice,
+static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
                                      const struct chain *chain)
 {
     const struct vkb_graph *graph = &choice->plain;
     const enum vkb_format format = graph->images[chain->composite->targets[0]].format;
     struct vkb_pass_row row;
-    struct vkb_whole_params *params = &row.params.whole;
+    struct vkb_fused_bloom_params *params = &row.params.fused_bloom;
 
     memcpy(&row, chain->composite, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    row.read_count = 1;
-    row.reads[1] = 0;
+    vkb_drop_reads(&row, 1);
     row.fused = true;
-    row.block = VKB_BLOCK_whole;
-    VKB_TAKE_COMPOSITE(&row, whole, chain->composite);
-    VKB_TAKE_THRESHOLD(&row, whole, chain->extract);
+    row.block = VKB_BLOCK_fused_bloom;
+    VKB_TAKE_COMPOSITE(&row, fused_bloom, chain->composite);
+    VKB_TAKE_THRESHOLD(&row, fused_bloom, chain->threshold);
     row.constants.format = vkb_stored_as(choice->device, format);
-    params->down_radius = chain->down_kernel.radius;
-    params->across_radius = chain->across_kernel.radius;
-    memcpy(params->down, chain->down_kernel.weights, sizeof params->down);
-    memcpy(params->across, chain->across_kernel.weights, sizeof params->across);
+    params->vertical_radius = chain->vertical_kernel.radius;
+    params->horizontal_radius = chain->horizontal_kernel.radius;
+    memcpy(params->vertical, chain->vertical_kernel.weights, sizeof params->vertical);
+    memcpy(params->horizontal, chain->horizontal_kernel.weights, sizeof params->horizontal);
     return row;
 }
 
-// The composite as it is, and after it the whole bloom in strips as its alternative.
+// The composite as it is, and after it the fused pass in strips, which may replace it.
 bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
@@ -166,7 +166,7 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
     *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, &chain) && vkb_fits_words(choice, pass);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = whole_row(choice, &chain);
+    struct vkb_pass_row row = fused_row(choice, &chain);
     vkb_make_words(&row, strip_shaders[format], STRIP_COLUMNS(vkb_formats[format].channel_size),
                    STRIP_ROWS);
     return vkb_add_fullscreen(choice, pass, error)
@@ -209,9 +209,9 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
          && find_chain(&choice->plain, pass, TILE_RADIUS, &chain);
     if (!*fits)
         return true;
-    while (radius < chain.down_kernel.radius || radius < chain.across_kernel.radius)
+    while (radius < chain.vertical_kernel.radius || radius < chain.horizontal_kernel.radius)
         radius *= 2;
-    struct vkb_pass_row row = whole_row(choice, &chain);
+    struct vkb_pass_row row = fused_row(choice, &chain);
     vkb_make_dispatch(&row, VKB_SHADER_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row.constants.radius = radius;
     return vkb_add_fullscreen(choice, pass, error)

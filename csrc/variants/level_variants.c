@@ -45,24 +45,24 @@ static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass
     return choice->variants != VKB_VARIANTS_CPU || vkb_fits_words(choice, pass);
 }
 
-// Where the larger level is what is extracted of an image: from the image itself, as an alternative
-// to `halving`, which `pass` became.
+// If the threshold pass writes the larger level: adds a fused pass that starts from the image
+// itself. It may replace `halving`, the variant of `pass`.
 static bool add_halved_image(const struct vkb_variant_choice *choice,
                              const struct vkb_pass_row *pass, const struct vkb_pass_row *halving,
                              struct vkb_error *error)
 {
-    const struct vkb_pass_row *extract = vkb_extract_of(&choice->plain, pass->reads[0]);
+    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
     struct vkb_pass_row row;
 
-    if (!extract)
+    if (!threshold)
         return true;
     memcpy(&row, halving, sizeof row);
-    row.reads[0] = extract->reads[0];
+    row.reads[0] = threshold->reads[0];
     row.fused = true;
-    row.constants.extract = true;
+    row.constants.from_image = true;
     row.constants.format =
         vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
-    VKB_TAKE_THRESHOLD(&row, pyramid, extract);
+    VKB_TAKE_THRESHOLD(&row, pyramid, threshold);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -76,7 +76,7 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    row.constants = (struct vkb_constants){0};
+    row.constants = (struct vkb_constants){.alpha = pass->constants.alpha};
     make_halving(choice, &row, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error)
         && add_halved_image(choice, pass, &row, error);
@@ -92,7 +92,10 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    row.constants = (struct vkb_constants){.add_own = pass->constants.add_own};
+    row.constants = (struct vkb_constants){
+        .add_own = pass->constants.add_own,
+        .alpha = pass->constants.alpha,
+    };
     make_doubling(choice, &row, double_shaders, double_words, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -108,7 +111,7 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
 
     if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
-    *fits = up && vkb_doubles(up) && !up->constants.add_own
+    *fits = up && vkb_doubles(up) && !up->constants.add_own && !pass->constants.masked
          && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format
          && loads(choice, pass);
     if (!*fits)
@@ -120,6 +123,7 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
+    vkb_drop_reads(&row, 2);
     row.block = VKB_BLOCK_double_final;
     params->coarse = up->params.pyramid.coarse;
     VKB_TAKE_COMPOSITE(&row, double_final, pass);

@@ -21,7 +21,8 @@ struct vkb_variant_choice {
 typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
                              const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error);
 
-// A blur's lines and enlarged lines; an image's whole bloom in strips and tiles.
+// A blur's lines and enlarged lines; fused passes for the complete bloom of an image, in strips and
+// tiles.
 vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
 // Levels of exactly half and twice a size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
@@ -44,8 +45,11 @@ enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format for
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
 // The last pass whose one target the image is; NULL: there is none.
 const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image);
-// The extraction of an image's bright parts in its own size and format that writes `image`, if any.
-const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_t image);
+// The threshold pass that writes `image` from an image of the same size and format; NULL: none.
+const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
+
+// The pass reads no more than so many of its images.
+void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 
 // Makes a dispatch of a pass over all pixels.
 void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,

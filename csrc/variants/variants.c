@@ -52,6 +52,12 @@ bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
     return writers == 1;
 }
 
+void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count)
+{
+    while (row->read_count > read_count)
+        row->reads[--row->read_count] = 0;
+}
+
 void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
                        uint32_t block_height)
 {
@@ -90,18 +96,18 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
     return writer;
 }
 
-const struct vkb_pass_row *vkb_extract_of(const struct vkb_graph *graph, uint32_t image)
+const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image)
 {
     const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
 
-    return pass && vkb_is_extract(pass)
+    return pass && vkb_is_threshold(pass)
                 && graph->images[pass->reads[0]].format == graph->images[image].format
              ? pass
              : NULL;
 }
 
 static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
-static const enum vkb_shader bright_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(bright);
+static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(threshold);
 
 // Whether the pixels of both have the same bytes. (Single floats hold R11G11B10.)
 static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
@@ -112,22 +118,25 @@ static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 // A composite whose images have one size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN
+    return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN && !pass->constants.masked
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
         && has_format_of(graph, pass->reads[0], pass->reads[1])
         && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-static bool brightens(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+// A threshold pass between images of one format.
+static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_extract(pass) && has_format_of(graph, pass->reads[0], pass->targets[0]);
+    return vkb_is_threshold(pass) && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-// A pass that needs the pixels at each pixel's own place alone.
-static void load_pixels(struct vkb_pass_row *row, enum vkb_shader shader, enum vkb_format format)
+// A pass that needs the pixels at each pixel's own place alone, of the first images that it reads.
+static void load_pixels(struct vkb_pass_row *row, enum vkb_shader shader, enum vkb_format format,
+                        uint32_t read_count)
 {
     vkb_make_words(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
+    vkb_drop_reads(row, read_count);
 }
 
 bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -142,9 +151,9 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
         vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
                           PIXEL_INVOCATIONS);
     else if (vkb_fits_words(choice, pass) && blends(graph, pass))
-        load_pixels(&row, blend_shaders[format], format);
-    else if (vkb_fits_words(choice, pass) && brightens(graph, pass))
-        load_pixels(&row, bright_shaders[format], format);
+        load_pixels(&row, blend_shaders[format], format, 2);
+    else if (vkb_fits_words(choice, pass) && loads_threshold(graph, pass))
+        load_pixels(&row, threshold_shaders[format], format, 1);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 

@@ -286,7 +286,7 @@ static bool fail_hung(struct vkb_device *device, double seconds, struct vkb_erro
              seconds);
     error->result = VK_TIMEOUT;
     snprintf(error->call, sizeof error->call, "vkWaitForFences");
-    device->hung = true;
+    device->timed_out = true;
     return false;
 }
 
@@ -331,7 +331,7 @@ bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
         if (result != VK_TIMEOUT)
             break;
         waited += slice;
-        if (device->interrupted && device->interrupted(device->asked))
+        if (device->interrupted && device->interrupted(device->context))
             return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
         if (waited >= limit)
             break;

@@ -27,10 +27,10 @@ struct vkb_device {
     // Imported host memory starts and ends at multiples of this; 0: import is not supported.
     VkDeviceSize import_alignment;
     atomic_bool lost;  // other threads read it while the device is in use
-    bool hung;         // lost because a wait took too long; it may still be busy
+    bool timed_out;    // lost because a wait took too long; it may still be busy
     // Called between the slices of a long wait; true ends the wait. May be NULL.
-    bool (*interrupted)(void *asked);
-    void *asked;
+    bool (*interrupted)(void *context);
+    void *context;
     double frame_seconds;  // the longest wait for each frame
 };
 

@@ -182,7 +182,7 @@ bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage
     return true;
 }
 
-static VkMappedMemoryRange whole_range(const struct vkb_buffer *buffer)
+static VkMappedMemoryRange full_range(const struct vkb_buffer *buffer)
 {
     return (VkMappedMemoryRange){
         .sType = VK_STRUCTURE_TYPE_MAPPED_MEMORY_RANGE,
@@ -194,7 +194,7 @@ static VkMappedMemoryRange whole_range(const struct vkb_buffer *buffer)
 bool vkb_buffer_flush(const struct vkb_device *device, const struct vkb_buffer *buffer,
                       struct vkb_error *error)
 {
-    VkMappedMemoryRange range = whole_range(buffer);
+    VkMappedMemoryRange range = full_range(buffer);
 
     return buffer->coherent
         || VK(error, device->vk.vkFlushMappedMemoryRanges(device->handle, 1, &range));
@@ -203,7 +203,7 @@ bool vkb_buffer_flush(const struct vkb_device *device, const struct vkb_buffer *
 bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buffer *buffer,
                            struct vkb_error *error)
 {
-    VkMappedMemoryRange range = whole_range(buffer);
+    VkMappedMemoryRange range = full_range(buffer);
 
     return buffer->coherent
         || VK(error, device->vk.vkInvalidateMappedMemoryRanges(device->handle, 1, &range));
@@ -237,7 +237,7 @@ static bool create_handle(const struct vkb_device *device, const struct vkb_imag
                   NULL, &image->handle));
 }
 
-static VkImageSubresourceRange whole_image(const struct vkb_image *image)
+static VkImageSubresourceRange all_of_image(const struct vkb_image *image)
 {
     return (VkImageSubresourceRange){
         .aspectMask = vkb_formats[image->format].aspect,
@@ -257,7 +257,7 @@ static bool create_view(const struct vkb_device *device, struct vkb_image *image
                              .viewType = image->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
                                                             : VK_IMAGE_VIEW_TYPE_2D,
                              .format = vkb_formats[image->format].vk,
-                             .subresourceRange = whole_image(image),
+                             .subresourceRange = all_of_image(image),
                          },
                          NULL, &image->view));
 }
@@ -395,7 +395,7 @@ void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer comma
         .oldLayout = vkb_image_layout(image, image->access),
         .newLayout = vkb_image_layout(image, access),
         .image = image->handle,
-        .subresourceRange = whole_image(image),
+        .subresourceRange = all_of_image(image),
     };
 
     // A mapped image is accessed as a buffer, too, whose writes only a memory barrier covers.

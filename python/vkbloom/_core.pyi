@@ -35,7 +35,12 @@ class ValidationError(Error): ...
 class ShaderError(Error): ...
 
 def adapters(driver: str, /) -> list[AdapterTuple]: ...
-def image_source(array: _Array, /) -> Source: ...
+def image_source(
+    image: _Array,
+    emission: _Array | None = None,
+    mask: NDArray[np.float32] | None = None,
+    /,
+) -> Source: ...
 def scene_source(
     scene: _Scene,
     camera: _Camera,
@@ -56,7 +61,7 @@ class Renderer:
         adapter: str,
         driver: str,
         validation: bool,
-        forms: str,
+        variants: str,
         frame_seconds: float,
         read_cache: Callable[[bytes], bytes | None],
         /,

@@ -8,6 +8,7 @@ import importlib
 import json
 import os
 from pathlib import Path
+from types import ModuleType
 
 from vkbloom import _core
 
@@ -79,11 +80,29 @@ def bundled_driver() -> str:
         return ""
     if chosen:
         return _library_of(Path(chosen)) if chosen.endswith(".json") else chosen
+    package = _package()
+    return "" if package is None else str(package.LIBRARY)
+
+
+def bundled_hash() -> str:
+    """Return the SHA-256 of the driver in ``vkbloom-lavapipe``, "" for other drivers.
+
+    Two drivers of one hash draw the same bits on every CPU. Other drivers have none here: what
+    they draw depends on libraries beside them and on the CPU.
+
+    Returns
+    -------
+    str
+    """
+    package = None if os.environ.get("VKBLOOM_DRIVER") else _package()
+    return "" if package is None else str(package.SHA256)
+
+
+def _package() -> ModuleType | None:
     try:
-        package = importlib.import_module("vkbloom_lavapipe")
+        return importlib.import_module("vkbloom_lavapipe")
     except ModuleNotFoundError:
-        return ""
-    return str(package.LIBRARY)
+        return None
 
 
 def _library_of(manifest: Path) -> str:

@@ -44,7 +44,8 @@ class Frames(Mapping[str, NDArray[Any]]):
     settings : Settings
         The settings of the request.
     info : mapping of str to object
-        "adapter", "driver", "version", and the numbers of "nan" and "inf" values in the input.
+        "adapter", "driver", "version", and the numbers of "nan" and "inf" values in the input;
+        "driver_sha256", where the driver is that of ``vkbloom-lavapipe``.
 
     Raises
     ------

@@ -45,6 +45,9 @@ class BevyBloom(Settings):
         Share of the levels, counted from the smallest blur, that are left in whole, 0.001 to 1.
     max_mip_dimension : int
         Height of ``down_0`` in pixels, 4 to 4096.
+    scale_x, scale_y : float
+        Bevy's scale: factors of all distances between taps, 0 to 16. Its ``Bloom::ANAMORPHIC`` is
+        ``scale_x=4, max_mip_dimension=1024``.
     composite : {"mix", "add"}
         Bevy's "energy conserving" and "additive".
     intensity : float
@@ -72,7 +75,8 @@ class BevyBloom(Settings):
 
     without the factor 1 - intensity where the composite is "add"; then
     up_k = (1 - f_k+1) down_k + f_k+1 tent(up_k+1), for "add" down_k + f_k+1 tent(up_k+1), with the
-    tent of `Pyramid` at a radius of 1. Bevy's last step, lerp(scene, tent(up_0), f_0), is the
+    tent of `Pyramid` at a radius of 1. `scale_x` and `scale_y` multiply the distances of all these
+    taps. Bevy's last step, lerp(scene, tent(up_0), f_0), is the
     composite, as f_0 is the intensity.
 
     Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016), crates/bevy_post_process/src/bloom.
@@ -93,6 +97,8 @@ class BevyBloom(Settings):
     low_frequency_boost_curvature: float = number_field("low_frequency_boost_curvature")
     high_pass_frequency: float = number_field("high_pass_frequency")
     max_mip_dimension: int = number_field("max_mip_dimension", unit="pixel")
+    scale_x: float = number_field("scale_x")
+    scale_y: float = number_field("scale_y")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -279,6 +285,9 @@ class HdrpBloom(Settings):
     high_quality_filtering : bool
         The levels are enlarged by a cubic B-spline instead of bilinearly. Frames under 800 pixels
         wide or 450 high are bilinear either way.
+    anamorphism : float
+        Of the camera, -1 to 1, as with HDRP's switch "anamorphic": above 0 it stretches the bloom
+        along y, below 0 along x.
     threshold : None
         HDRP's default. With one HDRP would replace what of the scene is above it, a composite
         that is not here.
@@ -296,12 +305,14 @@ class HdrpBloom(Settings):
     Notes
     -----
     Level k has the size of the frame / 2^(k + 1), rounded, halves to even; there are
-    clamp(floor(log2(longer side of the frame) - 2), 1, 16). Five bilinear taps in texels of the
-    frame, at (0, 0), +-(0.9, -0.4) and +-(0.4, 0.9), weighted by 1 / (1 + luminance), go into an
-    image of the size of ``down_0``. That is blurred into ``down_0``, and each level, read
-    bilinearly at distances of one pixel of the next one, into that, by the binomial 70, 56, 28, 8,
-    1 (/ 256) along both axes. With s = 0.05 + 0.9 scatter, up_k = lerp(down_k, U(up_k+1), s);
-    ``bloom`` is the cubic B-spline of up_0. Dirt, tint and anamorphism are left out.
+    clamp(floor(log2(longer side of the frame) - 2), 1, 16). An `anamorphism` a < 0 first
+    multiplies the frame's width by 1 + a / 2, one above 0 its height by 1 - a / 2. Five bilinear
+    taps in texels of the frame, at (0, 0), +-(0.9, -0.4) and +-(0.4, 0.9), weighted by
+    1 / (1 + luminance), go into an image of the size of ``down_0``. That is blurred into
+    ``down_0``, and each level, read bilinearly at distances of one pixel of the next one, into
+    that, by the binomial 70, 56, 28, 8, 1 (/ 256) along both axes. With s = 0.05 + 0.9 scatter,
+    up_k = lerp(down_k, U(up_k+1), s); ``bloom`` is the cubic B-spline of up_0. Dirt and tint are
+    left out.
 
     Source: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.high-definition/
     Runtime: PostProcessing/Shaders/BloomPrefilter.compute @ 2309d2c2fde8, BloomBlur.compute and
@@ -322,6 +333,7 @@ class HdrpBloom(Settings):
     format: BloomFormat | None = "rgba16float"
     scatter: float = number_field("scatter")
     high_quality_filtering: bool = flag_field("high_quality_filtering")
+    anamorphism: float = number_field("anamorphism")
 
     def __post_init__(self) -> None:
         super().__post_init__()

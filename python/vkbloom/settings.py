@@ -19,11 +19,12 @@ Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 Encoding = Literal["none", "gamma22", "srgb"]
+Alpha = Literal["keep", "max", "blur"]
 Texel = Literal["own", "x"]
 BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"]
 
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
-BLOOM_FORMATS = ("rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat")
+BLOOM_FORMATS: tuple[BloomFormat, ...] = get_args(BloomFormat)
 
 #: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
@@ -90,6 +91,13 @@ class Settings:
         more.
     intensity : float
         The i of the composite, 0 to 65504.
+    alpha : {"keep", "max", "blur"}
+        What becomes of the alpha a of an RGBA image, here premultiplied for "max" and "blur".
+        "keep": nothing. "max": max(a, clamp(max over r, g, b of i b, 0, 1)), whatever the
+        `composite`. "blur": alpha is blurred like a colour, with the weights of the colours, and
+        is ``bloom[..., 3]``; a becomes 1 - (1 - a)(1 - clamp(i b_a, 0, 1)). Where a threshold
+        subtracts instead of scaling (`FilamentBloom`), alpha takes the factor of the brightest
+        channel. Scenes ignore it.
     tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
         The tone curve that is applied to the composite.
     exposure : float
@@ -151,6 +159,7 @@ class Settings:
     knee: float = number_field("knee")
     composite: Composite = choice_field("composite")
     intensity: float = number_field("intensity")
+    alpha: Alpha = choice_field("alpha")
     tonemap: ToneMap = choice_field("tonemap")
     exposure: float = number_field("exposure", unit="stop")
     encoding: Encoding = choice_field("encoding")
@@ -269,7 +278,7 @@ class Settings:
             raise TypeError(f"fields: a mapping is needed, not {type(fields).__name__}")
         own = getattr(cls, "method", None)
         method = fields.get("method", own)
-        kinds = {kind.method: kind for kind in Settings.__subclasses__()}
+        kinds = methods()
         if not isinstance(method, str) or method not in kinds:
             raise ValueError(f"method: {method!r} is not one of {', '.join(kinds)}")
         if own not in (None, method):
@@ -584,6 +593,18 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     weights = [math.exp(-0.5 * distance * distance) for distance in distances]
     total = weights[0] + 2 * sum(weights[1:])
     return tuple(weight / total for weight in weights)
+
+
+def methods() -> dict[str, type[Settings]]:
+    """Return the settings class of each method, by the method's name."""
+    return {kind.method: kind for kind in Settings.__subclasses__()}
+
+
+def check_shading(shading: str) -> Shading:
+    """Return the shading; raise ValueError if there is no shading of that name."""
+    if shading not in SHADINGS:
+        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+    return shading
 
 
 def check_settings(settings: Settings | None) -> Settings:

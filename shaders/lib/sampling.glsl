@@ -68,7 +68,7 @@ vec4 fetch_within(sampler2D source, Place place)
 // Samples the source at an offset, in texels, from a position.
 vec4 sample_at(sampler2D source, Place place, vec2 offset, int sampling)
 {
-    if (sampling == SAMPLING_WHOLE)
+    if (sampling == SAMPLING_TEXEL)
         return fetch_clamped(source, place.texel + ivec2(offset));
     vec2 moved = place.part + offset;
     if (sampling == SAMPLING_FETCH) {

@@ -10,7 +10,7 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    vec3 bright = apply_threshold(surface_colour() * params.glow_intensity, THRESHOLD_MODE,
+    vec3 kept = apply_threshold(surface_colour() * params.glow_intensity, THRESHOLD_MODE,
                                   params.threshold, params.knee);
-    colour = vec4(storable(bright), 1.0);
+    colour = vec4(storable(kept), 1.0);
 }

@@ -49,9 +49,8 @@ void main()
         load_scene(first.x, y, raw);
         load_bloom(first.x, y, light);
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            vec4 own = vec4(colour_of(raw[i]), 1.0);
-            vec4 sum = finish(own, colour_of(light[i]), ivec2(first.x + i, y));
-            raw[i] = with_colour(raw[i], sum.rgb);
+            vec4 sum = finish(value_of(raw[i]), value_of(light[i]), ivec2(first.x + i, y));
+            raw[i] = finished(raw[i], sum);
         }
         store(first.x, y, raw);
     }

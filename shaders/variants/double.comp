@@ -16,11 +16,11 @@ WRITE_IMAGE(3);
 #define HAS_OWN (ADD_OWN != 0)
 #define OWN_CHANNELS 4
 
-uvec4 shade(uvec4 level, vec3 sum, ivec2 pixel)
+uvec4 shade(uvec4 level, vec4 sum, ivec2 pixel)
 {
     if (ADD_OWN != 0)
-        sum += params.own * colour_of(level);
-    return opaque(storable(sum));
+        sum += params.own * value_of(level);
+    return buffer_of(sum);
 }
 
 #include "variants/double.glsl"

@@ -38,21 +38,21 @@ void main()
     ivec2 last = READ_SIZE(smaller, 1) - 1, size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y) / 2;
-    vec3 rows[KEPT][COLUMNS];
-    vec3 texels[LOADED];
+    vec4 rows[KEPT][COLUMNS];
+    vec4 texels[LOADED];
     uvec4 raw[LOADED], pixels[COLUMNS];
 
     if (any(greaterThanEqual(first, size)))
         return;
     [[unroll]] for (int row = 0; row < KEPT; ++row)
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            rows[row][i] = vec3(0.0);
+            rows[row][i] = vec4(0.0);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         pixels[i] = uvec4(0);
     for (int y = first.y / 2 - 2; y < end + 2; ++y) {
         load_smaller(first.x / 2, clamp(y, 0, last.y), raw);
         [[unroll]] for (int i = 0; i < LOADED; ++i)
-            texels[i] = colour_of(raw[i]);
+            texels[i] = value_of(raw[i]);
         [[unroll]] for (int row = 1; row < KEPT; ++row)
             [[unroll]] for (int i = 0; i < COLUMNS; ++i)
                 rows[row - 1][i] = rows[row][i];
@@ -68,7 +68,7 @@ void main()
             if (HAS_OWN)
                 load_own(first.x, line, pixels);
             [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-                vec3 sum = four(rows[part][i], rows[part + 1][i], rows[part + 2][i],
+                vec4 sum = four(rows[part][i], rows[part + 1][i], rows[part + 2][i],
                                 rows[part + 3][i], part == 1);
                 pixels[i] = shade(pixels[i], params.coarse * sum, ivec2(first.x + i, line));
             }

@@ -17,10 +17,9 @@ WRITE_IMAGE(3);
 #define HAS_OWN true
 #define OWN_CHANNELS IMAGE_CHANNELS
 
-uvec4 shade(uvec4 scene, vec3 sum, ivec2 pixel)
+uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
 {
-    vec4 colour = vec4(colour_of(scene), 1.0);
-    return with_colour(scene, finish(colour, as_stored(sum, FORMAT), pixel).rgb);
+    return finished(scene, finish(value_of(scene), as_stored(sum, FORMAT), pixel));
 }
 
 #include "variants/double.glsl"

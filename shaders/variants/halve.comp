@@ -35,13 +35,13 @@ WRITE_IMAGE(2);
 #define STORE_CHANNELS 4
 #include "variants/store.glsl"
 
-vec3 bright(vec3 value)
+vec4 thresholded(vec4 value)
 {
-    if (EXTRACT == 0)
+    if (FROM_IMAGE == 0)
         return value;
-    vec3 kept =
+    vec4 kept =
         apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
-    // Whole or not at all, a texel has the format that it would be stored in.
+    // Without a knee it is the texel or 0, which has the format that it would be stored in.
     return THRESHOLD_MODE == THRESHOLD_KNEE ? as_stored(kept, FORMAT) : kept;
 }
 
@@ -51,33 +51,33 @@ void main()
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);
     // Of the output row that a pair of source rows ends, and of the one that it is the middle of.
-    vec3 ending[COLUMNS], middle[COLUMNS], starting[COLUMNS];
-    vec3 texels[LOADED];
+    vec4 ending[COLUMNS], middle[COLUMNS], starting[COLUMNS];
+    vec4 texels[LOADED];
     uvec4 raw[LOADED], stored[COLUMNS];
 
     if (any(greaterThanEqual(first, size)))
         return;
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        ending[i] = middle[i] = vec3(0.0);
+        ending[i] = middle[i] = vec4(0.0);
     for (int y = first.y - 1; y <= end; ++y) {
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            starting[i] = vec3(0.0);
+            starting[i] = vec4(0.0);
         [[unroll]] for (int half_row = 0; half_row < 2; ++half_row) {
             load_run(2 * first.x, clamp(2 * y + half_row, 0, source_size.y - 1), raw);
             [[unroll]] for (int i = 0; i < LOADED; ++i)
-                texels[i] = bright(colour_of(raw[i]));
+                texels[i] = thresholded(value_of(raw[i]));
             [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-                vec3 inner = texels[2 * i + 2] + texels[2 * i + 3];
-                vec3 four = inner + texels[2 * i + 1] + texels[2 * i + 4];
-                vec3 six = four + inner + texels[2 * i] + texels[2 * i + 5];
+                vec4 inner = texels[2 * i + 2] + texels[2 * i + 3];
+                vec4 four = inner + texels[2 * i + 1] + texels[2 * i + 4];
+                vec4 six = four + inner + texels[2 * i] + texels[2 * i + 5];
                 // Shares of 1/2 * 1/4 * 1/4 and 1/2 * 1/8 * 1/8 (the two middle rows twice that).
-                ending[i] += six / 128.0 + (half_row == 0 ? four / 32.0 : vec3(0.0));
+                ending[i] += six / 128.0 + (half_row == 0 ? four / 32.0 : vec4(0.0));
                 middle[i] += six / 64.0 + four / 32.0;
-                starting[i] += six / 128.0 + (half_row == 1 ? four / 32.0 : vec3(0.0));
+                starting[i] += six / 128.0 + (half_row == 1 ? four / 32.0 : vec4(0.0));
             }
         }
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            stored[i] = opaque(storable(ending[i]));
+            stored[i] = buffer_of(ending[i]);
         if (y > first.y)
             store(first.x, y - 1, stored);
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {

@@ -1,6 +1,6 @@
 // How variants load and store runs of pixels. With WORDS an image is a buffer of 16-byte words, as a
 // CPU has it: llvmpipe loads and stores a word nearly as fast as one channel. Else an image is a
-// storage image.
+// storage image. A shader that includes this has included storage.glsl.
 //
 // A pixel is `raw` before its channels are floats: with WORDS the bits of its CHANNEL_BYTES bytes a
 // channel, else the bits of single floats. load.glsl and store.glsl make the functions.
@@ -39,35 +39,46 @@ ivec2 first_pixel(ivec2 block)
     return ivec2(gl_GlobalInvocationID.xy) * block + ivec2(0, FIRST_ROW());
 }
 
-vec3 colour_of(uvec4 raw)
+vec4 value_of(uvec4 raw)
 {
 #if CHANNEL_BYTES == 1
     // As llvmpipe reads 8 bits.
-    return vec3(ivec3(raw.x, raw.x >> 8, raw.x >> 16) & 255) * (1.0 / 255.0);
+    return vec4(ivec4(raw.x, raw.x >> 8, raw.x >> 16, raw.x >> 24) & 255) * (1.0 / 255.0);
 #elif CHANNEL_BYTES == 2
-    return vec3(unpackHalf2x16(raw.x), unpackHalf2x16(raw.y).x);
+    return vec4(unpackHalf2x16(raw.x), unpackHalf2x16(raw.y));
 #else
-    return uintBitsToFloat(raw.rgb);
+    return uintBitsToFloat(raw);
 #endif
 }
 
-// The colour with the alpha of `raw`.
-uvec4 with_colour(uvec4 raw, vec3 colour)
+uvec4 raw_of(vec4 value)
 {
 #if CHANNEL_BYTES == 1
     // A sum with 2^23 is rounded to an integer, which its last bits are: Mesa 25 converts lane by lane.
-    uvec3 level = floatBitsToUint(clamp(colour, 0.0, 1.0) * 255.0 + 8388608.0) & 255u;
-    return uvec4(level.r | level.g << 8 | level.b << 16 | (raw.x & 0xff000000u), 0, 0, 0);
+    uvec4 level = floatBitsToUint(clamp(value, 0.0, 1.0) * 255.0 + 8388608.0) & 255u;
+    return uvec4(level.r | level.g << 8 | level.b << 16 | level.a << 24, 0, 0, 0);
 #elif CHANNEL_BYTES == 2
-    uint blue = packHalf2x16(vec2(colour.b, 0.0)) & 0xffffu;
-    return uvec4(packHalf2x16(colour.rg), blue | (raw.y & 0xffff0000u), 0, 0);
+    return uvec4(packHalf2x16(value.rg), packHalf2x16(value.ba), 0, 0);
 #else
-    return uvec4(floatBitsToUint(colour), raw.a);
+    return floatBitsToUint(value);
 #endif
 }
 
-// The colour with an alpha of 1.
-uvec4 opaque(vec3 colour)
+// The value with the bits of `own` for its alpha.
+uvec4 with_alpha_of(uvec4 own, vec4 value)
+{
+#if CHANNEL_BYTES == 1
+    return uvec4((raw_of(value).x & 0xffffffu) | (own.x & 0xff000000u), 0, 0, 0);
+#elif CHANNEL_BYTES == 2
+    uint blue = packHalf2x16(vec2(value.b, 0.0)) & 0xffffu;
+    return uvec4(packHalf2x16(value.rg), blue | (own.y & 0xffff0000u), 0, 0);
+#else
+    return uvec4(floatBitsToUint(value.rgb), own.a);
+#endif
+}
+
+// A value of a bloom buffer, whose alpha is 1 unless it is blurred like a colour.
+uvec4 buffer_of(vec4 value)
 {
 #if CHANNEL_BYTES == 1
     const uvec4 one = uvec4(0xff000000u, 0, 0, 0);
@@ -76,5 +87,11 @@ uvec4 opaque(vec3 colour)
 #else
     const uvec4 one = uvec4(0, 0, 0, 0x3f800000u);
 #endif
-    return with_colour(one, colour);
+    return ALPHA == ALPHA_BLUR ? raw_of(stored(value)) : with_alpha_of(one, stored(value));
+}
+
+// A pixel of the finished picture.
+uvec4 finished(uvec4 own, vec4 value)
+{
+    return ALPHA == ALPHA_KEEP ? with_alpha_of(own, value) : raw_of(value);
 }

@@ -1,9 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// An image's whole bloom for processors without fast shared memory: an invocation walks down a
+// The complete bloom of an image for processors without fast shared memory: an invocation walks down a
 // strip, with the vertical sums of the rows to come in registers.
-#include "variants/whole.glsl"
+#include "variants/fused_bloom.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = STRIP_COLUMNS(CHANNEL_BYTES);
@@ -47,8 +47,8 @@ void main()
     if (any(greaterThanEqual(first, size)))
         return;
     [[unroll]] for (int i = 0; i <= STRIP_RADIUS; ++i) {
-        weights[i] = down(i);
-        row_weights[i] = across(i);
+        weights[i] = vertical_weight(i);
+        row_weights[i] = horizontal_weight(i);
     }
     [[unroll]] for (int row = 0; row < SUMS; ++row)
         [[unroll]] for (int i = 0; i < LOADED; ++i)
@@ -57,7 +57,7 @@ void main()
     for (int y = first.y - STRIP_RADIUS; y < end + STRIP_RADIUS; ++y) {
         load_wide(first.x, clamp(y, 0, size.y - 1), raw);
         [[unroll]] for (int i = 0; i < LOADED; ++i)
-            line[i] = bright(colour_of(raw[i]));
+            line[i] = thresholded(value_of(raw[i]).rgb);
         [[unroll]] for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
@@ -74,8 +74,8 @@ void main()
             vec3 sum = vec3(0.0);
             [[unroll]] for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
                 sum += row_weights[abs(tap)] * line[i + STRIP_RADIUS + tap];
-            vec4 scene = vec4(colour_of(own[i]), 1.0);
-            own[i] = with_colour(own[i], finish(scene, as_stored(sum, FORMAT), pixel).rgb);
+            vec4 bloom = vec4(as_stored(sum, FORMAT), 1.0);
+            own[i] = finished(own[i], finish(value_of(own[i]), bloom, pixel));
         }
         store(first.x, y - STRIP_RADIUS, own);
     }

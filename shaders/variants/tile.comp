@@ -1,8 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// An image's whole bloom for GPUs: a workgroup writes a tile, whose vertical sums lie in shared
+// The complete bloom of an image for GPUs: a workgroup writes a tile, whose vertical sums lie in shared
 // memory between the blurs.
-#include "variants/whole.glsl"
+#include "variants/fused_bloom.glsl"
 
 const int RUN = TILE_ROWS / TILE_RUNS;
 
@@ -46,26 +46,26 @@ vec3 kept_sum(int row, int column)
 }
 
 // A run of vertical sums in one column, each texel loaded once.
-void sum_down(ivec2 place, ivec2 last, int top, int column)
+void sum_vertically(ivec2 place, ivec2 last, int top, int column)
 {
     vec3 run[RUN];
     for (int i = 0; i < RUN; ++i)
         run[i] = vec3(0.0);
     for (int at = -RADIUS; at < RUN + RADIUS; ++at) {
-        vec3 value = bright(texelFetch(image, ivec2(place.x, clamp(place.y + at, 0, last.y)), 0).rgb);
+        vec3 value = thresholded(texelFetch(image, ivec2(place.x, clamp(place.y + at, 0, last.y)), 0).rgb);
         for (int i = 0; i < RUN; ++i)
             if (abs(at - i) <= RADIUS)
-                run[i] += down(at - i) * value;
+                run[i] += vertical_weight(at - i) * value;
     }
     for (int i = 0; i < RUN; ++i)
         keep_sum(top + i, column, run[i]);
 }
 
-vec3 sum_across(int row, int column)
+vec3 sum_horizontally(int row, int column)
 {
     vec3 sum = vec3(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
-        sum += across(tap) * kept_sum(row, column + RADIUS + tap);
+        sum += horizontal_weight(tap) * kept_sum(row, column + RADIUS + tap);
     return as_stored(sum, FORMAT);
 }
 
@@ -76,7 +76,7 @@ void main()
     ivec2 first = ivec2(gl_WorkGroupID.xy) * ivec2(columns, TILE_ROWS);
     int column = int(gl_LocalInvocationID.x), top = int(gl_LocalInvocationID.y) * RUN;
 
-    sum_down(ivec2(clamp(first.x + column - RADIUS, 0, last.x), first.y + top), last, top, column);
+    sum_vertically(ivec2(clamp(first.x + column - RADIUS, 0, last.x), first.y + top), last, top, column);
     barrier();
     if (column >= columns || first.x + column > last.x)
         return;
@@ -86,6 +86,6 @@ void main()
         ivec2 pixel = first + ivec2(column, row);
         if (pixel.y <= last.y)
             imageStore(target, pixel,
-                       finish(texelFetch(image, pixel, 0), sum_across(row, column), pixel));
+                       finish(texelFetch(image, pixel, 0), vec4(sum_horizontally(row, column), 1.0), pixel));
     }
 }

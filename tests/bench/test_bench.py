@@ -21,7 +21,7 @@ from benchmarks.inputs import REC709, THRESHOLD, pictures
 from benchmarks.machine import command
 from benchmarks.ours import contender
 from benchmarks.plan import FORM_VARIABLE
-from benchmarks.points import best_order, worst_order
+from benchmarks.requests import best_order, worst_order
 from benchmarks.results import Curve, Goal, Section, Table, agreement
 from benchmarks.spread import spread
 from benchmarks.timing import Contender, Times, alternate
@@ -215,14 +215,14 @@ def test_no_rounding_decides_what_is_bright(dtype: Any) -> None:
     assert not np.array_equal(several[1], several[2])
 
 
-def test_points_are_the_same_in_both_orders() -> None:
-    points = best_order(10_000)
-    assert len(set(points)) == 10_000
+def test_settings_are_the_same_in_both_orders() -> None:
+    settings = best_order(10_000)
+    assert len(set(settings)) == 10_000
     for name, count in (("blur_scale", 10), ("blur_strength", 20), ("intensity", 50)):
-        assert len({getattr(point, name) for point in points}) == count
-    worst = worst_order(points)
-    assert set(worst) == set(points)
-    assert all(a.intensity != b.intensity for a, b in itertools.pairwise(points))
+        assert len({getattr(each, name) for each in settings}) == count
+    worst = worst_order(settings)
+    assert set(worst) == set(settings)
+    assert all(a.intensity != b.intensity for a, b in itertools.pairwise(settings))
     assert all(a.blur_scale != b.blur_scale for a, b in itertools.pairwise(worst))
     assert len(best_order(7)) == 7
 
@@ -266,7 +266,7 @@ def test_a_renderer_is_made_under_the_form(monkeypatch: pytest.MonkeyPatch) -> N
     assert seen == [("software", "fragment"), ("auto", "auto")]
 
 
-@pytest.mark.parametrize(("name", "value"), [("rounds", 2), ("points", 0), ("threads", 0)])
+@pytest.mark.parametrize(("name", "value"), [("rounds", 2), ("requests", 0), ("threads", 0)])
 def test_numbers_out_of_range(name: str, value: int) -> None:
     with pytest.raises(ValueError, match=f"{name}: {value} is out of range"):
         Plan(**{name: value})  # type: ignore[arg-type]
@@ -274,9 +274,9 @@ def test_numbers_out_of_range(name: str, value: int) -> None:
 
 def test_the_command_of_a_plan() -> None:
     assert command(Plan()) == "python -m benchmarks"
-    plan = Plan(adapter="NVIDIA H", only=("image", "cost"), quick=True, rounds=9, points=8)
+    plan = Plan(adapter="NVIDIA H", only=("image", "cost"), quick=True, rounds=9, requests=8)
     expected = "python -m benchmarks --adapter 'NVIDIA H' --only image --only cost --quick"
-    assert command(plan) == f"{expected} --rounds 9 --points 8"
+    assert command(plan) == f"{expected} --rounds 9 --requests 8"
 
 
 # Reports
@@ -399,10 +399,10 @@ def test_the_report_says_on_what(smoke: tuple[Result, dict[str, Any], str]) -> N
 
 
 def test_the_best_order_runs_fewer_passes(smoke: tuple[Result, dict[str, Any], str]) -> None:
-    (section,) = (each for each in smoke[1]["sections"] if each["id"] == "points")
+    (section,) = (each for each in smoke[1]["sections"] if each["id"] == "requests")
     rows = {row[0]: int(row[3].split()[0]) for row in section["tables"][0]["rows"]}
     many, calls, worst = rows.values()
-    # In calls one after the other, a point may be what the one before the table left.
+    # The first single call may find images that the calls before the table left.
     assert many <= calls <= worst
 
 
@@ -420,7 +420,7 @@ def test_the_list_names_every_benchmark() -> None:
     [
         (("--only", "speed"), "speed"),
         (("--rounds", "2"), "rounds: 2 is out of range, 3 or more"),
-        (("--points", "0"), "points: 0 is out of range"),
+        (("--requests", "0"), "requests: 0 is out of range"),
         (("--threads", "0"), "threads: 0 is out of range"),
         (("-o", "table.txt"), "does not end in .md"),
         (("extra",), "extra"),

@@ -21,7 +21,7 @@ IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
 
 
 def run(*words: object) -> Result:
-    return CliRunner().invoke(program, ["apply", *map(str, words), "--adapter", "software"])
+    return CliRunner().invoke(program, ["apply", *map(str, words)])
 
 
 def names(folder: Path) -> list[str]:
@@ -108,6 +108,53 @@ def test_quality(tmp_path: Path) -> None:
     assert (tmp_path / "95.jpg").stat().st_size > (tmp_path / "20.jpg").stat().st_size
     result = run(path, tmp_path / "b.png", "--quality", 90)
     assert (result.exit_code, "quality: png has none" in result.stderr) == (2, True)
+
+
+class TestJpeg:
+    """What Pillow, another reader, finds in the files that ``apply`` writes."""
+
+    @pytest.mark.parametrize("quality", [30, 95])
+    def test_quality(self, tmp_path: Path, quality: int) -> None:
+        image = pytest.importorskip("PIL.Image")
+        path = store_png(tmp_path / "a.png", IMAGE)
+        image.fromarray(IMAGE).save(tmp_path / "expected.jpg", quality=quality)
+        assert run(path, tmp_path / "b.jpg", "--quality", quality).exit_code == 0
+        with image.open(tmp_path / "b.jpg") as made, image.open(tmp_path / "expected.jpg") as same:
+            # libjpeg derives the tables from the quality alone.
+            assert made.quantization == same.quantization
+
+    @pytest.mark.parametrize(("stored", "named"), [(0, "4:4:4"), (1, "4:2:2"), (2, "4:2:0")])
+    def test_subsampling_is_kept(self, tmp_path: Path, stored: int, named: str) -> None:
+        image = pytest.importorskip("PIL.Image")
+        plugin = pytest.importorskip("PIL.JpegImagePlugin")
+        image.fromarray(IMAGE).save(tmp_path / "a.jpg", subsampling=stored)
+        assert run(tmp_path / "a.jpg", tmp_path / "b.jpg").exit_code == 0
+        with image.open(tmp_path / "b.jpg") as made:
+            assert plugin.get_sampling(made) == stored
+        # Of a file that says nothing, colours stay as sharp as brightness.
+        store_png(tmp_path / "c.png", IMAGE)
+        assert run(tmp_path / "c.png", tmp_path / "c.jpg").exit_code == 0
+        with image.open(tmp_path / "c.jpg") as made:
+            assert plugin.get_sampling(made) == 0, named
+
+    def test_exif_and_dpi_are_kept(self, tmp_path: Path) -> None:
+        image = pytest.importorskip("PIL.Image")
+        picture = image.fromarray(IMAGE)
+        exif = picture.getexif()
+        maker, orientation, inner, taken, iso = 271, 274, 0x8769, 0x9003, 0x8827
+        exif[maker], exif[orientation] = "Maker", 6
+        exif.get_ifd(inner)[taken] = "2020:01:02 03:04:05"
+        exif.get_ifd(inner)[iso] = 400
+        picture.save(tmp_path / "a.jpg", exif=exif, dpi=(240, 240))
+        assert run(tmp_path / "a.jpg", tmp_path / "b.jpg", "--quality", 90).exit_code == 0
+        with image.open(tmp_path / "b.jpg") as made:
+            assert made.info["dpi"] == (240, 240)
+            # The pixels are turned, so that no orientation may be left that turns them again.
+            assert made.size == picture.size[::-1]
+            found = made.getexif()
+            assert (found[maker], found.get(orientation, 1)) == ("Maker", 1)
+            assert found.get_ifd(inner)[taken] == "2020:01:02 03:04:05"
+            assert found.get_ifd(inner)[iso] == 400
 
 
 def test_profiles_are_noted(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,21 @@ def test_it_draws_what_it_draws_through_the_loader(
             assert not loaded.info.bundled
             for name, array in loaded.apply(image, Pyramid()).items():
                 np.testing.assert_array_equal(direct.apply(image, Pyramid())[name], array)
+
+
+def test_frames_record_the_hash_of_the_packages_driver(monkeypatch: pytest.MonkeyPatch) -> None:
+    package = SimpleNamespace(LIBRARY=library(), SHA256="ab" * 32)
+    monkeypatch.setitem(sys.modules, "vkbloom_lavapipe", package)
+    image = np.zeros((8, 8, 4), np.float32)
+    # Another library's hash is not known, nor are the libraries that the system's driver loads.
+    for chosen, expected in ((None, package.SHA256), (package.LIBRARY, None), ("system", None)):
+        if chosen is None:
+            monkeypatch.delenv("VKBLOOM_DRIVER", raising=False)
+        else:
+            monkeypatch.setenv("VKBLOOM_DRIVER", chosen)
+        with Renderer("software") as renderer:
+            assert renderer.info.bundled == (chosen != "system")
+            assert renderer.apply(image).info.get("driver_sha256") == expected
 
 
 def test_system_leaves_it_out(monkeypatch: pytest.MonkeyPatch) -> None:

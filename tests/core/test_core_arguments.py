@@ -163,7 +163,7 @@ def test_sizes_are_not_taken_modulo_2_to_the_32(scene: Scene, side: int) -> None
 
 
 def test_sides_that_are_no_whole_numbers() -> None:
-    with pytest.raises(TypeError, match="is not a whole number"):
+    with pytest.raises(TypeError, match="is not an integer"):
         scene_plan(Separable(), (16.5, 16))
 
 

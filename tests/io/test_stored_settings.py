@@ -52,11 +52,12 @@ class TestSettings:
 class TestFrames:
     @pytest.mark.parametrize("name", ["a.exr", "a.png", "folder"])
     @pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
-    def test_come_back(self, tmp_path: Path, name: str, dtype: str) -> None:
+    def test_come_back(
+        self, renderer: vkbloom.Renderer, tmp_path: Path, name: str, dtype: str
+    ) -> None:
         pytest.importorskip("OpenImageIO")
         image = (IMAGE * 255).astype(dtype) if dtype == "uint8" else IMAGE.astype(dtype)
-        with vkbloom.Renderer("software") as renderer:
-            frames = renderer.apply(image, vkbloom.Pyramid(levels=2, threshold=0.3))
+        frames = renderer.apply(image, vkbloom.Pyramid(levels=2, threshold=0.3))
         frames.save(tmp_path / name)
         again = vkbloom.Frames.load(tmp_path / name)
         assert list(again) == list(frames)
@@ -67,10 +68,9 @@ class TestFrames:
         assert again.timings == pytest.approx(dict(frames.timings), nan_ok=True)
         assert again.info == frames.info
 
-    def test_a_scene_with_depth(self, tmp_path: Path) -> None:
+    def test_a_scene_with_depth(self, renderer: vkbloom.Renderer, tmp_path: Path) -> None:
         pytest.importorskip("OpenImageIO")
-        with vkbloom.Renderer("software") as renderer:
-            frames = renderer.render(vkbloom.Scene.ufo(), size=(16, 9))
+        frames = renderer.render(vkbloom.Scene.ufo(), size=(16, 9))
         frames.save(tmp_path / "a.exr")
         again = vkbloom.Frames.load(tmp_path / "a.exr")
         assert {key: (a.dtype, a.shape) for key, a in again.items()} == {

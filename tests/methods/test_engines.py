@@ -120,8 +120,10 @@ class Cut(Storage):
 def test_levels_of_bevy_in_r11g11b10(renderer: Renderer, engine_frames: Path) -> None:
     """Lavapipe drew the frame, and cuts bits off where vkbloom rounds to the nearest.
 
-    With its rounding in the reference half of the values are the engine's to 1e-6. The largest
-    difference, 2 % of the value, is where single and double floats fall on two sides of a step.
+    With its rounding in the reference half of the values are the engine's to 1e-6 (1.2e-7 was
+    measured). The largest difference, 1.9 % of the value, is where single and double floats fall on
+    two sides of a step. The device and the reference both round to the nearest, and differ by 3e-8
+    in the median and by 0.26 % at most for the same reason.
     """
     image, expected, stride = read_frame(engine_frames, COARSE)
     settings = BevyBloom(format="rg11b10ufloat")
@@ -133,7 +135,7 @@ def test_levels_of_bevy_in_r11g11b10(renderer: Renderer, engine_frames: Path) ->
     nearest = reference.apply(image.astype(np.float64), settings)["bloom"]
     of_device = renderer.apply(image.astype(np.float32), settings)["bloom"]
     difference = relative(of_device[..., :3], nearest[..., :3])
-    assert np.median(difference) < 1e-3
+    assert np.median(difference) < 1e-6
     assert difference.max() < 0.01
     # Cutting bits off in 16 passes darkens the picture by some hundredths: nothing else differs.
     assert 0.02 < np.median(nearest[..., :3] / expected - 1) < 0.08

@@ -30,7 +30,7 @@ from vkbloom import (
 Array = NDArray[Any]
 
 # (width, height): odd, even, tall, wide, smaller than the chains are long.
-SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (333, 217)]
+SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (211, 157)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 PUBLISHED = sorted(set(presets) - {"tutorial", "outline", "deferred"})
 
@@ -177,8 +177,11 @@ def test_bevys_sizes(renderer: Renderer) -> None:
         ),
         BevyBloom(max_mip_dimension=100, threshold=0.3),
         BevyBloom(max_mip_dimension=5, composite="add"),
+        # Bloom::ANAMORPHIC, lower than it has it
+        BevyBloom(scale_x=4.0, max_mip_dimension=64),
+        BevyBloom(scale_x=0.3, scale_y=2.7, max_mip_dimension=32, threshold=0.3),
     ],
-    ids=["old-school", "screen-blur", "100-high", "two-levels"],
+    ids=["old-school", "screen-blur", "100-high", "two-levels", "anamorphic", "along-y"],
 )
 @pytest.mark.parametrize("format", FORMATS.values())
 def test_bevys_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
@@ -359,16 +362,43 @@ def test_a_level_of_urp_is_the_tutorials_kernel_at_two_steps() -> None:
         UrpBloom(scatter=1.0, clamp_max=30.0, iterations=8),
         HdrpBloom(scatter=0.0),
         HdrpBloom(scatter=1.0, high_quality_filtering=False),
+        HdrpBloom(anamorphism=0.7),
+        HdrpBloom(anamorphism=-1.0),
     ],
-    ids=["urp-narrow", "urp-wide", "hdrp-narrow", "hdrp-wide"],
+    ids=["urp-narrow", "urp-wide", "hdrp-narrow", "hdrp-wide", "hdrp-along-y", "hdrp-along-x"],
 )
 @pytest.mark.parametrize("format", FORMATS.values())
 def test_unitys_other_settings(renderer: Renderer, settings: Settings, format: Any) -> None:
     check(renderer, lights((211, 153), "float32"), settings.replace(format=format))
 
 
-@pytest.mark.parametrize("size", [(800, 450), (800, 449), (799, 450)])
-@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize(
+    ("settings", "stretched"),
+    [
+        (BevyBloom(scale_x=4.0, max_mip_dimension=64, high_pass_frequency=0.2), "x"),
+        (BevyBloom(scale_y=4.0, max_mip_dimension=64, high_pass_frequency=0.2), "y"),
+        (HdrpBloom(scatter=0.2, anamorphism=-1.0), "x"),
+        (HdrpBloom(scatter=0.2, anamorphism=1.0), "y"),
+    ],
+    ids=["bevy-x", "bevy-y", "hdrp-x", "hdrp-y"],
+)
+def test_an_anamorphic_bloom_is_stretched(
+    renderer: Renderer, settings: Settings, stretched: str
+) -> None:
+    point = np.zeros((129, 129, 3), np.float32)
+    # So large that HDRP's taps, four pixels apart, meet it.
+    point[62:67, 62:67] = 10
+    frames = renderer.apply(point, settings.replace(format="rgba32float"))
+    bloom = frames["bloom"][..., 0].astype(np.float64)
+    squares = (np.arange(129) - 64.0) ** 2
+    across, down = (np.sqrt(bloom.sum(axis) @ squares / bloom.sum()) for axis in (0, 1))
+    assert (across / down if stretched == "x" else down / across) > 1.5
+
+
+@pytest.mark.parametrize(
+    ("size", "smooth"),
+    [((800, 450), True), ((800, 450), False), ((800, 449), True), ((799, 450), True)],
+)
 def test_hdrps_cubic_filter_is_for_larger_frames(
     renderer: Renderer, size: tuple[int, int], smooth: bool
 ) -> None:

@@ -11,6 +11,8 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
+from tests.conftest import ADAPTER
+from vkbloom import AdapterInfo
 from vkbloom.testing import read_frame
 from vkbloom.testing.references import cpu_vendor
 from vkbloom.testing.regression import name_of_test
@@ -479,12 +481,22 @@ def test_same(frame_regression):
     frame_regression.compare(frames(), frames(0.00005))
 
 def test_other(frame_regression):
+    names = {"info": {"adapter": "My engine"}, "expected_info": {"driver": "Mesa 25"}}
+    frame_regression.compare(frames(0.1), frames(), **names)
+
+def test_unnamed(frame_regression):
     frame_regression.compare(frames(0.1), frames())
 """,
         )
         result = run(project, "--bloom-report=report")
-        result.assert_outcomes(passed=1, failed=1)
-        result.stdout.fnmatch_lines(["*test_other: the first framebuffer that differs is bloom *"])
+        result.assert_outcomes(passed=1, failed=2)
+        result.stdout.fnmatch_lines(
+            [
+                "*test_other: the first framebuffer that differs is bloom *",
+                f"*reference: Mesa 25, {cpu_vendor()}; now: My engine, {cpu_vendor()}",
+                "*reference: arrays that name no adapter, *; now: arrays that name no adapter, *",
+            ]
+        )
         assert not (project.path / "bloom_references").exists()
 
     @pytest.mark.parametrize("folder", ["", "file", "file/below"])
@@ -516,6 +528,100 @@ def test_other(frame_regression):
             f"    with pytest.raises(ValueError, match={argument.split('=', maxsplit=1)[0]!r}):\n"
             f"        frame_regression.check(frames(), {argument})",
         )
+        run(project).assert_outcomes(passed=1)
+
+
+class TestExact:
+    """The project's driver has the hash HASH, none without it; `check` gets ARGUMENTS."""
+
+    TEXT = (
+        PROJECT
+        + """
+def test_frames(frame_regression):
+    info = {"adapter": "An engine"}
+    if os.environ.get("HASH"):
+        info["driver_sha256"] = os.environ["HASH"]
+    arguments = eval(os.environ.get("ARGUMENTS", "{}"))
+    frame_regression.check(frames(), info=info, exact=True, **arguments)
+"""
+    )
+    # A hundredth of what the default tolerances allow, and a step of a half float.
+    LEAST = "0.0000005"
+
+    @pytest.fixture(autouse=True)
+    def reference(self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("HASH", "aa11")
+        write(project, self.TEXT)
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        file = project.path / "bloom_references" / "test_one" / "test_frames.json"
+        (listed,) = json.loads(file.read_text())["references"]
+        assert listed["origin"]["driver_sha256"] == "aa11"
+
+    def test_equal_values_of_one_driver_pass(self, project: pytest.Pytester) -> None:
+        run(project).assert_outcomes(passed=1)
+
+    def test_the_least_difference_fails(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("SHIFT", self.LEAST)
+        result = run(project)
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines(
+            ["*  bloom: FAILED (exact): *", "*reference: An engine, SHA-256 aa11, *; now: *"]
+        )
+
+    @pytest.mark.parametrize(
+        ("hash_now", "message"),
+        [
+            ("", "*exact: the driver of the frames has no hash (An engine, *"),
+            ("bb22", "*test_frames.json has no reference of the frames' driver (*bb22*aa11*"),
+        ],
+    )
+    def test_other_drivers_are_an_error(
+        self,
+        project: pytest.Pytester,
+        monkeypatch: pytest.MonkeyPatch,
+        hash_now: str,
+        message: str,
+    ) -> None:
+        monkeypatch.setenv("HASH", hash_now)
+        result = run(project)
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines(["*ValueError*" + message.lstrip("*")])
+
+    def test_references_of_another_driver_are_replaced_or_kept(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("HASH", "bb22")
+        monkeypatch.setenv("SHIFT", self.LEAST)
+        run(project, "--bloom-add").assert_outcomes(passed=1)
+        for hash_now, shift, outcome in (
+            ("bb22", self.LEAST, "passed"),
+            ("aa11", "0", "passed"),
+            # The other driver's values.
+            ("aa11", self.LEAST, "failed"),
+        ):
+            monkeypatch.setenv("HASH", hash_now)
+            monkeypatch.setenv("SHIFT", shift)
+            run(project).assert_outcomes(**{outcome: 1})
+        monkeypatch.setenv("HASH", "cc33")
+        run(project, "--bloom-update").assert_outcomes(passed=1)
+        assert len(references(project)) == 4
+
+    def test_no_hash_no_reference(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("HASH", "")
+        run(project, "--bloom-update").assert_outcomes(failed=1)
+
+    def test_tolerances_are_excluded(
+        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("ARGUMENTS", "{'atol': 0.1, 'flip': 0.2}")
+        result = run(project)
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines(["*exact: True excludes tolerances; leave out atol, flip"])
+        monkeypatch.setenv("ARGUMENTS", "{'allow_nan': True}")
         run(project).assert_outcomes(passed=1)
 
 
@@ -595,23 +701,23 @@ def test_again(bloom_renderer):
     assert not bloom_renderer.closed
 """
 
-    def test_renders(self, project: pytest.Pytester) -> None:
+    def test_renders(self, project: pytest.Pytester, software: AdapterInfo) -> None:
         write(project, self.RENDER)
         run(project, "--bloom-adapter=software", "--bloom-update").assert_outcomes(passed=2)
         text = (project.path / "bloom_references" / "test_one" / "test_render.json").read_text()
         origin = json.loads(text)["references"][0]["origin"]
-        assert "llvmpipe" in origin["adapter"]
-        assert "Mesa" in origin["driver"]
-        for wanted in ("llvmpipe", "mesa"):
+        assert software.name in origin["adapter"]
+        assert software.driver_info in origin["driver"]
+        for wanted in (software.name[:8].upper(), software.driver_info):
             run(
                 project, "--bloom-adapter=software", f"--bloom-expect-adapter={wanted}"
             ).assert_outcomes(passed=2)
 
     def test_another_adapter_is_an_error(self, project: pytest.Pytester) -> None:
         write(project, self.RENDER)
-        result = run(project, "--bloom-adapter=software", "--bloom-expect-adapter=GeForce")
+        result = run(project, f"--bloom-adapter={ADAPTER}", "--bloom-expect-adapter=Voodoo")
         result.assert_outcomes(errors=2)
-        result.stdout.fnmatch_lines(["*--bloom-expect-adapter=GeForce: the adapter is llvmpipe*"])
+        result.stdout.fnmatch_lines(["*--bloom-expect-adapter=Voodoo: the adapter is *"])
 
     def test_frames_of_another_adapter_are_an_error(self, project: pytest.Pytester) -> None:
         write(

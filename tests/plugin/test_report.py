@@ -159,6 +159,10 @@ def test_works_by_keyboard(page: Page) -> None:
     assert captions[2].startswith("bloom, FLIP")
     pressed = dialog.locator("button[aria-pressed=true]")
     assert pressed.inner_text() == "flip"
+    # One button is outlined: the one that is pressed and has the focus.
+    assert page.evaluate(OUTLINED) == ["flip"]
+    page.keyboard.press("Tab")
+    assert page.evaluate(OUTLINED) == ["Close"]
     page.keyboard.press("Escape")
     assert not dialog.is_visible()
     assert page.evaluate("document.activeElement.getAttribute('aria-label')") == opener
@@ -196,6 +200,13 @@ def test_structure(page: Page) -> None:
         "[...document.querySelectorAll('button')]"
         ".every(b => b.getAttribute('aria-label') || b.textContent.trim())"
     )
+
+
+# The texts of the buttons of the open dialog that an outline is drawn around.
+OUTLINED = """
+[...document.querySelectorAll('dialog button')]
+  .filter(b => getComputedStyle(b).outlineStyle !== 'none').map(b => b.textContent)
+"""
 
 
 # The relative luminance and the contrast of WCAG 2.2, of each element with a text of its own

@@ -79,9 +79,9 @@ static void die(const char *what, const struct vkb_error *error)
 
 // Renderers
 
-static bool interrupted(void *asked)
+static bool interrupted(void *context)
 {
-    (void)asked;
+    (void)context;
     pthread_mutex_lock(&gil);
     pthread_mutex_unlock(&gil);
     return false;

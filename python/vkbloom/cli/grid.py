@@ -11,7 +11,6 @@ import os
 import queue
 import signal
 import threading
-import typing
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
@@ -41,9 +40,8 @@ from vkbloom.grid.plan import Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.io import image_writing, safe_writing
 from vkbloom.io.images import Colour, Picture
-from vkbloom.settings import Shading
+from vkbloom.settings import SHADINGS, Shading
 
-_SHADINGS: Final = typing.get_args(Shading)
 _STORE: Final = ".zarr"
 
 
@@ -77,7 +75,7 @@ _STORE: Final = ".zarr"
 @click.option(
     "--time", default=0.0, show_default=True, help="Time of a scene's animation; its period is 1."
 )
-@click.option("--shading", type=click.Choice(_SHADINGS), default=_SHADINGS[0], show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @click.option(
     "--attachments",
     metavar="all|none|NAME,...",

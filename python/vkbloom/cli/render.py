@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-import typing
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
 
 import click
 from rich import box
@@ -21,9 +19,7 @@ from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.cli.terminal import show
-from vkbloom.settings import Shading
-
-_SHADINGS: Final = typing.get_args(Shading)
+from vkbloom.settings import SHADINGS, Shading
 
 
 @click.command()
@@ -49,7 +45,7 @@ _SHADINGS: Final = typing.get_args(Shading)
     type=click.IntRange(min=1),
     help="Render N frames of one period of the animation, starting at --time, to numbered files.",
 )
-@click.option("--shading", type=click.Choice(_SHADINGS), default=_SHADINGS[0], show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @click.option(
     "--attachments",
     metavar="all|NAME,...",

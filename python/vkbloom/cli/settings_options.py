@@ -12,15 +12,14 @@ import click
 import vkbloom
 from vkbloom.cli import fields
 from vkbloom.cli.program import as_wrong_use
+from vkbloom.settings import methods
 
 #: Settings class of each method, by the method's name.
-METHODS: Final[dict[str, type[vkbloom.Settings]]] = {
-    kind.method: kind for kind in vkbloom.Settings.__subclasses__()
-}
-#: What settings start from without --preset and --method.
+METHODS: Final = methods()
+#: The preset that settings start from without --preset and --method.
 PRESET_OF_IMAGES: Final = "bevy_natural"
 _PRESET_OF_SCENES: Final = "tutorial"
-# The commands' arguments for image files, of which explore and grid may have none.
+# Names of the commands' arguments for image files; explore and grid may be called without one.
 _IMAGES: Final = ("source", "sources", "images")
 
 

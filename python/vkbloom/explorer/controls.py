@@ -9,15 +9,13 @@ from typing import Any, Final, Literal
 
 from vkbloom import _core
 from vkbloom.presets import presets
-from vkbloom.settings import Settings, field_range
+from vkbloom.settings import Settings, field_range, methods
 from vkbloom.views.descriptions import described_parameters
 
 __all__ = ["METHODS", "as_code", "controls", "settings_from"]
 
-#: The settings of each method, by its name.
-METHODS: Final[dict[str, type[Settings]]] = {
-    kind.method: kind for kind in Settings.__subclasses__()
-}
+#: Settings class of each method, by the method's name.
+METHODS: Final = methods()
 
 # Where a slider ends, of fields whose range is wider than what one looks at; the number beside the
 # slider takes the whole range. A range that a method narrows is its slider's.
@@ -40,6 +38,8 @@ _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
     "maximum": (0, 20),
     "filter_radius": (0, 0.05),
     "max_mip_dimension": (16, 1024),
+    "scale_x": (0, 8),
+    "scale_y": (0, 8),
     "resolution": (16, 1024),
     "levels": (1, 10),
     "loops": (1, 8),

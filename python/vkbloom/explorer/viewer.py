@@ -32,7 +32,7 @@ from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
-from vkbloom.settings import SHADINGS, check_settings
+from vkbloom.settings import check_settings, check_shading
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
@@ -95,9 +95,7 @@ class Viewer:
             "a": begun,
             "b": begun.replace(bloom=False) if against is None else check_settings(against),
         }
-        if shading not in SHADINGS:
-            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
-        self._shading: Shading = shading
+        self._shading: Shading = check_shading(shading)
         if isinstance(source, Scene):
             self._scene: Scene | None = source
             self._own_size = check_size("size", size)
@@ -105,7 +103,7 @@ class Viewer:
             self._scene = None
             # A copy, since the page may ask for it long after the caller has changed it.
             self._image = np.array(check_image(source), order="C")
-            self._own_size = (source.shape[1], source.shape[0])
+            self._own_size = (self._image.shape[1], self._image.shape[0])
             self._reduced = (self._own_size, self._image)
         if renderer is not None and renderer.closed:
             raise ValueError("renderer: it is closed")

@@ -17,7 +17,7 @@ from vkbloom import _core
 from vkbloom.checks import check_image, check_size, check_time
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
-from vkbloom.settings import SHADINGS, Settings
+from vkbloom.settings import Settings, check_shading
 from vkbloom.sources import image_source, scene_source
 
 if TYPE_CHECKING:
@@ -239,10 +239,8 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     if isinstance(source, Scene):
-        if shading not in SHADINGS:
-            raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
         frame = check_size("size", size or _SCENE_SIZE)
-        return SceneSource(source, frame, shading, check_time(time))
+        return SceneSource(source, frame, check_shading(shading), check_time(time))
     for name, is_given in (
         ("size", size is not None),
         ("shading", shading != "forward"),

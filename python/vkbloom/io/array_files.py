@@ -13,23 +13,22 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io import image_reading, safe_writing
-from vkbloom.io.image_writing import as_numbers, check_quality, put
-from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture
-from vkbloom.io.srgb import encode_srgb
+from vkbloom.io.image_writing import as_numbers, check_quality, encoded, put
+from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, is_exr
 
 __all__ = ["read", "write"]
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22"]
 
 _ENCODINGS: Final = ("none", "linear", "srgb", "gamma22")
-# The numbers of the file, best first, by whether the array is of floats and the bits asked for.
+# The file's number types for floats, in order of preference, by the requested bits.
 _FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
     None: ("half", "float", "uint8"),
     8: ("uint8",),
     16: ("uint16", "half"),
     32: ("float",),
 }
-# Of a file's metadata, what `read` says of the file; the rest are attributes, which can be written.
+# Metadata that `read` adds about the file. The other entries are attributes, which can be written.
 _FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")
 
 
@@ -223,15 +222,14 @@ def write(
             raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
-    temporary = safe_writing.reserve(target, values.nbytes)
-    try:
+    with safe_writing.replacing(oiio, target, values.nbytes) as temporary:
         numbers = _numbers(oiio, values, bits, temporary, target)
         is_integer = numbers.startswith("uint")
-        if values.shape[2] in (2, 4) and premultiplied is not _is_exr(target):
+        if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
             values = _divided(values) if premultiplied else _multiplied(values)
         curve = encoding or ("srgb" if is_integer else "linear")
         if is_float:
-            values = _encoded(values, curve)
+            values = encoded(values, curve)
         said: Encoding | None = None if curve == "none" or not is_float else curve
         put(
             oiio,
@@ -241,10 +239,6 @@ def write(
             target,
             attributes={} if quality is None else {"CompressionQuality": quality},
         )
-        safe_writing.check_complete(oiio, temporary, target)
-        safe_writing.put_in_place(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
     return target
 
 
@@ -302,19 +296,6 @@ def _numbers(
     raise ValueError(f"{target}: {kind} cannot hold {' or '.join(wanted)}; try another bits=")
 
 
-def _encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
-    """Return floats with their colours on a curve; alpha has none."""
-    if curve in ("none", "linear"):
-        return values
-    encoded = values.astype(np.float32)
-    colours = encoded[:, :, : values.shape[2] - (values.shape[2] in (2, 4))]
-    if curve == "srgb":
-        colours[:] = encode_srgb(colours)
-    else:
-        colours[:] = np.maximum(colours, 0) ** np.float32(1 / 2.2)
-    return encoded
-
-
 def _multiplied(values: NDArray[Any]) -> NDArray[Any]:
     """Return colours multiplied by alpha, in the same dtype."""
     return _with_alpha(values, values[:, :, -1:])
@@ -336,10 +317,6 @@ def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
         made[:, :, :-1] = np.rint(np.minimum(made[:, :, :-1] / largest, largest))
     with np.errstate(over="ignore"):
         return made.astype(values.dtype)
-
-
-def _is_exr(target: Path) -> bool:
-    return target.suffix.lower() == ".exr"
 
 
 def _plain(value: Any) -> Any:

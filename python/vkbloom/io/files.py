@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 from vkbloom.checks import import_extra
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io import image_reading, safe_writing
-from vkbloom.io.images import PIXEL_TYPES, check_name, failure_of
+from vkbloom.io.images import PIXEL_TYPES, check_name, failure_of, is_exr
 from vkbloom.settings import Settings
 
 if TYPE_CHECKING:
     import OpenImageIO
-
 
 __all__ = ["load", "save"]
 
@@ -68,7 +67,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
         plan = {target / f"{name}.png": [name] for name in frames}
     else:
         safe_writing.check_extension(oiio, target.suffix)
-        if _is_exr(target) or len(frames) == 1:
+        if is_exr(target) or len(frames) == 1:
             plan = {target: list(frames)}
         else:
             plan = {
@@ -80,7 +79,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
         for file, names in plan.items():
             size = sum(frames[name].nbytes for name in names)
             files.append((safe_writing.reserve(file, size), file))
-            if not _is_exr(file):
+            if not is_exr(file):
                 if _write_image(oiio, frames, names[0], *files[-1]):
                     continue
                 files.pop()[0].unlink()
@@ -256,7 +255,3 @@ def _spec(
     spec.attribute("vkbloom:framebuffer", name)
     spec.attribute("vkbloom:place", str(list(frames).index(name)))
     return spec
-
-
-def _is_exr(file: Path) -> bool:
-    return file.suffix.lower() == ".exr"

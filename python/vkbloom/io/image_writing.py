@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import check_index, import_extra
 from vkbloom.io import safe_writing
-from vkbloom.io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, SavedColour
+from vkbloom.io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, SavedColour, is_exr
 from vkbloom.io.srgb import encode_srgb
 
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["as_numbers", "check_quality", "check_writable", "put", "save"]
+__all__ = ["as_numbers", "check_quality", "check_writable", "encoded", "put", "save"]
 
 # Number types to write, in order of preference, by the number type of the picture. For floats
 # uint8 comes before uint16, because a PNG of a float picture is expected to have 8 bits.
@@ -54,7 +54,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
-    """Find out whether a file's format has a quality of compression.
+    """Check that a file's format has a quality of compression, if one is given.
 
     Parameters
     ----------
@@ -128,17 +128,11 @@ def save(
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
-    temporary = safe_writing.reserve(target, picture.values.nbytes)
-    try:
-        added = {} if quality is None else {"CompressionQuality": quality}
-        notes = _write(
+    added = {} if quality is None else {"CompressionQuality": quality}
+    with safe_writing.replacing(oiio, target, picture.values.nbytes) as temporary:
+        return _write(
             oiio, picture, colour, temporary, target, attributes={**(attributes or {}), **added}
         )
-        safe_writing.check_complete(oiio, temporary, target)
-        safe_writing.put_in_place(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return notes
 
 
 def _write(
@@ -162,7 +156,7 @@ def _write(
     notes = _losses(picture, target, values, has_alpha, integer)
     encoding = picture.encoding
     if encoding == "linear" and (colour or ("srgb" if integer else "linear")) == "srgb":
-        values, encoding = _encoded(values, has_alpha), "srgb"
+        values, encoding = encoded(values, "srgb"), "srgb"
     put(
         oiio,
         as_numbers(values, numbers),
@@ -278,11 +272,29 @@ def _losses(
     return notes
 
 
-def _encoded(values: NDArray[Any], has_alpha: bool) -> NDArray[np.float32]:
-    colours = values.shape[2] - has_alpha
-    encoded = values.astype(np.float32)
-    encoded[:, :, :colours] = encode_srgb(encoded[:, :, :colours])
-    return encoded
+def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
+    """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (H, W, C)
+    curve : {"none", "linear", "srgb", "gamma22"}
+        "none" and "linear" return the values themselves.
+
+    Returns
+    -------
+    ndarray, shape (H, W, C)
+        float32 if a curve is applied.
+    """
+    if curve in ("none", "linear"):
+        return values
+    made = values.astype(np.float32)
+    colours = made[:, :, : made.shape[2] - (made.shape[2] in (2, 4))]
+    if curve == "srgb":
+        colours[:] = encode_srgb(colours)
+    else:
+        colours[:] = np.maximum(colours, 0) ** np.float32(1 / 2.2)
+    return made
 
 
 def as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
@@ -303,16 +315,16 @@ def _describe(
     spec: OpenImageIO.ImageSpec, picture: Picture, format_name: str, target: Path
 ) -> None:
     """Set the attributes that describe a file's colours, alpha and pixels."""
-    is_exr = target.suffix.lower() == ".exr"
+    to_exr = is_exr(target)
     stored, encoding = picture.stored, picture.encoding
     space = stored.space if encoding is None else SPACES[encoding]
     # OpenEXR files are linear by definition, and another attribute has their primaries.
-    if space and not (is_exr and encoding == "linear"):
+    if space and not (to_exr and encoding == "linear"):
         spec.attribute("oiio:ColorSpace", space)
     # Otherwise OpenImageIO divides by alpha for formats with straight colours. TIFF can record
     # either.
     is_tiff = target.suffix.lower() in (".tif", ".tiff")
-    if not is_exr and not (is_tiff and stored.associated):
+    if not to_exr and not (is_tiff and stored.associated):
         spec.attribute("oiio:UnassociatedAlpha", 1)
     is_jpeg = format_name == "jpeg"
     if is_jpeg and spec.nchannels == 3:
@@ -322,5 +334,10 @@ def _describe(
         # A profile describes encoded colours, not those of a picture that was written linear.
         if name == "ICCProfile" and encoding not in ("srgb", None):
             continue
-        if is_jpeg or not name.startswith("jpeg:"):
+        if name.startswith("jpeg:") and not is_jpeg:
+            continue
+        if isinstance(value, int):
+            # Of integers, OpenImageIO's Python sets those of 32 bits; Exif has 16 (ISO, flash).
+            spec.attribute(name, value)
+        else:
             spec.attribute(name, kind, value)

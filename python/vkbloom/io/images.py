@@ -18,6 +18,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
@@ -35,6 +36,7 @@ __all__ = [
     "Window",
     "check_name",
     "failure_of",
+    "is_exr",
     "is_kept",
 ]
 
@@ -218,6 +220,11 @@ def check_name(path: str | os.PathLike[str]) -> None:
         raise ValueError(
             f"path: {name!r} is not UTF-8; rename the image file or its folder"
         ) from None
+
+
+def is_exr(path: Path) -> bool:
+    """Tell whether a file name has the extension of OpenEXR."""
+    return path.suffix.lower() == ".exr"
 
 
 def is_kept(attribute: str) -> bool:

@@ -7,6 +7,8 @@ A file is written to a temporary file beside it, which is renamed when it is com
 3. write it; `write_error` converts a failure of OpenImageIO
 4. `check_complete`, then `put_in_place`
 5. remove the temporary file if it still exists
+
+`replacing` does steps 2, 4 and 5 for one file.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import contextlib
 import errno
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, BinaryIO, Final
@@ -32,6 +34,7 @@ __all__ = [
     "check_extension",
     "holds",
     "put_in_place",
+    "replacing",
     "reserve",
     "write_error",
     "write_file",
@@ -187,6 +190,42 @@ def put_in_place(temporary: Path, file: Path) -> None:
         temporary.replace(target)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(file)) from error
+
+
+@contextlib.contextmanager
+def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
+    """Yield a temporary file to be written in place of a file.
+
+    At the end of the block it is checked and renamed. If the block raises, it is removed.
+
+    Parameters
+    ----------
+    oiio : module
+        OpenImageIO.
+    file : Path
+        The file to replace or create.
+    size : int
+        Bytes of the pixels.
+
+    Yields
+    ------
+    Path
+        The temporary file, with the extension of `file`.
+
+    Raises
+    ------
+    ValueError
+        The name is not UTF-8.
+    OSError
+        The file cannot be written; the error names it.
+    """
+    temporary = reserve(file, size)
+    try:
+        yield temporary
+        check_complete(oiio, temporary, file)
+        put_in_place(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def write_file(file: Path, content: bytes) -> None:

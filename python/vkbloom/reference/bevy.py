@@ -14,7 +14,7 @@ import numpy as np
 from .image import Storage
 from .pyramid import downsample, groups
 from .sampling import Array
-from .threshold import luminance, soften
+from .threshold import luminance, masked, soften
 from .upsampling import combine, flat_gain, tent
 
 __all__ = ["gain", "passes"]
@@ -39,10 +39,18 @@ class BevySettings(Protocol):
     def high_pass_frequency(self) -> float: ...
     @property
     def max_mip_dimension(self) -> int: ...
+    @property
+    def scale_x(self) -> float: ...
+    @property
+    def scale_y(self) -> float: ...
 
 
 def passes(
-    glow: Array, settings: BevySettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: BevySettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -50,17 +58,19 @@ def passes(
     floored half. With p_g the five groups of the 13 taps, each times its share, down_0 is the
     sum of p_g / (1 + luminance(p_g) / 4), at least 0.0001, past the soft threshold; the other
     levels are the plain 13 taps. On the way up the smaller level counts f_k+1 and the level
-    itself 1 - f_k+1 ("mix") or 1 ("add").
+    itself 1 - f_k+1 ("mix") or 1 ("add"). The scale multiplies all distances of taps.
 
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels.
+        1, 3 or, with alpha, 4 channels.
     settings : vkbloom.BevyBloom
     size : (int, int)
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies down_0 after the threshold.
 
     Returns
     -------
@@ -69,15 +79,20 @@ def passes(
     """
     height, width, _ = glow.shape
     limit = settings.max_mip_dimension
+    scale = (settings.scale_x, settings.scale_y)
+
+    def stretched(image: Array, size: tuple[int, int]) -> Array:
+        return tent(image, size, *scale)
+
     level = (max(1, math.floor(width * limit / height + 0.5)), limit)
-    framebuffers = {"down_0": store(_prefilter(glow, level, settings))}
+    framebuffers = {"down_0": store(masked(_prefilter(glow, level, settings), mask))}
     downs = [framebuffers["down_0"]]
     for k in range(1, _level_count(settings)):
         level = (max(1, level[0] // 2), max(1, level[1] // 2))
-        downs.append(store(downsample(downs[-1], level, False)))
+        downs.append(store(downsample(downs[-1], level, False, scale)))
         framebuffers[f"down_{k}"] = downs[-1]
     own, coarse = _shares(settings)
-    ups = combine(downs, size, store, own=own, coarse=coarse, upsample=tent, last=tent)
+    ups = combine(downs, size, store, own=own, coarse=coarse, upsample=stretched, last=stretched)
     return {**framebuffers, **ups}
 
 
@@ -96,11 +111,13 @@ def _level_count(settings: BevySettings) -> int:
 
 def _prefilter(image: Array, size: tuple[int, int], settings: BevySettings) -> Array:
     total = np.zeros((size[1], size[0], image.shape[2]))
-    for share, mean in groups(image, size):
+    for share, mean in groups(image, size, (settings.scale_x, settings.scale_y)):
         part = share * mean
         grey = part if part.shape[2] == 1 else luminance(part)
         total += part / (1 + np.maximum(grey, 0.0) / 4)
-    return _threshold(np.maximum(total, 1e-4), settings)
+    # Alpha has no floor.
+    total[..., :3] = np.maximum(total[..., :3], 1e-4)
+    return _threshold(total, settings)
 
 
 def _threshold(rgb: Array, settings: BevySettings) -> Array:

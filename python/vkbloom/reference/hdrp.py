@@ -15,6 +15,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, read_rows, sample
+from .threshold import masked
 from .upsampling import combine, cubic, spline_taps
 
 __all__ = ["gain", "passes"]
@@ -33,14 +34,21 @@ class HdrpSettings(Protocol):
     def scatter(self) -> float: ...
     @property
     def high_quality_filtering(self) -> bool: ...
+    @property
+    def anamorphism(self) -> float: ...
 
 
 def passes(
-    glow: Array, settings: HdrpSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: HdrpSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    Level k is the frame's size / 2^(k + 1), rounded, halves to even. Five taps of the frame,
+    Level k is the frame's size / 2^(k + 1), rounded, halves to even; an anamorphism a below 0
+    multiplies the width by 1 + a / 2, one above 0 the height by 1 - a / 2. Five taps of the frame,
     weighted by 1 / (1 + luminance), go into an image of the size of down_0, which is that image
     blurred; each further level is the one above it, bilinear at positions one pixel of the level
     apart, blurred. The blur is the binomial of order 8 along each axis. On the way up the smaller
@@ -55,12 +63,14 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels.
+        1, 3 or, with alpha, 4 channels.
     settings : vkbloom.HdrpBloom
     size : (int, int)
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies the prefiltered image.
 
     Returns
     -------
@@ -69,11 +79,13 @@ def passes(
     """
     height, width, _ = glow.shape
     count = min(max(math.floor(math.log2(max(width, height)) - 2), 1), 16)
+    across = width * (1 + min(settings.anamorphism, 0) / 2)
+    down = height * (1 - max(settings.anamorphism, 0) / 2)
     sizes = [
-        (max(1, round(width / 2 ** (k + 1))), max(1, round(height / 2 ** (k + 1))))
+        (max(1, round(across / 2 ** (k + 1))), max(1, round(down / 2 ** (k + 1))))
         for k in range(count)
     ]
-    reduced = store(_prefilter(glow, sizes[0]))
+    reduced = store(masked(_prefilter(glow, sizes[0]), mask))
     downs = [_along_both(reduced, sizes[0], _blur_rows, store)]
     for level in sizes[1:]:
         downs.append(_along_both(downs[-1], level, _shrink_rows, store))
@@ -103,7 +115,7 @@ def _prefilter(image: Array, size: tuple[int, int]) -> Array:
     total, shares = np.zeros((size[1], size[0], image.shape[2])), np.zeros((size[1], size[0], 1))
     for x, y in _PREFILTER_TAPS:
         tap = sample(image, size, [(x, 1.0)], [(y, 1.0)])
-        grey = tap if tap.shape[2] == 1 else (tap * _LUMINANCE).sum(axis=-1, keepdims=True)
+        grey = tap if tap.shape[2] == 1 else (tap[..., :3] * _LUMINANCE).sum(axis=-1, keepdims=True)
         share = 1 / (1 + np.maximum(grey, 0))
         total += share * tap
         shares += share

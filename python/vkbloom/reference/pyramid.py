@@ -59,7 +59,8 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels (grey or rgb) for the firefly filter, any number without it.
+        1, 3 or 4 channels (grey, rgb or with alpha) for the firefly filter, any number without
+        it.
     settings : vkbloom.Pyramid
     size : (int, int)
         Width and height of the bloom, in pixels.
@@ -74,7 +75,7 @@ def passes(
     Raises
     ------
     ValueError
-        Firefly filter of an image with neither 1 nor 3 channels.
+        Firefly filter of an image with another number of channels.
     """
     height, width, _ = glow.shape
     sizes = level_sizes((width, height), settings.levels)
@@ -111,26 +112,37 @@ def gain(settings: PyramidSettings, size: tuple[int, int]) -> float:
     return sum(settings.level_weights[: len(level_sizes(size, settings.levels))])
 
 
-def groups(image: Array, size: tuple[int, int]) -> Iterator[tuple[float, Array]]:
-    """Yield the share and the mean of each of the five groups of taps, (height, width, C)."""
+def groups(
+    image: Array, size: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)
+) -> Iterator[tuple[float, Array]]:
+    """Yield the share and the mean of each of the five groups of taps, (height, width, C).
+
+    `scale` multiplies the taps' distances along x and y.
+    """
     for share, x_offsets, y_offsets in _GROUPS:
-        x_taps, y_taps = ([(x, 0.5) for x in offsets] for offsets in (x_offsets, y_offsets))
+        x_taps = [(scale[0] * x, 0.5) for x in x_offsets]
+        y_taps = [(scale[1] * y, 0.5) for y in y_offsets]
         yield share, sample(image, size, x_taps, y_taps)
 
 
-def downsample(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:
-    """Read the 13 taps around each pixel of a smaller image.
+def downsample(
+    image: Array,
+    size: tuple[int, int],
+    firefly_filter: bool,
+    scale: tuple[float, float] = (1.0, 1.0),
+) -> Array:
+    """Read the 13 taps around each pixel of a smaller image, at `scale` times their distances.
 
     With `firefly_filter` the share of each group is multiplied by 1 / (1 + luminance of the
     group's mean), and the shares are divided by their sum. A negative luminance counts as 0.
     """
-    if firefly_filter and image.shape[2] not in (1, 3):
+    if firefly_filter and image.shape[2] not in (1, 3, 4):
         raise ValueError(
             f"firefly_filter needs an image of 1, 3 or 4 channels, not {image.shape[2]}"
         )
     total = np.zeros((size[1], size[0], image.shape[2]))
     shares = np.zeros((size[1], size[0], 1))
-    for group_share, mean in groups(image, size):
+    for group_share, mean in groups(image, size, scale):
         share = np.full((size[1], size[0], 1), group_share)
         if firefly_filter:
             grey = mean if image.shape[2] == 1 else luminance(mean)

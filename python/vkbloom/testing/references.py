@@ -51,23 +51,27 @@ class Origin:
         Vendor of the machine's CPU; software renderers round differently by vendor.
     version : str
         Version of vkbloom.
+    driver_sha256 : str or None
+        Hash of a driver that draws the same bits on every machine; None for other drivers.
     """
 
     adapter: str | None
     driver: str | None
     cpu_vendor: str
     version: str
+    driver_sha256: str | None = None
 
     @property
     def summary(self) -> str:
-        """All fields but the version on one line."""
-        made_by = [text for text in (self.adapter, self.driver) if text]
-        return ", ".join([*(made_by or ["an unnamed adapter"]), self.cpu_vendor])
+        """All fields but the version on one line, and of the hash its start."""
+        sha256 = f"SHA-256 {self.driver_sha256[:12]}" if self.driver_sha256 else None
+        made_by = [text for text in (self.adapter, self.driver, sha256) if text]
+        return ", ".join([*(made_by or ["arrays that name no adapter"]), self.cpu_vendor])
 
     @property
-    def machine(self) -> tuple[str | None, str | None, str]:
+    def machine(self) -> tuple[str | None, ...]:
         """The fields that identify a machine: all but the version."""
-        return self.adapter, self.driver, self.cpu_vendor
+        return self.adapter, self.driver, self.cpu_vendor, self.driver_sha256
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

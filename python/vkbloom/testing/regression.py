@@ -130,6 +130,7 @@ class FrameRegression:
         flip: float | None = None,
         warn: float | None = None,
         allow_nan: bool = False,
+        exact: bool = False,
         info: Mapping[str, str] | None = None,
     ) -> None:
         """Compare frames with their reference, and fail if they differ.
@@ -155,22 +156,37 @@ class FrameRegression:
             tolerances. With ``atol=math.inf`` only these decide.
         allow_nan : bool, default False
             Whether NaN and infinity pass if the reference has the same.
+        exact : bool, default False
+            Whether every value must be the reference's, by a driver of the same hash, which draws
+            the same bits on every CPU. `Frames` of the package ``vkbloom-lavapipe`` have a hash.
+            Excludes all tolerances.
         info : mapping of str to str, optional
-            "adapter" and "driver" that made the images, stored with a new reference. `Frames` have
-            their own.
+            "adapter", "driver" and "driver_sha256" that made the images, stored with a new
+            reference. `Frames` have their own.
 
         Raises
         ------
         AssertionError
             The frames differ, or there is no reference; the message says where and what to do.
         TypeError, ValueError
-            An argument is wrong, or a reference's file is damaged.
+            An argument is wrong, or a reference's file is damaged; with `exact`, the driver of the
+            frames has no hash, or no reference has the same one.
         OSError
             A file cannot be read or written.
         """
         __tracebackhide__ = True
+        if exact:
+            _check_alone(
+                atol=atol,
+                rtol=rtol,
+                fail_percent=fail_percent or None,
+                hard_fail=hard_fail,
+                ssim=ssim,
+                flip=flip,
+                warn=warn,
+            )
         tolerances = Tolerances(
-            atol=atol,
+            atol=0.0 if exact else atol,
             rtol=rtol,
             fail_percent=fail_percent,
             hard_fail=hard_fail,
@@ -184,6 +200,8 @@ class FrameRegression:
         )
         self._check_adapter(given.origin)
         references = self._folder.load(given.name)
+        if exact:
+            references = self._of_one_driver(references, given)
         if not references:
             self._without_reference(given)
             return
@@ -207,6 +225,8 @@ class FrameRegression:
         flip: float | None = None,
         warn: float | None = None,
         allow_nan: bool = False,
+        info: Mapping[str, Any] | None = None,
+        expected_info: Mapping[str, Any] | None = None,
     ) -> None:
         """Compare frames with others of the same test, and report as `check` does.
 
@@ -218,6 +238,9 @@ class FrameRegression:
             Name in messages and the report.
         atol, rtol, fail_percent, hard_fail, ssim, flip, warn, allow_nan
             As for `check`.
+        info, expected_info : mapping of str to object, optional
+            "adapter" and "driver" that made `actual` and `expected`, for messages and the report:
+            an engine's name, or `Frames.info`. `Frames` have their own.
 
         Raises
         ------
@@ -240,9 +263,11 @@ class FrameRegression:
         if name is not None:
             check_name(name)
         given = _Given(
-            name or self._name, _images("actual", actual), _origin(actual, None), tolerances
+            name or self._name, _images("actual", actual), _origin(actual, info), tolerances
         )
-        reference = Reference(images=_images("expected", expected), origin=_origin(expected, None))
+        reference = Reference(
+            images=_images("expected", expected), origin=_origin(expected, expected_info)
+        )
         self._conclude(given, reference, judge(reference.images, given.images, tolerances), None)
 
     def _chosen_name(self, name: str | None) -> str:
@@ -264,6 +289,27 @@ class FrameRegression:
             raise ValueError(
                 f"--bloom-expect-adapter={wanted}: the frames come from {origin.summary}"
             )
+
+    def _of_one_driver(self, references: list[Reference], given: _Given) -> list[Reference]:
+        """Return the references that the driver of the given frames made.
+
+        Raises ValueError where exact values cannot be expected of what was given.
+        """
+        origin = given.origin
+        if not origin.driver_sha256:
+            raise ValueError(
+                f"exact: the driver of the frames has no hash ({origin.summary}), and may draw "
+                "other bits elsewhere; use the driver of vkbloom-lavapipe, or tolerances"
+            )
+        same = [one for one in references if one.origin.driver_sha256 == origin.driver_sha256]
+        if references and not same and not (self._mode.update or self._mode.add):
+            made_by = "; ".join(one.origin.summary for one in references)
+            raise ValueError(
+                f"exact: {self._folder.file(given.name)} has no reference of the frames' driver "
+                f"({origin.summary}), only of {made_by}; install that one's vkbloom-lavapipe, or "
+                "write a reference with --bloom-update or --bloom-add"
+            )
+        return same
 
     def _without_reference(self, given: _Given) -> None:
         __tracebackhide__ = True
@@ -378,13 +424,21 @@ def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     return images
 
 
-def _origin(frames: object, info: Mapping[str, str] | None) -> Origin:
+def _check_alone(**tolerances: float | None) -> None:
+    """Raise ValueError if a tolerance is given."""
+    given = [name for name, value in tolerances.items() if value is not None]
+    if given:
+        raise ValueError(f"exact: True excludes tolerances; leave out {', '.join(given)}")
+
+
+def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
     known: Mapping[str, Any] = info or (frames.info if isinstance(frames, Frames) else {})
     return Origin(
         adapter=known.get("adapter"),
         driver=known.get("driver"),
         cpu_vendor=cpu_vendor(),
         version=installed_version(),
+        driver_sha256=known.get("driver_sha256"),
     )
 
 

@@ -17,6 +17,8 @@ function show(index) {
   for (const [place, button] of [...kinds.children].entries()) {
     button.setAttribute("aria-pressed", String(place === current));
   }
+  // The focus goes along, so that the button it outlines is the one that is pressed.
+  kinds.children[current].focus();
 }
 
 function open(button) {
@@ -28,8 +30,8 @@ function open(button) {
     choice.addEventListener("click", () => show(place));
     return choice;
   }));
-  show(pictures.indexOf(button));
   dialog.showModal();
+  show(pictures.indexOf(button));
 }
 
 for (const button of document.querySelectorAll(".pictures button")) {

@@ -53,10 +53,10 @@ def worst_order(settings: Iterable[vkbloom.Separable]) -> list[vkbloom.Separable
 
 
 def run(plan: Plan) -> Section:
-    """Time `plan.points` requests with one half-float image, in blocks that alternate."""
-    count = min(plan.points, 60) if plan.quick else plan.points
+    """Time `plan.requests` requests with one half-float image, in blocks that alternate."""
+    count = min(plan.requests, 60) if plan.quick else plan.requests
     section = Section(
-        "points",
+        "requests",
         f"{count:,} requests of {SIZE[0]} x {SIZE[1]}, float16 RGBA",
         [
             "Settings over blur_scale x blur_strength x intensity for one image. `final` of "

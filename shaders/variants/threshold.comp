@@ -1,12 +1,12 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// What of an image is bright enough, where the bloom buffers have its size.
+// The threshold pass if the bloom buffers have the size of the image.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
-UNIFORM_BLOCK(EXTRACT_BLOCK);
+UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
@@ -40,9 +40,9 @@ void main()
     for (int y = first.y; y < end; ++y) {
         load_run(first.x, y, raw);
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            vec3 colour = finite_or_zero(colour_of(raw[i]));
-            vec3 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
-            raw[i] = opaque(storable(kept));
+            vec4 colour = finite_or_zero(value_of(raw[i]));
+            raw[i] = buffer_of(
+                apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee));
         }
         store(first.x, y, raw);
     }
