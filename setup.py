@@ -37,8 +37,8 @@ def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to.
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
-    is compiled for each format that it may load from: for images as words, with four channels and,
-    if it mentions IMAGE_CHANNELS, with three; and for storage images, unless only CPUs run it.
+    is compiled for each format that it may load from: for images as words, and for storage images,
+    unless only CPUs run it.
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
@@ -46,16 +46,9 @@ def modules(shader: Path) -> list[Module]:
         found = []
         for ours, glsl in FORMATS.items():
             if shader.name not in WORDS_ALONE:
-                images = (f"-DSOURCE_FORMAT={glsl}", "-DIMAGE_CHANNELS=4")
-                found.append(Module(f"{name}_{ours}", shader, images))
+                found.append(Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",)))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
-            found.append(
-                Module(f"{shader.stem}_words_{ours}", shader, (*words, "-DIMAGE_CHANNELS=4"))
-            )
-            if "IMAGE_CHANNELS" in text:
-                found.append(
-                    Module(f"{shader.stem}_packed_{ours}", shader, (*words, "-DIMAGE_CHANNELS=3"))
-                )
+            found.append(Module(f"{shader.stem}_words_{ours}", shader, words))
         return found
     if "SOURCE_FORMAT" in text:
         return [
@@ -138,18 +131,17 @@ def write_spirv() -> None:
     rows = ""
     for module in built:
         dispatch = f"{module.shader.stem}_dispatch"
-        packed = module.name.replace("_words_", "_packed_")
-        twins = (name if name in names else module.name for name in (dispatch, packed))
-        twin_names = ", ".join(f"VKB_SHADER_{twin}" for twin in twins)
-        rows += f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twin_names}}},\n'
+        twin = dispatch if dispatch in names else module.name
+        rows += (
+            f'    {{"{module.name}", {module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n'
+        )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
         "#include <stddef.h>\n#include <stdint.h>\n\n"
         f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
-        "// `dispatch`: the same pass as a compute shader; `packed`: the same for packed images;\n"
-        "// itself where there is none.\n"
+        "// `dispatch`: the same pass as a compute shader, or itself where there is none.\n"
         "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
-        "    enum vkb_shader dispatch, packed;\n};\n"
+        "    enum vkb_shader dispatch;\n};\n"
         "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
     )
     (SPIRV / "spirv.c").write_text(

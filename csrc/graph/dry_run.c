@@ -24,7 +24,7 @@ static struct vkb_dry_image *find_image(const struct vkb_dry_run *dry_run, const
 static bool fits(const struct vkb_dry_image *image, const struct vkb_image_row *row)
 {
     return image->row.format == row->format && image->row.width == row->width
-        && image->row.height == row->height && image->row.packed == row->packed;
+        && image->row.height == row->height;
 }
 
 static struct vkb_dry_image *add_image(struct vkb_dry_run *dry_run, struct vkb_error *error)

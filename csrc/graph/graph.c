@@ -68,7 +68,7 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
     for (uint32_t i = 0; i < a->image_count; ++i) {
         const struct vkb_image_row *x = &a->images[i], *y = &b->images[i];
         if (x->format != y->format || x->width != y->width || x->height != y->height
-            || x->packed != y->packed || strcmp(x->name, y->name) != 0)
+            || strcmp(x->name, y->name) != 0)
             return false;
     }
     return true;

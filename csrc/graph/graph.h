@@ -37,7 +37,6 @@ struct vkb_image_row {
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
     enum vkb_input_kind input;
-    bool packed;  // three channels without gaps: accessed by passes that read words alone
 };
 
 // What a pass draws; depth test and culling are derived from it. A dispatch draws nothing: its

@@ -38,7 +38,8 @@ extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submis
 // abandoned: the renderer owns it.
 struct vkb_pending {
     struct vkb_submission *submission;  // NULL: not submitted
-    PyObject *plans;  // a tuple: their graphs are read until the device has finished
+    PyObject *plans;   // a tuple: their graphs are read until the device has finished
+    PyObject *source;  // read by the device until then
     struct vkb_request *requests;
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
@@ -58,11 +59,12 @@ struct vkb_renderer {
     long process;                   // that opened it; a forked process must not use the device
     atomic_bool open;               // written with the lock, read without it
     const struct vkb_messages
-        *before;               // receives the messages when the thread with the lock leaves
-    uint64_t serial;           // identifies the renderer of a plan; never 0
-    struct vkb_pages *pages;   // of large arrays; NULL: closed
-    size_t pipeline_count;     // created so far; accessed with the GIL
-    struct vkb_cached cached;  // accessed with the GIL
+        *before;                      // receives the messages when the thread with the lock leaves
+    uint64_t serial;                  // identifies the renderer of a plan; never 0
+    struct vkb_pages *pages;          // of large arrays; NULL: closed
+    struct vkb_residents *residents;  // of handles; NULL: closed
+    size_t pipeline_count;            // created so far; accessed with the GIL
+    struct vkb_cached cached;         // accessed with the GIL
     enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -146,12 +148,19 @@ bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *im
 bool vkb_read_mask(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
 
+// An image is the caller's array, or one that stays on the device of a renderer.
 struct vkb_source_object {
     PyObject_HEAD
     struct vkb_source source;
     struct vkb_held_scene scene;
     struct vkb_held_image images[VKB_INPUT_COUNT];  // by kind
+    struct vkb_resident *resident;                  // NULL: none
+    struct vkb_residents *residents;
+    long process;  // whose device the resident image is on
 };
+
+// Whether the renderer can use the source; else with a ValueError set.
+bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_source_object *source);
 
 struct vkb_plan_object {
     PyObject_HEAD
@@ -174,6 +183,8 @@ PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
+PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_renderer_fill(PyObject *renderer, PyObject *arguments);
 
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);

@@ -167,6 +167,8 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
         return NULL;
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
+    if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
+        return NULL;
     return new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
                     &settings, names);
 }

@@ -197,7 +197,8 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     self->lock = PyThread_allocate_lock();
     if (!self->lock)
         PyErr_NoMemory();
-    else if ((self->pages = vkb_pages_create(&self->device, &error)))
+    else if ((self->pages = vkb_pages_create(&self->device, &error))
+             && (self->residents = vkb_residents_create(&self->device, &error)))
         self->open = create(self, adapter, driver, validation, variants, read_cache, &error);
     if (self->open) {
         self->device.interrupted = interrupted;
@@ -231,7 +232,9 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
     vkb_pages_close(self->pages);
+    vkb_residents_close(self->residents);
     self->pages = NULL;
+    self->residents = NULL;
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);
@@ -272,6 +275,7 @@ static void dealloc(PyObject *object)
         return;
     release_all(take_over(self));
     vkb_pages_close(self->pages);
+    vkb_residents_close(self->residents);
     if (self->lock)
         PyThread_free_lock(self->lock);
     vkb_free_object(object);
@@ -358,8 +362,17 @@ static PyMethodDef methods[] = {
     {"plan", vkb_renderer_plan, METH_VARARGS,
      "plan(source, settings, names) -> Plan. Makes no device call; names None: all framebuffers."},
     {"run", vkb_renderer_run, METH_VARARGS,
-     "run(source, plans, arrays) -> Submission. Submits plans with the same images; arrays has a "
-     "tuple for each plan, in the order of its outputs."},
+     "run(source, plans, arrays[, first, count]) -> Submission. Submits plans with the same "
+     "images; "
+     "arrays has a tuple for each plan, in the order of its outputs, or of rows first to first + "
+     "count of each."},
+    {"upload", vkb_renderer_upload, METH_VARARGS,
+     "upload(source, spare, recycled, height=0) -> Source. A copy of an image on the device. "
+     "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "
+     "`recycled`: it will be one; `height`: rows in all, if `fill` provides more of them."},
+    {"fill", vkb_renderer_fill, METH_VARARGS,
+     "fill(source, rows, first). Copies rows of an image into an uploaded image, from row `first` "
+     "on, before anything uses it."},
     {"pages", vkb_new_pages, METH_O,
      "pages(size) -> Pages. Memory for an array; reused when the array is gone."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},

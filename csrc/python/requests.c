@@ -55,8 +55,9 @@ static bool check_plans(const struct vkb_renderer *renderer, const struct vkb_so
 }
 
 // Allocates the memory that the requests need in addition to their plans.
-static struct vkb_pending *new_pending(PyObject *plans, struct vkb_error *error)
+static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct vkb_error *error)
 {
+    struct vkb_resident *resident = ((struct vkb_source_object *)source)->resident;
     struct vkb_pending *pending = vkb_alloc(error, 1, sizeof *pending);
     const Py_ssize_t count = PyTuple_Size(plans);
     size_t output_count = 0, pass_count = 0;
@@ -68,6 +69,9 @@ static struct vkb_pending *new_pending(PyObject *plans, struct vkb_error *error)
         pass_count += plan_at(plans, i)->plan.graph.pass_count;
     }
     pending->plans = Py_NewRef(plans);
+    pending->source = Py_NewRef(source);
+    if (resident)
+        vkb_resident_use(resident);
     pending->requests = vkb_alloc(error, (size_t)count, sizeof *pending->requests);
     pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
     pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
@@ -76,6 +80,15 @@ static struct vkb_pending *new_pending(PyObject *plans, struct vkb_error *error)
         return pending;
     vkb_pending_release(pending);
     return NULL;
+}
+
+static void release_source(struct vkb_pending *pending)
+{
+    struct vkb_source_object *source = (struct vkb_source_object *)pending->source;
+
+    if (source && source->resident)
+        vkb_resident_end_use(source->residents, source->resident);
+    Py_XDECREF(pending->source);
 }
 
 static void release_views(struct vkb_pending *pending)
@@ -92,19 +105,28 @@ void vkb_pending_release(struct vkb_pending *pending)
     vkb_free(pending->views);
     vkb_free(pending->timings);
     Py_XDECREF(pending->plans);
+    release_source(pending);
     vkb_free(pending);
 }
 
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg)
 {
     Py_VISIT(pending->plans);
+    Py_VISIT(pending->source);
     for (size_t i = 0; i < pending->view_count; ++i)
         Py_VISIT(pending->views[i].obj);
     return 0;
 }
 
+// Rows of the outputs to read back.
+struct rows {
+    uint32_t first, count;
+};
+
+// `rows` may be NULL: all of them.
 static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                       const struct vkb_plan *plan, uint32_t output, PyObject *array)
+                       const struct vkb_plan *plan, uint32_t output, const struct rows *rows,
+                       PyObject *array)
 {
     const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
     Py_buffer *view = &pending->views[pending->view_count];
@@ -112,6 +134,8 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
     if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
         return false;
     pending->outputs[pending->view_count++] = (struct vkb_output){
+        .first_row = rows ? rows->first : 0,
+        .row_count = rows ? rows->count : row->height,
         .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
         .memory = view->buf,
         // Only large arrays are looked up: the search takes time in proportion to the kept arrays.
@@ -119,14 +143,21 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
                    ? vkb_pages_find(renderer->pages, view->buf)
                    : NULL,
     };
-    if ((size_t)view->len == vkb_output_size(plan, output))
+    if (rows
+        && (rows->count == 0 || rows->first >= row->height
+            || rows->count > row->height - rows->first)) {
+        PyErr_Format(PyExc_ValueError, "%s: it does not have those rows", row->name);
+        return false;
+    }
+    const size_t size = vkb_output_size(plan, output);
+    if ((size_t)view->len == (rows ? size / row->height * rows->count : size))
         return true;
     PyErr_Format(PyExc_ValueError, "%s: the array has the wrong size", row->name);
     return false;
 }
 
 static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                        PyObject *arrays)
+                        const struct rows *rows, PyObject *arrays)
 {
     size_t passes = 0;
 
@@ -147,15 +178,15 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
             return false;
         }
         for (uint32_t output = 0; output < plan->output_count; ++output)
-            if (!hold_array(renderer, pending, plan, output, PyTuple_GetItem(tuple, output)))
+            if (!hold_array(renderer, pending, plan, output, rows, PyTuple_GetItem(tuple, output)))
                 return false;
         ++pending->count;
     }
     return true;
 }
 
-static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *plans,
-                                         PyObject *arrays)
+static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *source,
+                                         PyObject *plans, const struct rows *rows, PyObject *arrays)
 {
     struct vkb_module_state *state = state_of((PyObject *)renderer);
     struct submission *self = vkb_new_object(state->submission_type);
@@ -164,10 +195,10 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
     if (!self)
         return NULL;
     self->renderer = (struct vkb_renderer *)Py_NewRef((PyObject *)renderer);
-    self->pending = new_pending(plans, &error);
+    self->pending = new_pending(source, plans, &error);
     if (!self->pending)
         vkb_raise(state, &error);
-    else if (hold_arrays(renderer, self->pending, arrays))
+    else if (hold_arrays(renderer, self->pending, rows, arrays))
         return self;
     Py_DECREF(self);
     return NULL;
@@ -178,6 +209,7 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
 {
     struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
+        .resident = source->resident,
     };
 
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
@@ -189,11 +221,8 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
     bool done = vkb_require_open(renderer, error)
              && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
                                  pending->count, &pending->submission, error);
-    for (int kind = 0; done && kind < VKB_INPUT_COUNT; ++kind)
-        if (data.inputs[kind]) {
-            pending->specials.nan += renderer->frame.uploads[kind].specials.nan;
-            pending->specials.inf += renderer->frame.uploads[kind].specials.inf;
-        }
+    if (done)
+        pending->specials = vkb_frame_specials(&renderer->frame, &data);
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
@@ -204,13 +233,17 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     struct vkb_module_state *state = state_of(object);
     PyObject *source, *plans, *arrays;
+    struct rows rows = {0};
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!O!O!:run", state->source_type, &source, &PyTuple_Type,
-                          &plans, &PyTuple_Type, &arrays)
+    if (!PyArg_ParseTuple(arguments, "O!O!O!|O&O&:run", state->source_type, &source, &PyTuple_Type,
+                          &plans, &PyTuple_Type, &arrays, vkb_read_uint32, &rows.first,
+                          vkb_read_uint32, &rows.count)
+        || !vkb_check_source(renderer, (struct vkb_source_object *)source)
         || !check_plans(renderer, &((struct vkb_source_object *)source)->source, plans, arrays))
         return NULL;
-    struct submission *self = new_submission(renderer, plans, arrays);
+    struct submission *self =
+        new_submission(renderer, source, plans, PyTuple_Size(arguments) > 3 ? &rows : NULL, arrays);
     if (self && !submit(renderer, (struct vkb_source_object *)source, self->pending, &error)) {
         // The exception is kept while the arrays are released, which may run Python code.
         vkb_raise(state, &error);

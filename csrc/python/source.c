@@ -94,6 +94,141 @@ PyObject *vkb_scene_source(PyObject *module, PyObject *arguments)
     return (PyObject *)self;
 }
 
+bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_source_object *source)
+{
+    // A closed renderer says so itself.
+    if (!source->resident || !renderer->open || source->residents == renderer->residents)
+        return true;
+    PyErr_SetString(PyExc_ValueError, "image: it was uploaded to another renderer, or to one that "
+                                      "is closed; upload it to this one");
+    return false;
+}
+
+// The resident image of a source that nobody needs any more, and that no submission uses; or a new
+// one.
+static struct vkb_resident *take_resident(struct vkb_renderer *renderer, PyObject *spare,
+                                          struct vkb_error *error)
+{
+    struct vkb_source_object *source = (struct vkb_source_object *)spare;
+
+    if (spare == Py_None || !source->resident || source->resident->uses > 0
+        || source->residents != renderer->residents)
+        return vkb_resident_add(renderer->residents, error);
+    struct vkb_resident *resident = source->resident;
+    source->resident = NULL;
+    source->source = (struct vkb_source){0};
+    return resident;
+}
+
+// Begins images of `height` rows, unless that is 0, and fills them from row `first` on.
+static bool stage_all(struct vkb_renderer *renderer, struct vkb_resident *resident,
+                      const struct vkb_source_object *source, uint32_t height, uint32_t first,
+                      struct vkb_error *error)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        struct vkb_input complete = source->images[kind].input;
+        complete.height = height;
+        if (source->images[kind].held
+            && ((height > 0
+                 && !vkb_resident_begin(&renderer->device, resident, kind, &complete,
+                                        &renderer->frame.cache.clock, error))
+                || !vkb_resident_fill(&renderer->device, resident, kind,
+                                      &source->images[kind].input, first, error)))
+            return false;
+    }
+    return true;
+}
+
+static bool stage(struct vkb_renderer *renderer, struct vkb_resident *resident,
+                  const struct vkb_source_object *source, uint32_t height, uint32_t first,
+                  struct vkb_error *error)
+{
+    if (!vkb_renderer_enter(renderer, error))
+        return false;
+    const bool done = vkb_require_open(renderer, error)
+                   && stage_all(renderer, resident, source, height, first, error);
+    const bool silent = vkb_renderer_check_messages(renderer, done, error);
+    vkb_renderer_leave(renderer);
+    return silent;
+}
+
+PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
+{
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    PyTypeObject *type = (PyTypeObject *)state->source_type;
+    PyObject *given, *spare;
+    int recycled;
+    uint32_t height = 0;
+    struct vkb_error error = {0};
+
+    if (!PyArg_ParseTuple(arguments, "O!Op|O&:upload", type, &given, &spare, &recycled,
+                          vkb_read_uint32, &height))
+        return NULL;
+    const struct vkb_source_object *source = (struct vkb_source_object *)given;
+    if (!source->images[VKB_INPUT_IMAGE].held
+        || (spare != Py_None && !PyObject_TypeCheck(spare, type))) {
+        PyErr_SetString(PyExc_ValueError, "upload: an image in host memory is needed");
+        return NULL;
+    }
+    if (!vkb_require_open(renderer, &error))
+        return vkb_raise(state, &error);
+    struct vkb_source_object *self = vkb_new_object(state->source_type);
+    if (!self)
+        return NULL;
+    if (height < source->source.image.size.height)
+        height = source->source.image.size.height;
+    self->residents = renderer->residents;
+    self->process = renderer->process;
+    self->resident = take_resident(renderer, spare, &error);
+    if (self->resident) {
+        self->resident->recycled = recycled;
+        if (stage(renderer, self->resident, source, height, 0, &error)) {
+            self->source = source->source;
+            self->source.image.size.height = height;
+            return (PyObject *)self;
+        }
+    }
+    Py_DECREF(self);
+    return vkb_raise(state, &error);
+}
+
+// Whether the rows go into the resident images from row `first` on.
+static bool check_rows(const struct vkb_source_object *source, const struct vkb_source_object *rows,
+                       uint32_t first)
+{
+    const struct vkb_image_source *image = &source->source.image, *part = &rows->source.image;
+
+    if (source->resident && source->resident->uses == 0 && rows->images[VKB_INPUT_IMAGE].held
+        && part->format == image->format && part->channels == image->channels
+        && part->has_emission == image->has_emission && part->has_mask == image->has_mask
+        && part->size.width == image->size.width && first <= image->size.height
+        && part->size.height <= image->size.height - first)
+        return true;
+    PyErr_SetString(PyExc_ValueError, "fill: the rows do not go into the image");
+    return false;
+}
+
+PyObject *vkb_renderer_fill(PyObject *object, PyObject *arguments)
+{
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    PyObject *given, *rows;
+    uint32_t first;
+    struct vkb_error error = {0};
+
+    if (!PyArg_ParseTuple(arguments, "O!O!O&:fill", state->source_type, &given, state->source_type,
+                          &rows, vkb_read_uint32, &first))
+        return NULL;
+    const struct vkb_source_object *source = (struct vkb_source_object *)given;
+    const struct vkb_source_object *held = (struct vkb_source_object *)rows;
+    if (!vkb_check_source(renderer, source) || !check_rows(source, held, first))
+        return NULL;
+    if (!stage(renderer, source->resident, held, 0, first, &error))
+        return vkb_raise(state, &error);
+    return Py_NewRef(Py_None);
+}
+
 static int traverse(PyObject *object, visitproc visit, void *arg)
 {
     struct vkb_source_object *self = (struct vkb_source_object *)object;
@@ -116,6 +251,13 @@ static int clear(PyObject *object)
     vkb_release_scene(&self->scene);
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         vkb_release_image(&self->images[kind]);
+    // A submission that uses it has this object, and is released first. A forked process keeps its
+    // copy: the device is its parent's.
+    if (self->resident && self->resident->uses > 0)
+        return 0;
+    if (self->resident && self->process == vkb_current_process())
+        vkb_resident_release(self->residents, self->resident);
+    self->resident = NULL;
     return 0;
 }
 
@@ -126,10 +268,22 @@ static void dealloc(PyObject *object)
     vkb_free_object(object);
 }
 
+static PyObject *is_resident(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyBool_FromLong(((struct vkb_source_object *)object)->resident != NULL);
+}
+
+static PyGetSetDef attributes[] = {
+    {"resident", is_resident, NULL, "Whether it is an image that stays on a device.", NULL},
+    {0},
+};
+
 static PyType_Slot slots[] = {
     {Py_tp_dealloc, dealloc},
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
+    {Py_tp_getset, attributes},
     {Py_tp_doc, "The input of frames: an image or a scene."},
     {0},
 };

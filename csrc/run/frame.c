@@ -73,7 +73,7 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
         sets += vkb_record_sets(run->device, &plan->graph) + surfaces;
         for (uint32_t output = 0; output < plan->output_count; ++output) {
             const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
-            if (!vkb_readback_plan(run->device, &submission->readback, row,
+            if (!vkb_readback_plan(run->device, &submission->readback, row->format, row->width,
                                    &requests[i].outputs[output], error))
                 return false;
         }
@@ -99,6 +99,10 @@ static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error
     struct vkb_image_cache *cache = &run->frame->cache;
     struct vkb_cached_image *cached;
 
+    if (run->inputs[row->input]) {
+        set_cached(run, image, run->inputs[row->input]);
+        return true;
+    }
     if ((vkb_image_cache_replaces(cache, row)
          && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
         || !vkb_image_cache_resolve(run->device, cache, row, &cached, error))
@@ -133,6 +137,8 @@ static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
     struct vkb_upload *upload = &run->frame->uploads[kind];
     bool changed;
 
+    run->uploads[kind] = upload;
+
     // An image that its last writing did not reach holds nothing to compare with.
     if (image->image.mapped && !image->content.valid)
         vkb_upload_forget(upload);
@@ -151,10 +157,15 @@ static bool stage_inputs(struct vkb_run *run, const struct vkb_frame_source *sou
         const enum vkb_input_kind kind = run->graph->images[i].input;
         if (kind == VKB_INPUT_NONE)
             continue;
+        if (source->resident) {
+            run->inputs[kind] = &source->resident->inputs[kind].cached;
+            run->uploads[kind] = &source->resident->inputs[kind].upload;
+            run->send_input[kind] = source->resident->staged;
+        }
         if (!resolve(run, i, error))
             return false;
         run->inputs[kind] = run->images[i];
-        if (!stage_input(run, kind, source->inputs[kind], error))
+        if (!source->resident && !stage_input(run, kind, source->inputs[kind], error))
             return false;
     }
     return true;
@@ -167,8 +178,8 @@ static void record_inputs(struct vkb_run *run)
         if (!run->send_input[kind])
             continue;
         if (!image->image.mapped)
-            vkb_upload_record(run->device, run->submission->commands.buffer,
-                              &run->frame->uploads[kind], &image->image);
+            vkb_upload_record(run->device, run->submission->commands.buffer, run->uploads[kind],
+                              &image->image);
         image->content.valid = true;
     }
 }
@@ -204,7 +215,10 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     request->timing_count = 0;
     request->first_span = submission->timer.span_count;
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        set_cached(run, i, vkb_image_cache_find(&frame->cache, &graph->images[i]));
+        set_cached(run, i,
+                   graph->images[i].input != VKB_INPUT_NONE
+                       ? run->inputs[graph->images[i].input]
+                       : vkb_image_cache_find(&frame->cache, &graph->images[i]));
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i)
@@ -304,7 +318,11 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     struct vkb_run run = {.device = device, .frame = frame};
     // All requests have the same images.
     const uint32_t image_count = requests[0].plan->graph.image_count;
+    enum vkb_access accesses[VKB_INPUT_COUNT];
     bool done;
+
+    for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
+        accesses[kind] = source->resident->inputs[kind].cached.image.access;
 
     if (!renew(device, frame, error)
         || !vkb_submissions_take(device, &frame->submissions, &run.submission, error))
@@ -319,7 +337,12 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         run.submission->requests = requests;
         run.submission->request_count = request_count;
         *submission = run.submission;
+        if (source->resident)
+            source->resident->staged = false;
     } else {
+        // What was recorded of it does not run.
+        for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
+            source->resident->inputs[kind].cached.image.access = accesses[kind];
         fail_frame(device, frame, run.submission, error);
         vkb_submissions_give_back(device, &frame->submissions, run.submission);
     }
@@ -371,6 +394,19 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
     if (*over)
         vkb_submissions_give_back(device, &frame->submissions, submission);
     return done;
+}
+
+struct vkb_specials vkb_frame_specials(const struct vkb_frame *frame,
+                                       const struct vkb_frame_source *source)
+{
+    struct vkb_specials sum = {0};
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        const struct vkb_upload *upload = &frame->uploads[kind];
+        sum.nan += source->inputs[kind] ? upload->specials.nan : 0;
+        sum.inf += source->inputs[kind] ? upload->specials.inf : 0;
+    }
+    return source->resident ? source->resident->specials : sum;
 }
 
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,

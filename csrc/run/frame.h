@@ -6,8 +6,8 @@
 #include "graph/plan.h"
 #include "run/image_cache.h"
 #include "run/pipeline.h"
+#include "run/resident.h"
 #include "run/submission.h"
-#include "run/upload.h"
 #include "scene/scene.h"
 
 // Everything that lives from frame to frame. What the submissions share is changed by the device in
@@ -27,6 +27,7 @@ struct vkb_frame {
 struct vkb_frame_source {
     const struct vkb_scene_data *scene;
     const struct vkb_input *inputs[VKB_INPUT_COUNT];  // by kind
+    struct vkb_resident *resident;                    // in place of them
 };
 
 struct vkb_timing {
@@ -64,6 +65,10 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
 // is done with it, which it need not be after a failure.
 bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
                        struct vkb_submission *submission, bool *over, struct vkb_error *error);
+
+// How many NaN and infinities the source's image holds; after it was submitted.
+struct vkb_specials vkb_frame_specials(const struct vkb_frame *frame,
+                                       const struct vkb_frame_source *source);
 
 // Gives up a submission that nobody wants any more, without a wait; false where the device may
 // still be at work on it.

@@ -57,7 +57,8 @@ static void destroy_image(const struct vkb_device *device, struct vkb_image_cach
 
 static uint64_t image_size(const struct vkb_image *image)
 {
-    return image->memory ? (uint64_t)image->width * image->height * vkb_image_pixel_size(image) : 0;
+    return image->handle ? (uint64_t)image->width * image->height * vkb_pixel_size(image->format)
+                         : 0;
 }
 
 uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache)
@@ -79,7 +80,7 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
     while (size > left) {
         struct vkb_cached_image *oldest = NULL;
         for (size_t i = 0; i < cache->count; ++i)
-            if (cache->images[i]->image.memory
+            if (cache->images[i]->image.handle
                 && (!oldest || cache->images[i]->used < oldest->used))
                 oldest = cache->images[i];
         if (!oldest || !vkb_is_old(oldest->used, age))
@@ -98,10 +99,10 @@ static VkImageUsageFlags image_usage(enum vkb_format format)
                 : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_STORAGE_BIT);
 }
 
-static bool check_format(const struct vkb_device *device, const struct vkb_graph *graph,
-                         uint32_t image, struct vkb_error *error)
+bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
+                         struct vkb_error *error)
 {
-    const enum vkb_format format = graph->images[image].format;
+    const enum vkb_format format = row->format;
     const VkFormatFeatureFlags features = format == VKB_FORMAT_DEPTH32_FLOAT
                                             ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
                                             : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT
@@ -111,6 +112,16 @@ static bool check_format(const struct vkb_device *device, const struct vkb_graph
     if (!vkb_device_supports(device, format, features))
         return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
                         device->adapter.name, vkb_formats[format].name);
+    return true;
+}
+
+static bool check_format(const struct vkb_device *device, const struct vkb_graph *graph,
+                         uint32_t image, struct vkb_error *error)
+{
+    const enum vkb_format format = graph->images[image].format;
+
+    if (!vkb_image_row_check(device, &graph->images[image], error))
+        return false;
     if (vkb_graph_blends(graph, image)
         && !vkb_device_supports(device, format, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT))
         return vkb_fail(error, VKB_ERROR_GENERAL,
@@ -127,6 +138,22 @@ bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_gra
         if (!check_format(device, graph, i, error))
             return false;
     return true;
+}
+
+bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
+                          struct vkb_image *image, struct vkb_error *error)
+{
+    return vkb_image_create(device,
+                            &(struct vkb_image_spec){
+                                .format = row->format,
+                                .width = row->width,
+                                .height = row->height,
+                                .layers = 1,
+                                .levels = 1,
+                                .usage = image_usage(row->format),
+                                .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
+                            },
+                            image, error);
 }
 
 static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache, const char *name)
@@ -151,17 +178,17 @@ static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache, const 
     return cached;
 }
 
-static bool fits(const struct vkb_image *image, const struct vkb_image_row *row)
+bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
 {
-    return image->memory && image->format == row->format && image->width == row->width
-        && image->height == row->height && image->packed == row->packed;
+    return image->handle && image->format == row->format && image->width == row->width
+        && image->height == row->height;
 }
 
 bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
 {
     const struct vkb_cached_image *cached = find_cached(cache, row->name);
 
-    return cached && cached->image.memory && !fits(&cached->image, row);
+    return cached && cached->image.handle && !vkb_image_fits(&cached->image, row);
 }
 
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
@@ -169,7 +196,7 @@ struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cach
 {
     struct vkb_cached_image *cached = find_cached(cache, row->name);
 
-    return cached && fits(&cached->image, row) ? cached : NULL;
+    return cached && vkb_image_fits(&cached->image, row) ? cached : NULL;
 }
 
 bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_cache *cache,
@@ -182,22 +209,11 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
         return false;
     *resolved = cached;
     cached->used = cache->now;
-    if (fits(&cached->image, row))
+    if (vkb_image_fits(&cached->image, row))
         return true;
     destroy_image(device, cache, cached);
     cached->image_id = ++cache->clock;
-    return vkb_image_create(device,
-                            &(struct vkb_image_spec){
-                                .format = row->format,
-                                .width = row->width,
-                                .height = row->height,
-                                .layers = 1,
-                                .levels = 1,
-                                .usage = image_usage(row->format),
-                                .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
-                                .packed = row->packed,
-                            },
-                            &cached->image, error);
+    return vkb_image_create_row(device, row, &cached->image, error);
 }
 
 bool vkb_image_cache_framebuffer(const struct vkb_device *device, struct vkb_image_cache *cache,

@@ -42,6 +42,14 @@ void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_c
 bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
                            struct vkb_error *error);
 
+// The same for one row, without what only passes do.
+bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
+                         struct vkb_error *error);
+// Whether it is an image of the row's size and format, and such an image outside of the cache.
+bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row);
+bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
+                          struct vkb_image *image, struct vkb_error *error);
+
 // The cached of an image row where it holds an image of the row's size and format, else NULL.
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
                                               const struct vkb_image_row *row);

@@ -2,18 +2,10 @@
 
 #include <string.h>
 
-enum { COPIED_AT_ONCE = 64 };  // rows of a packed image
-
-// Channels of the image, which may be more than those of the output.
-static uint32_t image_channels(const struct vkb_output *output)
-{
-    return output->packed ? 3 : vkb_formats[output->format].channels;
-}
-
+// Bytes of a row of the image, which may have more channels than the output.
 static size_t row_size(const struct vkb_output *output)
 {
-    return (size_t)output->width * image_channels(output)
-         * vkb_formats[output->format].channel_size;
+    return (size_t)output->width * vkb_pixel_size(output->format);
 }
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback)
@@ -46,8 +38,8 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
     struct vkb_buffer *buffer = &readback->imports[readback->import_count];
 
     // The device writes complete pixels, to multiples of their size.
-    if (output->channels != image_channels(output)
-        || (!output->packed && (uintptr_t)output->memory % pixel_size != 0))
+    if (output->channels != vkb_formats[output->format].channels
+        || (uintptr_t)output->memory % pixel_size != 0)
         return false;
     if (output->pages)
         return import_pages(device, output);
@@ -60,16 +52,14 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
 }
 
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       const struct vkb_image_row *row, struct vkb_output *output,
+                       enum vkb_format format, uint32_t width, struct vkb_output *output,
                        struct vkb_error *error)
 {
-    output->format = row->format;
-    output->width = row->width;
-    output->height = row->height;
-    output->packed = row->packed;
+    output->format = format;
+    output->width = width;
     output->imported = VK_NULL_HANDLE;
     output->stored = false;
-    const size_t size = row_size(output) * row->height;
+    const size_t size = row_size(output) * output->row_count;
     if (size >= VKB_IMPORTED_BYTES) {
         if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
                       readback->import_count + 1, sizeof *readback->imports))
@@ -83,11 +73,12 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     return true;
 }
 
-bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output)
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,
+                              uint32_t height)
 {
     const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
 
-    return output->imported && row_size(output) % VKB_WORD_SIZE == 0
+    return output->imported && output->row_count == height && row_size(output) % VKB_WORD_SIZE == 0
         && output->offset % VKB_WORD_SIZE == 0 && output->offset % align == 0;
 }
 
@@ -98,27 +89,6 @@ bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *
                               readback->used, &readback->staging, error);
 }
 
-static void copy_packed(const struct vkb_device *device, VkCommandBuffer commands,
-                        const struct vkb_image *image, const struct vkb_output *output, VkBuffer to)
-{
-    const size_t size = row_size(output);
-    // Rows without a gap between them are one.
-    const size_t part = size == image->row_pitch ? size * output->height : size;
-    const uint32_t count = part == size ? output->height : 1;
-    VkBufferCopy copies[COPIED_AT_ONCE];
-
-    for (uint32_t first = 0; first < count; first += COPIED_AT_ONCE) {
-        uint32_t i = 0;
-        for (; i < COPIED_AT_ONCE && first + i < count; ++i)
-            copies[i] = (VkBufferCopy){
-                .srcOffset = (first + i) * image->row_pitch,
-                .dstOffset = output->offset + (first + i) * part,
-                .size = part,
-            };
-        device->vk.vkCmdCopyBuffer(commands, image->buffer, to, i, copies);
-    }
-}
-
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          const struct vkb_readback *readback, struct vkb_image *image,
                          const struct vkb_output *output)
@@ -127,17 +97,15 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
     VkBufferImageCopy copy = {
         .bufferOffset = output->offset,
         .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
-        .imageExtent = {image->width, image->height, 1},
+        .imageOffset = {0, (int32_t)output->first_row, 0},
+        .imageExtent = {image->width, output->row_count, 1},
     };
 
     if (output->stored)
         return;
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
-    if (output->packed)
-        copy_packed(device, commands, image, output, to);
-    else
-        device->vk.vkCmdCopyImageToBuffer(
-            commands, image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1, &copy);
+    device->vk.vkCmdCopyImageToBuffer(
+        commands, image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1, &copy);
 }
 
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
@@ -159,13 +127,13 @@ static inline void drop_alpha(unsigned char *to, const unsigned char *from, size
 
 void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
 {
-    const size_t pixels = (size_t)output->width * output->height;
+    const size_t pixels = (size_t)output->width * output->row_count;
 
     if (output->imported)
         return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
-    if (output->channels == image_channels(output)) {
-        memcpy(output->memory, from, row_size(output) * output->height);
+    if (output->channels == vkb_formats[output->format].channels) {
+        memcpy(output->memory, from, row_size(output) * output->row_count);
         return;
     }
     switch (vkb_formats[output->format].channel_size) {

@@ -3,7 +3,6 @@
 #ifndef VKB_READBACK_H
 #define VKB_READBACK_H
 
-#include "graph/graph.h"
 #include "run/pages.h"
 
 // From so many bytes on the device writes to the caller's memory itself. On lavapipe 22.3.6 (two
@@ -16,13 +15,13 @@ enum { VKB_IMPORTED_BYTES = 1 << 20 };
 // of each pixel.
 struct vkb_output {
     uint32_t channels;
+    uint32_t first_row, row_count;  // of the image
     void *memory;
     struct vkb_page_run
         *pages;  // that the memory is in; NULL: none of the renderer's, or too little
     // What vkb_readback_plan decides.
     enum vkb_format format;
-    uint32_t width, height;
-    bool packed;          // the image is
+    uint32_t width;
     VkBuffer imported;    // the caller's memory as a buffer; VK_NULL_HANDLE: through the staging
     VkDeviceSize offset;  // in either
     // Decided while its passes are recorded: the last of them stores to the imported memory, so
@@ -39,12 +38,13 @@ struct vkb_readback {
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback);
 
-// Decides how the output, an image of that row, comes back.
+// Decides how the output, rows of an image of that format and width, comes back.
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       const struct vkb_image_row *row, struct vkb_output *output,
+                       enum vkb_format format, uint32_t width, struct vkb_output *output,
                        struct vkb_error *error);
-// Whether a pass can store words to the output's memory.
-bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output);
+// Whether a pass can store words to the output's memory, all rows of an image of that height.
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,
+                              uint32_t height);
 // After all of them: makes room for what goes through the staging memory.
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error);

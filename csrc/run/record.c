@@ -215,7 +215,8 @@ static struct vkb_output *find_stored(const struct vkb_run *run, const struct vk
             return NULL;
     for (uint32_t i = 0; i < plan->output_count; ++i)
         if (plan->outputs[i] == image
-            && vkb_readback_takes_words(run->device, &run->request->outputs[i]))
+            && vkb_readback_takes_words(run->device, &run->request->outputs[i],
+                                        run->graph->images[image].height))
             return &run->request->outputs[i];
     return NULL;
 }
@@ -252,7 +253,7 @@ static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
     const VkDeviceSize start = output ? output->offset : 0;
     struct band band = {
         .buffer.buffer = output ? output->imported : image->buffer,
-        .row_pitch = output ? image->width * vkb_image_pixel_size(image) : image->row_pitch,
+        .row_pitch = output ? image->width * vkb_pixel_size(image->format) : image->row_pitch,
     };
     const struct binding binding = {.pass = pass, .params = params, .band = &band};
     const uint32_t rows = band_rows(run->device, pass, band.row_pitch);

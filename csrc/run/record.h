@@ -10,11 +10,12 @@ struct vkb_run {
     struct vkb_frame *frame;
     struct vkb_submission *submission;
     struct vkb_request *request;
-    const struct vkb_graph *graph;                     // the request's
-    struct vkb_cached_image **images;                  // by the graph's image index
-    struct vkb_content **contents;                     // of the cache
-    struct vkb_cached_image *inputs[VKB_INPUT_COUNT];  // by kind; NULL: none
-    bool send_input[VKB_INPUT_COUNT];                  // the device does not have it yet
+    const struct vkb_graph *graph;                      // the request's
+    struct vkb_cached_image **images;                   // by the graph's image index
+    struct vkb_content **contents;                      // of the cache
+    struct vkb_cached_image *inputs[VKB_INPUT_COUNT];   // by kind; NULL: none
+    const struct vkb_upload *uploads[VKB_INPUT_COUNT];  // that their pixels come from
+    bool send_input[VKB_INPUT_COUNT];                   // the device does not have it yet
 };
 
 // The most descriptor sets that the graph's passes take, without those of surfaces.

@@ -37,16 +37,23 @@ static inline void pack_rgb(unsigned char *to, const unsigned char *from, uint32
     memcpy(to + 3 * size, one, size);
 }
 
-static inline void pack_strided(unsigned char *to, uint32_t to_channels, const unsigned char *from,
+static inline void pack_strided(unsigned char *to, const unsigned char *from,
                                 const struct vkb_input *input, const void *one, size_t size)
 {
-    for (uint32_t x = 0; x < input->width;
-         ++x, to += to_channels * size, from += input->pixel_stride) {
+    const size_t pixel_size = vkb_pixel_size(input->format);
+
+    for (uint32_t x = 0; x < input->width; ++x, to += pixel_size, from += input->pixel_stride) {
         for (uint32_t channel = 0; channel < input->channels; ++channel)
             memcpy(to + channel * size, from + channel * input->channel_stride, size);
-        if (to_channels > input->channels)
+        if (input->channels == 3)
             memcpy(to + 3 * size, one, size);
     }
+}
+
+// Whether the input has all channels of its format, which RGB has not.
+static bool is_complete(const struct vkb_input *input)
+{
+    return input->channels == vkb_formats[input->format].channels;
 }
 
 static bool is_contiguous(const struct vkb_input *input)
@@ -61,34 +68,28 @@ static const unsigned char *input_row(const struct vkb_input *input, uint32_t y)
     return (const unsigned char *)input->memory + y * input->row_stride;
 }
 
-// A row of pixels of `channels` channels, which are those of the input and an alpha, if that has
-// none.
-static inline void pack_pixels(unsigned char *to, uint32_t channels, const struct vkb_input *input,
-                               uint32_t y, size_t size)
+static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t y)
 {
     const unsigned char *from = input_row(input, y);
     const void *one = channel_one(input->format);
+    const bool contiguous = is_contiguous(input);
 
-    if (!is_contiguous(input))
-        pack_strided(to, channels, from, input, one, size);
-    else if (input->channels == channels)
-        memcpy(to, from, input->width * channels * size);
-    else
-        pack_rgb(to, from, input->width, one, size);
-}
-
-static void pack_row(unsigned char *to, uint32_t channels, const struct vkb_input *input,
-                     uint32_t y)
-{
+    if (contiguous && is_complete(input)) {
+        memcpy(to, from, (size_t)input->width * vkb_pixel_size(input->format));
+        return;
+    }
     switch (vkb_formats[input->format].channel_size) {
     case 1:
-        pack_pixels(to, channels, input, y, 1);
+        contiguous ? pack_rgb(to, from, input->width, one, 1)
+                   : pack_strided(to, from, input, one, 1);
         break;
     case 2:
-        pack_pixels(to, channels, input, y, 2);
+        contiguous ? pack_rgb(to, from, input->width, one, 2)
+                   : pack_strided(to, from, input, one, 2);
         break;
     default:
-        pack_pixels(to, channels, input, y, 4);
+        contiguous ? pack_rgb(to, from, input->width, one, 4)
+                   : pack_strided(to, from, input, one, 4);
         break;
     }
 }
@@ -98,18 +99,13 @@ static unsigned char *kept_row(const struct vkb_upload *upload, uint32_t y)
     return upload->pixels + y * upload->row_pitch;
 }
 
-static size_t row_size(const struct vkb_upload *upload)
-{
-    return (size_t)upload->width * upload->kept_channels * vkb_formats[upload->format].channel_size;
-}
-
 static bool row_differs(const struct vkb_upload *upload, const struct vkb_input *input, uint32_t y)
 {
-    const size_t size = row_size(upload);
+    const size_t size = (size_t)input->width * vkb_pixel_size(input->format);
 
-    if (input->channels == upload->kept_channels && is_contiguous(input))
+    if (is_complete(input) && is_contiguous(input))
         return memcmp(kept_row(upload, y), input_row(input, y), size) != 0;
-    pack_row(upload->packed, upload->kept_channels, input, y);
+    pack_row(upload->packed, input, y);
     return memcmp(kept_row(upload, y), upload->packed, size) != 0;
 }
 
@@ -140,7 +136,7 @@ static struct vkb_specials count_singles(const uint32_t *bits, size_t count)
 
 static struct vkb_specials count_row(const struct vkb_upload *upload, uint32_t y)
 {
-    const size_t count = (size_t)upload->width * upload->kept_channels;
+    const size_t count = (size_t)upload->width * vkb_formats[upload->format].channels;
     const void *row = kept_row(upload, y);
     struct vkb_specials sum = {0};
 
@@ -161,50 +157,67 @@ void vkb_upload_forget(struct vkb_upload *upload)
     upload->format = VKB_FORMAT_NONE;
 }
 
-static uint32_t kept_channels(const struct vkb_image *image)
-{
-    return image->packed ? 3 : vkb_formats[image->format].channels;
-}
-
-static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *input,
-                       const struct vkb_image *image)
+static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *input)
 {
     return upload->format == input->format && upload->width == input->width
-        && upload->height == input->height && upload->channels == input->channels
-        && upload->kept_channels == kept_channels(image);
+        && upload->height == input->height && upload->channels == input->channels;
 }
 
 // Memory for an image of another kind than the last.
-static bool prepare(const struct vkb_device *device, struct vkb_upload *upload,
-                    const struct vkb_input *input, const struct vkb_image *image,
-                    struct vkb_error *error)
+bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
+                      const struct vkb_input *input, const struct vkb_image *image,
+                      struct vkb_error *error)
 {
-    const size_t size = input->width * vkb_image_pixel_size(image);
+    const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
 
     vkb_upload_forget(upload);
     if (!vkb_grow(error, &upload->rows, &upload->row_capacity, input->height, sizeof *upload->rows)
-        || !vkb_grow(error, &upload->packed, &upload->packed_capacity, size, 1))
+        || !vkb_grow(error, &upload->packed, &upload->packed_capacity, row_size, 1))
         return false;
     // Cached memory: it is compared with the next image.
     if (!image->mapped
         && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                               size * input->height, &upload->staging, error))
+                               row_size * input->height, &upload->staging, error))
         return false;
+    memset(upload->rows, 0, input->height * sizeof *upload->rows);
+    upload->specials = (struct vkb_specials){0};
     upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
-    upload->row_pitch = image->mapped ? image->row_pitch : size;
+    upload->row_pitch = image->mapped ? image->row_pitch : row_size;
     upload->format = input->format;
     upload->width = input->width;
     upload->height = input->height;
     upload->channels = input->channels;
-    upload->kept_channels = kept_channels(image);
     return true;
+}
+
+// Rows `from` to the last of the input, which is the image's from row `first` on.
+static void pack_rows(struct vkb_upload *upload, const struct vkb_input *input, uint32_t from,
+                      uint32_t first)
+{
+    for (uint32_t y = from; y < input->height; ++y) {
+        pack_row(kept_row(upload, first + y), input, y);
+        upload->rows[first + y] = count_row(upload, first + y);
+    }
+    upload->specials = (struct vkb_specials){0};
+    for (uint32_t y = 0; y < upload->height; ++y) {
+        upload->specials.nan += upload->rows[y].nan;
+        upload->specials.inf += upload->rows[y].inf;
+    }
+}
+
+bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
+                     const struct vkb_input *input, uint32_t first, struct vkb_error *error)
+{
+    pack_rows(upload, input, 0, first);
+    return upload->pixels != upload->staging.mapped
+        || vkb_buffer_flush(device, &upload->staging, error);
 }
 
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       struct vkb_submissions *submissions, const struct vkb_input *input,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error)
 {
-    const bool fresh = !holds_such(upload, input, image);
+    const bool fresh = !holds_such(upload, input);
     uint32_t first = 0;
 
     while (!fresh && first < input->height && !row_differs(upload, input, first))
@@ -213,17 +226,9 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     if (!*changed)
         return true;
     if (!vkb_submissions_wait(device, submissions, error)
-        || (fresh && !prepare(device, upload, input, image, error)))
+        || (fresh && !vkb_upload_begin(device, upload, input, image, error)))
         return false;
-    for (uint32_t y = first; y < input->height; ++y) {
-        pack_row(kept_row(upload, y), upload->kept_channels, input, y);
-        upload->rows[y] = count_row(upload, y);
-    }
-    upload->specials = (struct vkb_specials){0};
-    for (uint32_t y = 0; y < input->height; ++y) {
-        upload->specials.nan += upload->rows[y].nan;
-        upload->specials.inf += upload->rows[y].inf;
-    }
+    pack_rows(upload, input, first, 0);
     return image->mapped || vkb_buffer_flush(device, &upload->staging, error);
 }
 

@@ -25,7 +25,6 @@ struct vkb_upload {
     size_t row_pitch;
     enum vkb_format format;  // of what it holds; NONE: nothing
     uint32_t width, height, channels;
-    uint32_t kept_channels;        // 3 of a packed image, else the format's
     struct vkb_specials *rows;     // in each row of what it holds
     struct vkb_specials specials;  // in all
     unsigned char *packed;         // one row, to be compared
@@ -37,13 +36,21 @@ void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *uplo
 // What it holds is not compared with the next image.
 void vkb_upload_forget(struct vkb_upload *upload);
 
-// Packs the image to its format, alpha 1 where it has none, or to RGB, if `image` is packed;
-// *changed: it is another one than the last. The submissions may still read the last one: they are
-// waited for before it is written over. `image` is where the device will read it; if that is
-// mapped, it has it now, else vkb_upload_record brings it there.
+// Packs the image to its format, alpha 1 where it has none; *changed: it is another one than the
+// last. The submissions may still read the last one: they are waited for before it is written over.
+// `image` is where the device will read it; if that is mapped, it has it now, else
+// vkb_upload_record brings it there.
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       struct vkb_submissions *submissions, const struct vkb_input *input,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error);
+
+// The same in steps, for an image that nothing compares: memory for an image of the input's kind,
+// whatever its pixels; then rows of it, from `first` on.
+bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
+                      const struct vkb_input *input, const struct vkb_image *image,
+                      struct vkb_error *error);
+bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
+                     const struct vkb_input *input, uint32_t first, struct vkb_error *error);
 
 // Records the copy of what is staged to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,

@@ -229,38 +229,6 @@ static bool add_variant(const struct vkb_variant_choice *choice, const struct vk
     return vkb_graph_add_pass(choice->graph, pass, error);
 }
 
-static bool touches(const struct vkb_pass_row *pass, const struct vkb_image_row *row,
-                    const struct vkb_graph *graph)
-{
-    const uint32_t image = (uint32_t)(row - graph->images);
-
-    return row->channels == 3 && (vkb_pass_reads(pass, image) || vkb_pass_writes(pass, image));
-}
-
-static bool touches_any(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
-{
-    bool found = false;
-
-    for (uint32_t i = 0; i < graph->image_count; ++i)
-        found = found || touches(pass, &graph->images[i], graph);
-    return found;
-}
-
-// Packs the images of three channels, if every pass that accesses one has a shader for that.
-static void pack_images(struct vkb_graph *graph)
-{
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (touches_any(graph, &graph->passes[i])
-            && (graph->passes[i].reading != VKB_READING_WORDS
-                || vkb_spirv[graph->passes[i].shader].packed == graph->passes[i].shader))
-            return;
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (touches_any(graph, &graph->passes[i]))
-            graph->passes[i].shader = vkb_spirv[graph->passes[i].shader].packed;
-    for (uint32_t i = 0; i < graph->image_count; ++i)
-        graph->images[i].packed = graph->images[i].channels == 3;
-}
-
 bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *device,
                          struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -284,6 +252,5 @@ bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *de
         done = add_variant(&choice, &choice.plain.passes[i], error);
     }
     vkb_free(choice.plain.passes);
-    pack_images(graph);
     return done;
 }

@@ -267,13 +267,6 @@ static size_t round_up(size_t size, size_t step)
     return (size + step - 1) / step * step;
 }
 
-size_t vkb_image_pixel_size(const struct vkb_image *image)
-{
-    const struct vkb_format_info *format = &vkb_formats[image->format];
-
-    return (size_t)format->channel_size * (image->packed ? 3 : format->channels);
-}
-
 size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width)
 {
     // No driver aligns rows to more than that.
@@ -292,15 +285,12 @@ bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format forma
 static bool create_buffer(const struct vkb_device *device, struct vkb_image *image,
                           VkMemoryRequirements *requirements, struct vkb_error *error)
 {
-    VkSubresourceLayout layout = {
-        .rowPitch = round_up(image->width * vkb_image_pixel_size(image), VKB_WORD_SIZE),
-    };
+    VkSubresourceLayout layout;
     VkMemoryRequirements own;
 
-    if (!image->packed)
-        device->vk.vkGetImageSubresourceLayout(
-            device->handle, image->handle,
-            &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
+    device->vk.vkGetImageSubresourceLayout(
+        device->handle, image->handle,
+        &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
     image->row_pitch = (size_t)layout.rowPitch;
     if (!VK(error, device->vk.vkCreateBuffer(device->handle,
                                              &(VkBufferCreateInfo){
@@ -342,7 +332,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                       struct vkb_image *image, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
-    VkMemoryRequirements requirements = {.memoryTypeBits = UINT32_MAX};
+    VkMemoryRequirements requirements;
     VkMemoryPropertyFlags flags;
 
     *image = (struct vkb_image){
@@ -351,20 +341,16 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .height = spec->height,
         .layers = spec->layers,
         .levels = spec->levels,
-        .packed = spec->packed,
     };
-    if (!spec->packed) {
-        if (!create_handle(device, spec, image, error))
-            return false;
-        vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
-    }
+    if (!create_handle(device, spec, image, error))
+        return false;
+    vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
     if ((spec->mapped && !create_buffer(device, image, &requirements, error))
         || !allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE, &requirements,
                      &image->memory, &flags, error)
-        || (image->handle
-            && !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0)))
+        || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
-        || (image->handle && !create_view(device, image, error))) {
+        || !create_view(device, image, error)) {
         vkb_image_destroy(device, image);
         return false;
     }
@@ -399,8 +385,7 @@ void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer comma
     };
 
     // A mapped image is accessed as a buffer, too, whose writes only a memory barrier covers.
-    vkb_barrier_record(device, commands,
-                       barrier.oldLayout != barrier.newLayout && image->handle ? &barrier : NULL,
+    vkb_barrier_record(device, commands, barrier.oldLayout != barrier.newLayout ? &barrier : NULL,
                        image->mapped, image->access, access);
     image->access = access;
 }

@@ -32,16 +32,15 @@ struct vkb_image {
     // The mapped pixels as a buffer, and as words if they are few enough for a view.
     VkBuffer buffer;
     VkBufferView words;
-    bool packed;  // three channels without gaps: there is no handle and no view
 };
 
 // Six layers make a cubemap. A mapped image has one layer and one level, and is a buffer, too;
-// device->words is required. A packed image is mapped.
+// device->words is required.
 struct vkb_image_spec {
     enum vkb_format format;
     uint32_t width, height, layers, levels;
     VkImageUsageFlags usage;
-    bool mapped, packed;
+    bool mapped;
 };
 
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.
@@ -70,9 +69,6 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
-
-// Bytes of a pixel in the image's memory.
-size_t vkb_image_pixel_size(const struct vkb_image *image);
 
 // An upper bound of the bytes from a row of a mapped image to the next.
 size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width);

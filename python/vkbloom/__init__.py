@@ -32,6 +32,7 @@ from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
+from vkbloom.image import Image
 from vkbloom.plans import Pass, Plan
 from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
@@ -86,6 +87,7 @@ __all__ = [
     "GodotBloom",
     "GridReport",
     "HdrpBloom",
+    "Image",
     "KinoBloom",
     "OutOfMemoryError",
     "Pass",

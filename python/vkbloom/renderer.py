@@ -6,17 +6,18 @@ import contextlib
 import math
 import os
 from collections import abc
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast
 
 import numpy as np
 
 from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, bundled_hash, from_core
-from vkbloom.checks import check_attachments, check_image, check_size
+from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
+from vkbloom.image import Image
 from vkbloom.plans import Pass, Plan, framebuffers
 from vkbloom.settings import Settings, Shading, check_settings
-from vkbloom.sources import image_source, scene_source
+from vkbloom.sources import image_kind, image_source, is_image, scene_source
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
@@ -82,6 +83,28 @@ def _arrays_for(
         given[name] if name in given else requests.new_array(core, shape, dtype)
         for name, shape, dtype in plan.outputs
     )
+
+
+def _paired(
+    images: Iterable[NDArray[Any] | Image], settings: Settings | Sequence[Settings]
+) -> Iterator[requests.Work]:
+    """Yield each image with its settings; what is wrong comes in its turn."""
+    count = 0
+    for image in images:
+        if isinstance(settings, Settings):
+            one = settings
+        elif count < len(settings):
+            one = settings[count]
+        else:
+            raise ValueError(f"settings: {len(settings)} are fewer than the images")
+        work = requests.Work(image_source(image), one)
+        # The array is the caller's again while the next is asked for.
+        del image
+        yield work
+        del work
+        count += 1
+    if not isinstance(settings, Settings) and count < len(settings):
+        raise ValueError(f"settings: {len(settings)} are more than the {count} images")
 
 
 class Renderer:
@@ -286,7 +309,7 @@ class Renderer:
 
     def apply(
         self,
-        image: NDArray[Any],
+        image: NDArray[Any] | Image,
         settings: Settings | None = None,
         *,
         mask: NDArray[Any] | None = None,
@@ -298,11 +321,12 @@ class Renderer:
 
         Parameters
         ----------
-        image : ndarray, shape (H, W, 3) or (H, W, 4)
+        image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
             Linear light: uint8 (read as value / 255), float16 or float32; any strides. The levels
             of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; what
             becomes of an alpha is the field `alpha` of the settings. NaN and infinity count as 0 in
-            the bloom and stay where they are in ``final``.
+            the bloom and stay where they are in ``final``. An `Image` of `upload` is used as it is,
+            with its mask and emission.
         settings : Settings, optional
             By default ``Separable()``.
         mask : ndarray, shape (H, W), optional
@@ -363,7 +387,7 @@ class Renderer:
 
     def apply_many(
         self,
-        image: NDArray[Any],
+        image: NDArray[Any] | Image,
         settings_seq: Iterable[Settings],
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
@@ -373,7 +397,7 @@ class Renderer:
         Parameters
         ----------
         image
-            As for `apply`; it must not change before the last frame is taken.
+            As for `apply`; an array must not change before the last frame is taken.
         settings_seq : iterable of Settings
         attachments
             As for `apply`.
@@ -392,6 +416,132 @@ class Renderer:
         """
         names = check_attachments(attachments)
         return self._run_many(image_source(image), settings_seq, names)
+
+    def apply_each(
+        self,
+        images: Iterable[NDArray[Any] | Image],
+        settings: Settings | Sequence[Settings] | None = None,
+        *,
+        attachments: Literal["all"] | str | Sequence[str] = "all",
+    ) -> Iterator[Frames]:
+        """Give one image after the other bloom.
+
+        Parameters
+        ----------
+        images : iterable of images
+            Each as for `apply`; shapes and dtypes may change from one to the next. Each is copied
+            before the next is asked for, so that one array can be filled again and again.
+        settings : Settings or sequence of Settings, optional
+            For all images, or one for each of them; by default ``Separable()``.
+        attachments
+            As for `apply`.
+
+        Yields
+        ------
+        Frames
+            One for each image, in their order.
+
+        Raises
+        ------
+        ValueError
+            At the call: the lengths of both sequences differ, or an argument is out of range. At
+            the turn of an image: it is one that `apply` refuses, or there is no settings for it.
+        TypeError
+            `images` is not iterable, or an argument has another type.
+
+        See Also
+        --------
+        apply_many : One image with one settings after the other.
+        upload : Keeps an image on the device.
+
+        Notes
+        -----
+        The device works on the next images while a frame is used: after the first frame, at most
+        two images are taken ahead of the frame that is given. What goes wrong with an image, or
+        with the iterable, is raised in its turn, after the frames before it, and is the end.
+
+        Examples
+        --------
+        >>> images = (np.full((16, 24, 3), level, np.float32) for level in (0.25, 0.5, 1.0))
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     for frames in renderer.apply_each(images, vkbloom.Pyramid(levels=2)):
+        ...         print(frames["final"].max())
+        0.5
+        1.0
+        2.0
+        """
+        names = check_attachments(attachments)
+        if not isinstance(images, abc.Iterable) or isinstance(images, str | bytes | np.ndarray):
+            raise TypeError(
+                f"images: several images are needed, not {type(images).__name__}; of one image "
+                "make a list, or call apply"
+            )
+        if settings is not None and not isinstance(settings, Settings):
+            if not isinstance(settings, abc.Sequence):
+                raise TypeError(f"settings: {settings!r} is not Settings, or a sequence of them")
+            settings = [check_settings(one) for one in settings]
+            if isinstance(images, abc.Sized) and len(images) != len(settings):
+                raise ValueError(
+                    f"settings: {len(settings)} are not as many as the {len(images)} images"
+                )
+        if self.closed:
+            raise ValueError("the renderer is closed")
+        work = requests.uploaded(self._core, _paired(images, settings or check_settings(None)))
+        results = requests.run(work, self._core, names, alone=True)
+        return (self._frames(one, result) for one, result in results)
+
+    def upload(
+        self,
+        image: NDArray[Any],
+        *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> Image:
+        """Copy an image to the device, where it stays for many calls.
+
+        Parameters
+        ----------
+        image : ndarray
+            As for `apply`. It may change as soon as this returns.
+        mask, emission : ndarray, optional
+            As for `apply`. They stay with the image.
+
+        Returns
+        -------
+        Image
+            Accepted by this renderer wherever an image is. Calls with it compare no bytes.
+
+        Raises
+        ------
+        ValueError
+            The image has another shape, or more pixels than the adapter allows, the mask or the
+            emission do not fit it; or the renderer is closed.
+        TypeError
+            The image has another dtype.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed. After any but a lost device the renderer can be used again.
+
+        See Also
+        --------
+        apply_each : One image after the other, copied while the device works on others.
+
+        Examples
+        --------
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     image = renderer.upload(np.full((90, 160, 4), 0.5, np.float32))
+        ...     dark, bright = (
+        ...         renderer.apply(image, vkbloom.Separable(exposure=exposure))["final"]
+        ...         for exposure in (-1.0, 1.0)
+        ...     )
+        >>> bool((dark < bright).all(axis=(0, 1))[:3].all())
+        True
+        """
+        if isinstance(image, Image):
+            raise TypeError("image: it was uploaded already")
+        shape, dtype = image_kind(image)
+        height, width, channels = shape
+        source = self._core.upload(image_source(image, mask, emission), None, False)
+        return Image(source, (height, width, channels), dtype)
 
     def render_many(
         self,
@@ -426,7 +576,7 @@ class Renderer:
 
     def plan(
         self,
-        source: Scene | NDArray[Any],
+        source: Scene | NDArray[Any] | Image,
         settings: Settings | None = None,
         size: tuple[int, int] | None = None,
         *,
@@ -437,7 +587,7 @@ class Renderer:
 
         Parameters
         ----------
-        source : Scene or ndarray
+        source : Scene or an image
             As for `render` and `apply`.
         settings : Settings, optional
             By default ``Separable()``.
@@ -485,17 +635,16 @@ class Renderer:
         names = check_attachments(attachments)
         kind: str = shading
         dtype = channels = None
-        if isinstance(source, np.ndarray):
+        if is_image(source):
             for name, is_given in (("size", size is not None), ("shading", shading != "forward")):
                 if is_given:
                     raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            image = check_image(source)
-            kind, dtype = "image", image.dtype
-            height, width, channels = image.shape
-            planned = image_source(image)
+            kind, (shape, dtype) = "image", image_kind(source)
+            height, width, channels = shape
+            planned = image_source(source)
         else:
             width, height = check_size("size", _SCENE_SIZE if size is None else size)
-            planned = scene_source(source, (width, height), shading, 0.0)
+            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0)
         plan = self._core.plan(planned, settings, names)
         outputs = framebuffers(plan)
         passes = tuple(Pass(*row[:-1]) for row in plan.passes)
@@ -505,7 +654,11 @@ class Renderer:
 
     def grid(
         self,
-        source: Scene | NDArray[Any] | Sequence[NDArray[Any]] | Mapping[str, NDArray[Any]],
+        source: Scene
+        | NDArray[Any]
+        | Image
+        | Sequence[NDArray[Any] | Image]
+        | Mapping[str, NDArray[Any] | Image],
         settings: Settings | None = None,
         axes: Mapping[str, Iterable[Any]] | None = None,
         *,
@@ -520,19 +673,22 @@ class Renderer:
 
         Parameters
         ----------
-        source : Scene, ndarray, or list or mapping of ndarray
+        source : Scene, image, or list or mapping of images
             Several images add the dimension "image" before all others; a mapping's keys label
             them. They must have one shape and dtype.
         settings : Settings, optional
             What the axes vary; by default ``Separable()``.
         axes : mapping of str to sequence
-            Values by settings field, or by "time" for a scene.
+            Values by settings field, or by "time" for a scene. "preset" has names of
+            `vkbloom.presets`, or "settings" a list of Settings, of any methods: these two exclude
+            each other and the argument `settings`, and the other axes change each of them.
         size : (int, int), optional
             Width and height of a scene's frames, by default (1280, 720).
         shading, time
             Of a scene, as for `render`.
         attachments : "all" or sequence of str
-            The framebuffers to keep. Their shape and dtype must be the same at all points.
+            The framebuffers to keep. Their shape must be the same at all points, and all are of
+            uint8 or all of floats, which become the largest of their dtypes.
         reduce : mapping of str to callable, optional
             Figures to keep, by name: each is called with the `Frames` of a point, and returns a
             number or a small array. `vkbloom.reductions` has ready ones. With ``attachments=()``
@@ -554,7 +710,9 @@ class Renderer:
         ------
         ValueError
             An argument is out of range; or, before anything is rendered, a framebuffer has
-            different shapes along an axis.
+            different shapes along an axis, or some point lacks it.
+        MemoryError
+            The result is larger than the memory that is left; nothing was rendered.
         TypeError
             An argument has the wrong type.
         ModuleNotFoundError
@@ -566,6 +724,19 @@ class Renderer:
         -----
         Points are visited in the order that runs the fewest passes, whatever the order of the
         axes. For grids that outgrow memory see `vkbloom.grid_to_zarr`.
+
+        Examples
+        --------
+        >>> image = np.zeros((32, 48, 3), np.float32)
+        >>> image[16, 24] = 50
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     grid = renderer.grid(
+        ...         image, axes={"preset": ["kino", "filament"], "intensity": [0.5, 1.0]}
+        ...     )
+        >>> dict(grid.sizes)
+        {'preset': 2, 'intensity': 2, 'y': 32, 'x': 48, 'channel': 3}
+        >>> grid["final"].sel(preset="kino", intensity=0.5).shape
+        (32, 48, 3)
         """
         from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
         from vkbloom.grid.plan import ask  # noqa: PLC0415
@@ -602,8 +773,14 @@ class Renderer:
         # No generator itself: the arguments are checked at the call, not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
-        checked = map(check_settings, settings_seq)
-        results = requests.run(checked, self._core, source, names)
+        return self._run_work(
+            (requests.Work(source, check_settings(one)) for one in settings_seq), names
+        )
+
+    def _run_work(
+        self, sequence: Iterable[requests.Work], names: tuple[str, ...] | None
+    ) -> Iterator[Frames]:
+        results = requests.run(sequence, self._core, names)
         return (self._frames(settings, result) for settings, result in results)
 
     def _frames(self, settings: Settings, result: requests.Result) -> Frames:

@@ -1,4 +1,4 @@
-"""Many settings over one source: several go to the device at once, while it has others to run."""
+"""Many requests in their order: several go to the device at once, while it has others to run."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from vkbloom.settings import Settings
 
-__all__ = ["Result", "new_array", "new_arrays", "run", "run_one"]
+__all__ = ["Result", "Work", "new_array", "new_arrays", "run", "run_one", "uploaded"]
 
 #: Requests in one submission at most.
 REQUESTS = 32
@@ -29,6 +29,8 @@ BYTES = 64 << 20
 SECONDS = 0.25
 #: Submissions that the device has while the frames of another are taken.
 AHEAD = 2
+#: The same where each request has an image of its own: the next is copied while the device works.
+IMAGES_AHEAD = 3
 
 #: Arrays of so many bytes and more are in a renderer's pages, where the device writes them itself.
 #: NumPy keeps some of the memory of smaller ones for the next.
@@ -99,12 +101,49 @@ def run_one(
     return Result(_named(plan, arrays), timings, counts)
 
 
+def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
+    """Copy each image to the device before the next is asked for.
+
+    Images of arrays take the device's memory of those before, whose submissions are over by then.
+
+    Parameters
+    ----------
+    core : Renderer of the core
+    sequence : iterable of Work
+        Of images; one that is on the device stays as it is.
+    """
+    kept: deque[_core.Source] = deque()
+    for work in sequence:
+        if work.source.resident:
+            yield work
+            continue
+        spare = kept.popleft() if len(kept) == IMAGES_AHEAD else None
+        kept.append(core.upload(work.source, spare, True))
+        settings = work.settings
+        # The array is the caller's again while the next is asked for.
+        del work
+        yield Work(kept[-1], settings)
+
+
 def _named(plan: _core.Plan, arrays: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:
     return {name: array for (name, _, _), array in zip(plan.outputs, arrays, strict=True)}
 
 
-class _Request(NamedTuple):
+class Work(NamedTuple):
+    """What a request is made of.
+
+    Attributes
+    ----------
+    source : Source of the core
+    settings : Settings
+    """
+
+    source: _core.Source
     settings: Settings
+
+
+class _Request(NamedTuple):
+    work: Work
     plan: _core.Plan
     arrays: tuple[NDArray[Any], ...]
 
@@ -112,7 +151,7 @@ class _Request(NamedTuple):
 def _taken(
     request: _Request, timings: dict[str, float], counts: tuple[int, int]
 ) -> tuple[Settings, Result]:
-    return request.settings, Result(_named(request.plan, request.arrays), timings, counts)
+    return request.work.settings, Result(_named(request.plan, request.arrays), timings, counts)
 
 
 class _Submitted(NamedTuple):
@@ -122,7 +161,15 @@ class _Submitted(NamedTuple):
 
 
 class _Requests:
-    """A sequence of settings, put into submissions in its order.
+    """A sequence of work, put into submissions in its order.
+
+    Parameters
+    ----------
+    sequence : iterable of Work
+    core : Renderer of the core
+    names : tuple of str or None
+    most : int
+        Requests in one submission at most.
 
     Attributes
     ----------
@@ -132,36 +179,36 @@ class _Requests:
 
     def __init__(
         self,
-        settings_seq: Iterable[Settings],
+        sequence: Iterable[Work],
         core: _core.Renderer,
-        source: _core.Source,
         names: tuple[str, ...] | None,
+        most: int,
     ) -> None:
-        self._sequence = iter(settings_seq)
+        self._sequence = iter(sequence)
         self._core = core
-        self._source = source
         self._names = names
-        self._waiting: deque[Settings] = deque()  # taken from the sequence, and not submitted
+        self._ever = most
+        self._waiting: deque[Work] = deque()  # taken from the sequence, and not submitted
         self._alone = 0  # how many of those go one by one
         self._limit = 1
-        self._most = REQUESTS  # in SECONDS, as far as is known
+        self._most = most  # in SECONDS, as far as is known
         self._ended = False
         self.failure: Exception | None = None
 
     def submit(self) -> _Submitted | None:
-        """Hand the next settings to the device; None: there are none, or the next one failed."""
+        """Hand the next work to the device; None: there are none, or the next one failed."""
         while requests := self._take():
             plans = tuple(request.plan for request in requests)
             try:
                 submission = self._core.run(
-                    self._source, plans, tuple(request.arrays for request in requests)
+                    requests[0].work.source, plans, tuple(one.arrays for one in requests)
                 )
             except Exception as error:
                 if not self._blames_one(error, requests):
                     self._fail(error)
                     return None
                 # Those before it still come, and the error in its turn.
-                self._waiting.extendleft(request.settings for request in reversed(requests))
+                self._waiting.extendleft(request.work for request in reversed(requests))
                 self._alone = len(requests)
             else:
                 self._alone = max(0, self._alone - 1)
@@ -172,8 +219,9 @@ class _Requests:
         return None
 
     def took(self, seconds: float, count: int) -> None:
-        """Learn from a submission of so many settings, which took no longer than that."""
-        self._most = max(1, int(SECONDS * count / max(seconds, SECONDS / REQUESTS)))
+        """Learn from a submission of so many requests, which took no longer than that."""
+        fit = int(SECONDS * count / max(seconds, SECONDS / REQUESTS))
+        self._most = min(max(1, fit), self._ever)
 
     def _take(self) -> list[_Request]:
         """Return the requests of the next submission."""
@@ -183,23 +231,25 @@ class _Requests:
         while len(requests) < limit:
             if requests and size + size // len(requests) > BYTES:
                 break
-            settings = self._next()
-            if settings is None:
+            work = self._next()
+            if work is None:
                 break
             try:
-                plan = self._core.plan(self._source, settings, self._names)
-                # Those with other images need another submission.
-                if requests and not plan.shares_images(requests[0].plan):
-                    self._waiting.appendleft(settings)
+                plan = self._core.plan(work.source, work.settings, self._names)
+                # Those with another source or other images need another submission.
+                if requests and not (
+                    work.source is requests[0].work.source and plan.shares_images(requests[0].plan)
+                ):
+                    self._waiting.appendleft(work)
                     break
-                requests.append(_Request(settings, plan, new_arrays(self._core, plan)))
+                requests.append(_Request(work, plan, new_arrays(self._core, plan)))
             except Exception as error:
                 self._fail(error)
                 break
             size += plan.size
         return requests
 
-    def _next(self) -> Settings | None:
+    def _next(self) -> Work | None:
         if self._waiting:
             return self._waiting.popleft()
         if self._ended:
@@ -219,7 +269,7 @@ class _Requests:
 
     @staticmethod
     def _blames_one(error: Exception, requests: list[_Request]) -> bool:
-        """Whether one of several settings is to blame, so that the others may do alone."""
+        """Whether one of several requests is to blame, so that the others may do alone."""
         general = _core.ValidationError, _core.DeviceLostError
         return (
             len(requests) > 1 and isinstance(error, _core.Error) and not isinstance(error, general)
@@ -227,30 +277,32 @@ class _Requests:
 
 
 def run(
-    settings_seq: Iterable[Settings],
+    sequence: Iterable[Work],
     core: _core.Renderer,
-    source: _core.Source,
     names: tuple[str, ...] | None,
+    *,
+    alone: bool = False,
 ) -> Iterator[tuple[Settings, Result]]:
-    """Yield the result of each of the settings, in their order.
+    """Yield the result of each request, in their order.
 
-    Settings are taken ahead of the results, so that the device has work while results are used:
-    none ahead of the first result, then as many as make `AHEAD` submissions.
+    Work is taken ahead of the results, so that the device has some while results are used: none
+    ahead of the first result, then as much as makes `AHEAD` submissions.
 
     Parameters
     ----------
-    settings_seq : iterable of Settings
+    sequence : iterable of Work
     core : Renderer of the core
-    source : Source of the core
     names : tuple of str or None
         The framebuffers wanted; None: all.
+    alone : bool
+        Each request is a submission: less than `IMAGES_AHEAD` requests are taken ahead.
 
     Raises
     ------
     Exception
         What a request or the sequence raises, after the results before it.
     """
-    waiting = _Requests(settings_seq, core, source, names)
+    waiting = _Requests(sequence, core, names, 1 if alone else REQUESTS)
     submitted: deque[_Submitted] = deque()
     ahead = 1
     before = 0.0  # when the last submission was over
@@ -272,7 +324,7 @@ def run(
             timings.reverse()
             while requests:
                 yield _taken(requests.pop(), timings.pop(), counts)
-            ahead = AHEAD
+            ahead = IMAGES_AHEAD if alone else AHEAD
     finally:
         # Whatever nobody takes is waited for here, not when the collector comes round.
         submitted.clear()

@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_size, check_time
+from vkbloom.image import Image
 from vkbloom.settings import check_shading
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from vkbloom.scene import Mesh, Scene
     from vkbloom.scene.textures import Texture
     from vkbloom.settings import Shading
 
-__all__ = ["image_source", "scene_arguments", "scene_source"]
+__all__ = ["image_kind", "image_source", "is_image", "scene_arguments", "scene_source"]
 
 
 def image_source(
@@ -27,6 +30,13 @@ def image_source(
     TypeError, ValueError
         As `check_image`, `check_mask` and `check_emission`.
     """
+    if isinstance(image, Image):
+        for name, given in (("mask", mask), ("emission", emission)):
+            if given is not None:
+                raise ValueError(
+                    f"{name}: the image was uploaded already; upload it together with its {name}"
+                )
+        return image._source
     checked = check_image(image)
     height, width, _ = checked.shape
     return _core.image_source(
@@ -34,6 +44,25 @@ def image_source(
         None if emission is None else check_emission(emission, checked),
         None if mask is None else check_mask(mask, (height, width)),
     )
+
+
+def is_image(source: object) -> bool:
+    """Whether a source is an image, or looks like one; anything else may be a scene."""
+    return isinstance(source, Image | memoryview) or any(
+        hasattr(source, name) for name in ("__array__", "__array_interface__", "__dlpack__")
+    )
+
+
+def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Return shape and dtype of an image, or of a handle of one.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `check_image`.
+    """
+    checked = image if isinstance(image, Image) else check_image(image)
+    return checked.shape, checked.dtype
 
 
 def scene_source(

@@ -19,7 +19,7 @@ WRITE_IMAGE(3);
 #define LOAD load_scene
 #define LOAD_IMAGE scene
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS IMAGE_CHANNELS
+#define LOAD_CHANNELS 4
 #define LOAD_FROM 0
 #define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"
@@ -33,7 +33,7 @@ WRITE_IMAGE(3);
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS
-#define STORE_CHANNELS IMAGE_CHANNELS
+#define STORE_CHANNELS 4
 #include "variants/store.glsl"
 
 void main()

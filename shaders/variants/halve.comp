@@ -26,7 +26,7 @@ WRITE_IMAGE(2);
 #define LOAD load_run
 #define LOAD_IMAGE source
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS IMAGE_CHANNELS
+#define LOAD_CHANNELS 4
 #define LOAD_FROM -2
 #define LOAD_COUNT LOADED
 #include "variants/load.glsl"

@@ -17,7 +17,7 @@ WRITE_IMAGE(2);
 #define LOAD load_wide
 #define LOAD_IMAGE image
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS IMAGE_CHANNELS
+#define LOAD_CHANNELS 4
 #define LOAD_FROM -STRIP_RADIUS
 #define LOAD_COUNT LOADED
 #include "variants/load.glsl"
@@ -25,13 +25,13 @@ WRITE_IMAGE(2);
 #define LOAD load_own
 #define LOAD_IMAGE image
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS IMAGE_CHANNELS
+#define LOAD_CHANNELS 4
 #define LOAD_FROM 0
 #define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS
-#define STORE_CHANNELS IMAGE_CHANNELS
+#define STORE_CHANNELS 4
 #include "variants/store.glsl"
 
 void main()

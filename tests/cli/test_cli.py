@@ -125,14 +125,14 @@ def test_a_failure_is_one_line_and_status_1(
     assert one_line(result.stderr).startswith(message)
 
 
-def test_an_interrupt_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_is_status_130(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt() -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(vkbloom, "adapters", interrupt)
     result = vkb("adapters")
     # The first line break ends the line on which a terminal shows ^C.
-    assert (result.exit_code, result.stderr) == (1, "\nvkbloom: interrupted\n")
+    assert (result.exit_code, result.stderr) == (130, "\nvkbloom: interrupted\n")
 
 
 @pytest.mark.parametrize("kind", [AssertionError, OSError])
@@ -147,7 +147,7 @@ def test_what_fails_because_of_an_interrupt_is_one(
 
     monkeypatch.setattr(vkbloom, "adapters", interrupt)
     result = vkb("adapters")
-    assert (result.exit_code, result.stderr) == (1, "vkbloom: interrupted\n")
+    assert (result.exit_code, result.stderr) == (130, "vkbloom: interrupted\n")
 
 
 def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -438,6 +438,46 @@ def test_an_animation_in_a_folder(tmp_path: Path) -> None:
         "0001_final.png",
         "0001_glow.png",
     ]
+
+
+def test_an_animation_in_a_gif(tmp_path: Path) -> None:
+    oiio = pytest.importorskip("OpenImageIO")
+    path = tmp_path / "a.gif"
+    result = vkb("render", "-o", path, *SMALL, "--frames", "3", "--fps", "10")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert list(tmp_path.iterdir()) == [path]
+    reader = oiio.ImageInput.open(str(path))
+    for index in range(3):
+        assert reader.seek_subimage(index, 0)
+        shown = np.asarray(reader.read_image(index, 0, 0, 3, "uint8"), np.float64)
+        expected = rendered(time=index / 3)["final"][:, :, :3]
+        # 256 colours, dithered.
+        assert abs(shown - expected).mean() < 8
+    assert not reader.seek_subimage(3, 0)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--frames", "2", "--attachments", "all"), "a GIF shows one framebuffer"),
+        (("--frames", "2", "--attachments", "depth"), "is no frame of an animation"),
+        (("--fps", "10"), "--fps is for --frames and a GIF"),
+    ],
+)
+def test_what_no_gif_shows(tmp_path: Path, words: tuple[str, ...], told: str) -> None:
+    pytest.importorskip("OpenImageIO")
+    result = vkb("render", "-o", tmp_path / "a.gif", *SMALL, *words)
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", [(), ("--frames", "2")])
+def test_render_without_bloom_says_so(tmp_path: Path, words: tuple[str, ...]) -> None:
+    result = vkb("render", "-o", tmp_path / "a.png", *SMALL, "--threshold", "2", *words)
+    assert result.exit_code == 0
+    assert "nothing lies above the threshold 2" in result.stderr
+    assert vkb("render", "-o", tmp_path / "a.png", *SMALL, *words).stderr == ""
 
 
 def test_render_passes_validation(tmp_path: Path) -> None:

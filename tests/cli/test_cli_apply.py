@@ -447,7 +447,7 @@ class TestErrors:
 
         path = stored(tmp_path / "a.exr", light(20, 30, 3))
         before = path.read_bytes()
-        monkeypatch.setattr(vkbloom.Renderer, "apply", fail)
+        monkeypatch.setattr(vkbloom.Renderer, "apply_each", fail)
         result = run(path, path)
         assert (result.exit_code, result.stderr) == (1, "vkbloom: the device is lost\n")
         assert path.read_bytes() == before

@@ -87,6 +87,8 @@ class TestAxes:
             ("tonemap=nice", "is not one of"),
             ("blur_scale=1,99", "blur_scale: 99.0 is out of range"),
             ("loops=1:2:4", "is not an integer"),
+            ("blur_scale=1:2", "a range is FIRST:LAST:COUNT"),
+            ("preset=kino,non", "there is no preset 'non'"),
         ],
     )
     def test_wrong_use_is_one_line(self, tmp_path: Path, word: str, told: str) -> None:
@@ -184,7 +186,7 @@ class TestStores:
             time.sleep(0.05)
         os.killpg(running.pid, signal.SIGINT)
         stdout, stderr = running.communicate()
-        assert (running.returncode, stdout, stderr) == (1, "", "\nvkbloom: interrupted\n")
+        assert (running.returncode, stdout, stderr) == (130, "", "\nvkbloom: interrupted\n")
 
     @pytest.mark.parametrize(
         ("words", "told"),
@@ -220,7 +222,8 @@ class TestStores:
         arrays = {"glow": noise(9, 12, 3, dtype="float32"), "final": load(image_file).pixels}
         file = tmp_path / "frames.exr"
         vkbloom.Frames(arrays, timings={}, settings=Separable(), info={}).save(file)
-        result = run(image_file, "-o", tmp_path / "a.zarr", "--reduce", f"psnr@{file}")
+        words = ("--axis", "exposure=0", "--reduce", f"psnr@{file}")
+        result = run(image_file, "-o", tmp_path / "a.zarr", *words)
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert "frames.exr has several parts" in result.stderr
 
@@ -247,6 +250,38 @@ class TestStores:
             assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
             assert result.stderr.startswith(f"vkbloom: {file}: {told}")
             assert not out.exists()
+
+
+def test_presets_as_an_axis(tmp_path: Path, image_file: Path) -> None:
+    words = ("--axis", "preset=kino,filament", "--axis", "intensity=0.5,1", "-o")
+    result = run(image_file, *words, tmp_path / "a.zarr")
+    assert result.exit_code == 0, result.stderr
+    with xr.open_zarr(tmp_path / "a.zarr") as dataset:
+        assert dict(dataset.sizes)["preset"] == 2
+        assert list(dataset["preset"].values) == ["kino", "filament"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "nothing varies; give an --axis"),
+        (("--axis", "preset=kino", "--intensity", "0.5"), "leave out options of settings"),
+        (("--axis", "preset=kino,filament", "--axis", "levels=1,2"), "not all of these presets"),
+    ],
+)
+def test_axes_that_cannot_be(
+    tmp_path: Path, image_file: Path, words: tuple[str, ...], told: str
+) -> None:
+    result = run(image_file, *words, "-o", tmp_path / "a.zarr")
+    assert result.exit_code == 2
+    assert told in result.stderr
+
+
+def test_a_grid_without_bloom_says_so(tmp_path: Path, image_file: Path) -> None:
+    words = ("--method", "pyramid", "--axis", "intensity=0.5,1", "--threshold")
+    result = run(image_file, *words, "1000", "-o", tmp_path / "a.zarr")
+    assert "nothing lies above the threshold 1000" in result.stderr
+    assert run(image_file, *words, "0", "-o", tmp_path / "b.zarr").stderr == ""
 
 
 class TestImageFiles:
@@ -345,10 +380,11 @@ class TestImageFiles:
         self, tmp_path: Path, image_file: Path, content: bytes, told: str
     ) -> None:
         out = tmp_path / "files"
-        done(image_file, "-o", out)
+        words = (image_file, "--axis", "exposure=0", "-o", out)
+        done(*words)
         (out / "grid.json").write_bytes(content)
         before = {path: path.read_bytes() for path in out.iterdir()}
-        result = run(image_file, "-o", out, "--resume")
+        result = run(*words, "--resume")
         assert result.exit_code == 1
         assert told in result.stderr
         assert {path: path.read_bytes() for path in out.iterdir()} == before
@@ -549,6 +585,7 @@ class TestOptionFiles:
 
     def test_a_flag_that_is_off(self, tmp_path: Path, image_file: Path) -> None:
         (tmp_path / "a.toml").write_text("resume = false\nraw = false\n[settings]\nbloom = false")
-        done(image_file, "--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
+        words = ("--axis", "exposure=0", "-o", tmp_path / "a.zarr")
+        done(image_file, "--from", tmp_path / "a.toml", *words)
         settings = json.loads(xr.open_zarr(tmp_path / "a.zarr").attrs["settings"])
         assert settings["bloom"] is False

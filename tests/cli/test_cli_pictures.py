@@ -74,6 +74,44 @@ class TestSequences:
         assert message in result.stderr
         assert names(frames) == before
 
+    def test_an_error_comes_after_the_images_before_it(self, frames: Path) -> None:
+        (frames / "f.0010.png").write_bytes(b"nothing of the kind")
+        result = run("f.%04d.png", "g.%04d.png")
+        assert result.exit_code == 1
+        assert "f.0010.png: is not a readable image" in result.stderr
+        assert [name for name in names(frames) if name[0] == "g"] == ["g.0008.png", "g.0009.png"]
+
+    def test_sizes_and_types_change(self, frames: Path) -> None:
+        values = np.linspace(0, 2, 5 * 7 * 3, dtype=np.float32).reshape(5, 7, 3)
+        vkbloom.write(frames / "x.exr", values)
+        assert run("f.0008.png", "x.exr", "f.0009.png", "out").exit_code == 0
+        for name in ("f.0008.png", "x.exr", "f.0009.png"):
+            assert run(name, f"alone_{name}").exit_code == 0
+            alone = vkbloom.read(frames / f"alone_{name}")
+            assert np.array_equal(vkbloom.read(frames / "out" / name), alone)
+
+    def test_no_bloom_names_its_image(self, frames: Path) -> None:
+        result = run("f.*.png", "out", "--method", "pyramid", "--threshold", "1")
+        for number in range(8, 12):
+            assert f"f.{number:04d}.png: the bloom is zero everywhere" in result.stderr
+
+    def test_libraries_are_silenced_and_notes_are_not(self, frames: Path) -> None:
+        """libpng prints of its own while the notes of other images are printed."""
+        content = (frames / "f.0011.png").read_bytes()
+        (frames / "f.0011.png").write_bytes(content[: len(content) // 2])
+        words = ("f.*.png", "out", "--method", "pyramid", "--threshold", "1")
+        ended = subprocess.run(
+            [sys.executable, "-m", "vkbloom.cli", "apply", *words],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert ended.returncode == 1
+        lines = ended.stderr.splitlines()
+        assert len(lines) == 4
+        assert all(line.startswith("vkbloom: ") for line in lines)
+        assert "f.0011.png: " in lines[-1]
+
 
 def test_pipes(tmp_path: Path) -> None:
     path = store_png(tmp_path / "a.png", IMAGE)

@@ -96,6 +96,16 @@ def readback(renderer: Renderer) -> Arrays:
     return {"own": own, "new": new, "again": again}
 
 
+def handles(renderer: Renderer) -> Arrays:
+    """Images that stay, one after the other on the memory of those before, of two sizes."""
+    kept = renderer.upload(picture(*SIZE, seed=9))
+    images = [picture(24 + seed // 3, 16, seed=seed) for seed in range(6)]
+    frames = renderer.apply_each([*images, kept], vkbloom.Separable(threshold=0.5))
+    arrays = {f"{i} final": one["final"] for i, one in enumerate(frames)}
+    arrays["twice"] = renderer.apply(kept, vkbloom.Separable())["final"]
+    return arrays
+
+
 def variables(dataset: Any) -> Arrays:
     return {str(name): variable.values for name, variable in dataset.variables.items()}
 
@@ -141,6 +151,7 @@ WORK: dict[str, Work] = {
     "grid in memory": grid_in_memory,
     "grid to Zarr": grid_to_zarr,
     "readback": readback,
+    "handles": handles,
     **{
         f"apply {preset} {form}": method(settings)
         for preset, settings in vkbloom.presets.items()

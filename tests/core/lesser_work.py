@@ -32,6 +32,21 @@ SETTINGS = {
 LARGE = (600, 500)
 
 
+def use_handles(renderer: Renderer) -> None:
+    """One of each size and dtype, more than have memory at once, each used twice."""
+    images = [picture(28 + i, 20, 3 + i % 2, dtype) for dtype in DTYPES for i in range(3)]
+    handles = [renderer.upload(image) for image in images]
+    for _ in range(2):
+        for image, handle in zip(images, handles, strict=True):
+            np.testing.assert_array_equal(
+                renderer.apply(handle, Pyramid(levels=2))["final"],
+                renderer.apply(image, Pyramid(levels=2))["final"],
+            )
+    for _ in range(2):
+        for image, frames in zip(images, renderer.apply_each(iter(images)), strict=True):
+            tolerance.assert_matches_reference(frames, image, Separable())
+
+
 def try_all(renderer: Renderer) -> dict[str, str]:
     """Return what went wrong, by what it was."""
     wrong: dict[str, str] = {}
@@ -58,6 +73,7 @@ def try_all(renderer: Renderer) -> dict[str, str]:
                 f"{name} {shading}",
                 lambda: renderer.render(scene, settings, (40, 30), shading=shading),  # noqa: B023
             )
+    attempt("handles", lambda: use_handles(renderer))
     large = picture(*LARGE, 4, "uint8")
     attempt("large", lambda: apply(large, Separable()))
     for dtype in DTYPES:

@@ -109,7 +109,9 @@ def test_frames_that_fill_a_submission_alone(
     monkeypatch.setattr(requests, "SECONDS", 1e6)
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=exposure / 8) for exposure in range(20)]
-    results = list(requests.run(settings, counting, _core.image_source(image), ("final",)))
+    source = _core.image_source(image)
+    work = [requests.Work(source, one) for one in settings]
+    results = list(requests.run(work, counting, ("final",)))
     assert len(results) == 20
     assert max(counting.sizes) == frames * image.nbytes
     for one, (arrays, _, _) in results:
@@ -124,7 +126,9 @@ def test_a_submission_is_as_long_as_a_wait_may_be(
     monkeypatch.setattr(requests, "SECONDS", seconds)
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=step / 8) for step in range(100)]
-    results = list(requests.run(settings, counting, _core.image_source(image), ("final",)))
+    source = _core.image_source(image)
+    work = [requests.Work(source, one) for one in settings]
+    results = list(requests.run(work, counting, ("final",)))
     assert [one for one, _ in results] == settings
     assert max(counting.counts) == most
     assert sum(counting.counts) == len(settings)
@@ -420,8 +424,9 @@ def run_failing(
     results: list[Any] = []
     core: Any = FailingCore(failing)
     nothing: Any = None
+    work = [requests.Work(nothing, one) for one in settings]
     try:
-        for result in requests.run(settings, core, nothing, None):
+        for result in requests.run(work, core, None):
             results.append(result)
     except Exception as error:
         return results, error

@@ -56,7 +56,7 @@ def show(rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]) ->
 FORMS = ("fragment", "cpu", "gpu")
 OTHERS = (
     *("create", "close", "render forward", "render deferred", "batch"),
-    *("grid", "grid in memory", "grid to Zarr", "readback"),
+    *("grid", "grid in memory", "grid to Zarr", "readback", "handles"),
 )
 
 

@@ -198,6 +198,109 @@ def ask_for(source: Any, axes: Any, settings: Settings | None = None, **more: An
     return ask(source, settings, axes, **{**defaults, **more})
 
 
+class TestWholeSettings:
+    """The axes "preset" and "settings": settings of any methods."""
+
+    @pytest.mark.parametrize("first", [True, False])
+    def test_presets(self, renderer: Renderer, image: Any, first: bool) -> None:
+        names, exposures = ["kino", "tutorial", "filament"], [0.0, 1.0]
+        axes: dict[str, Any] = {"preset": names, "exposure": exposures}
+        if not first:
+            axes = dict(reversed(axes.items()))
+        grid = renderer.grid(image, axes=axes, progress=False)
+        assert list(grid["final"].dims[:2]) == list(axes)
+        assert list(grid["preset"].values) == names
+        for name in names:
+            for exposure in exposures:
+                settings = vkbloom.presets[name].replace(exposure=exposure)
+                expected = renderer.apply(image, settings)["final"]
+                found = grid["final"].sel(preset=name, exposure=exposure).values
+                np.testing.assert_array_equal(found, expected)
+        assert json.loads(grid.attrs["settings"]) == {}
+        told = json.loads(grid["preset"].attrs["settings"])
+        assert vkbloom.Settings.from_dict(told["kino"]) == vkbloom.presets["kino"]
+
+    def test_settings(self, renderer: Renderer, image: Any) -> None:
+        many = [Separable(threshold=0.5), Pyramid(levels=2, format="rgba32float")]
+        against = {"settings": many[0]}
+        grid = renderer.grid(
+            image,
+            axes={"settings": many, "intensity": [0.5, 1.0]},
+            attachments=("final", "bloom"),
+            reduce={"psnr": vkbloom.reductions.PSNR(against=against)},
+            progress=False,
+        )
+        for place, one in enumerate(many):
+            frames = renderer.apply(image, one.replace(intensity=0.5))
+            assert vkbloom.Settings.from_json(grid["settings"].values[place].item()) == one
+            for name in ("final", "bloom"):
+                found = grid[name].isel(settings=place, intensity=0).values
+                np.testing.assert_array_equal(found, frames[name])
+        assert np.isinf(grid["psnr"].isel(settings=0)).all()
+
+    def test_in_a_store(self, tmp_path: Path) -> None:
+        pytest.importorskip("zarr")
+        image = np.random.default_rng(3).random((8, 12, 3)).astype(np.float32)
+        arguments: Any = (image, None, {"settings": [Separable(), Pyramid(levels=2)]}, tmp_path)
+        first = vkbloom.grid_to_zarr(*arguments, progress=False)["final"].values
+        again = vkbloom.grid_to_zarr(*arguments, resume=True, progress=False)
+        np.testing.assert_array_equal(again["final"].values, first)
+        assert again.attrs["passes_run"] == 0
+        assert vkbloom.check_grid(tmp_path).complete
+        other = {"settings": [Separable(), Pyramid(levels=3)]}
+        with pytest.raises(ValueError, match="axes"):
+            vkbloom.grid_to_zarr(image, None, other, tmp_path, resume=True, progress=False)
+
+    def test_floats_become_the_largest_of_their_dtypes(self, renderer: Renderer) -> None:
+        half = np.random.default_rng(4).random((8, 12, 3)).astype(np.float16)
+        formats: Any = ["rgba16float", "rgba32float"]
+        grid = renderer.grid(half, None, {"format": formats}, attachments=("bloom",))
+        assert grid["bloom"].dtype == np.float32
+        for name in formats:
+            expected = renderer.apply(half, Separable(format=name))["bloom"]
+            np.testing.assert_array_equal(grid["bloom"].sel(format=name).values, expected)
+
+    @pytest.mark.parametrize(
+        ("settings", "axes", "kind", "told"),
+        [
+            (None, {"preset": ["non"]}, ValueError, "no preset 'non'; "),
+            (None, {"preset": "kino"}, TypeError, "preset"),
+            (None, {"preset": [[]]}, TypeError, "is not a name"),
+            (None, {"settings": ["kino"]}, TypeError, "'kino' is not Settings"),
+            (None, {"settings": []}, ValueError, "has no values"),
+            (None, {"preset": ["kino"], "settings": [Separable()]}, ValueError, "exclude"),
+            (Separable(), {"preset": ["kino"]}, ValueError, "the axis preset has the settings"),
+            (None, {"preset": ["kino", "tutorial"], "levels": [1]}, ValueError, "not a field of"),
+            (None, {"preset": ["tutorial"], "intensity": [-9]}, ValueError, "intensity"),
+        ],
+    )
+    def test_refusals(
+        self, renderer: Renderer, settings: Any, axes: Any, kind: type[Exception], told: str
+    ) -> None:
+        with pytest.raises(kind, match=told):
+            renderer.grid(np.zeros((4, 4, 3), np.uint8), settings, axes)
+
+    def test_a_framebuffer_that_some_lack(self, renderer: Renderer) -> None:
+        with pytest.raises(ValueError, match=r"along preset, blur_vertical .* not there at"):
+            renderer.grid(
+                np.zeros((8, 8, 3), np.float32),
+                axes={"preset": ["tutorial", "kino"]},
+                attachments=("blur_vertical",),
+            )
+
+
+class TestMemory:
+    def test_a_grid_that_is_too_large(
+        self, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(Renderer, "_run_work", None)
+        image = np.zeros((1000, 1000, 4), np.float32)
+        axes = {"exposure": np.linspace(-1, 1, 1000), "intensity": np.linspace(0, 1, 1000)}
+        told = r"1000000 points with final takes 16,000.0 GB, .* grid_to_zarr .* attachments=\(\)"
+        with pytest.raises(MemoryError, match=told):
+            renderer.grid(image, None, axes)
+
+
 class TestDataset:
     def test_coordinates_say_what_they_are(self, renderer: Renderer, image: Any) -> None:
         axes: dict[str, Any] = {
@@ -284,7 +387,7 @@ class TestRefusals:
 
     @pytest.fixture
     def nothing_renders(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        for name in ("apply", "apply_many"):
+        for name in ("apply", "_run_work"):
             monkeypatch.setattr(Renderer, name, None)
 
     @pytest.mark.parametrize(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import functools
+import itertools
 import json
 import sys
 import tempfile
@@ -10,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 import vkbloom
+from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import (
     COLOURS,
@@ -22,8 +25,10 @@ from vkbloom.cli.image_files import (
     layer_option,
     note,
     read_picture,
+    silenced,
     subimage_option,
 )
+from vkbloom.cli.in_a_row import read_ahead, rendered, written_behind
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
@@ -137,34 +142,47 @@ def command(
             checked = f"image.{pipe_format}" if out == PIPE else name
             image_writing.check_writable(checked)
             image_writing.check_quality(checked, quality)
-    with tempfile.TemporaryDirectory() as folder:
+    names = attachments if attachments == "all" else ["final", *attachments.split(",")]
+    wanted = no_bloom.with_bloom(names, settings)
+    several = len(work) > 1
+    with tempfile.TemporaryDirectory() as folder, silenced():
 
         def taken(source: str) -> Picture:
             file = _piped_in(folder) if source == PIPE else source
             return read_picture(file, subimage, input_colour, layer=layer, raw=raw)
 
+        def write(picture: Picture, frames: vkbloom.Frames, target: str) -> None:
+            if several:
+                Path(target).parent.mkdir(exist_ok=True)
+            file = Path(folder, f"output.{pipe_format}") if out == PIPE else Path(target)
+            written = _written(picture, frames, file, output_colour, quality)
+            if out == PIPE:
+                sys.stdout.buffer.write(file.read_bytes())
+            elif not several:
+                for path in written:
+                    click.echo(f"wrote {path}")
+
         # Before the device is opened: the most likely failure comes at once.
-        picture = taken(work[0][0])
-        piped = Path(folder, f"output.{pipe_format}")
+        first = taken(work[0][0])
+        pictures = itertools.chain([first], read_ahead(taken, [name for name, _ in work[1:]]))
         # None: shown where standard error is a terminal.
-        disable = True if len(work) == 1 or sys.stderr is None else None
+        disable = None if several and sys.stderr is not None else True
         with vkbloom.Renderer(adapter, validation=validation) as renderer:
             _say(f"Rendering on {renderer.info.summary}", out)
-            for index, (source, target) in enumerate(
-                tqdm(work, unit="image", leave=False, disable=disable)
-            ):
-                picture = taken(source) if index else picture
-                frames = _applied(renderer, picture, settings, attachments)
-                if len(work) > 1:
-                    Path(target).parent.mkdir(exist_ok=True)
-                file = piped if out == PIPE else Path(target)
-                written = _written(picture, frames, file, output_colour, quality)
-                if out == PIPE:
-                    sys.stdout.buffer.write(piped.read_bytes())
-                elif len(work) == 1:
-                    for path in written:
-                        click.echo(f"wrote {path}")
-    if len(work) > 1:
+            with as_wrong_use():
+                renderer.plan(first.pixels, settings, attachments=wanted)
+            results = rendered(renderer, pictures, settings, wanted)
+            del first
+            bar = tqdm(results, total=len(work), unit="image", leave=False, disable=disable)
+            with written_behind() as write_next, contextlib.closing(results):
+                for (picture, frames), (name, target) in zip(bar, work, strict=True):
+                    if no_bloom.is_without(frames):
+                        said = no_bloom.reason(settings, no_bloom.brightest_of(picture.pixels))
+                        note(f"{name}: {said}" if several else said)
+                    write_next(
+                        functools.partial(write, picture, no_bloom.only(frames, names), target)
+                    )
+    if several:
         click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
 
 
@@ -187,44 +205,6 @@ def _piped_in(folder: str) -> str:
     path = Path(folder, "standard input")
     path.write_bytes(sys.stdin.buffer.read())
     return str(path)
-
-
-def _applied(
-    renderer: vkbloom.Renderer, picture: Picture, settings: vkbloom.Settings, attachments: str
-) -> vkbloom.Frames:
-    """Return the frames that are to be written, and say where there is no bloom in them."""
-    names = [name for name in attachments.split(",") if name != "final"]
-    wanted = ["final", *names] if attachments != "all" else []
-    # To know whether it is zero, unless it was turned off.
-    looked_at = ["bloom"] if wanted and settings.bloom and "bloom" not in names else []
-    with as_wrong_use():
-        frames = renderer.apply(
-            picture.pixels, settings, attachments=[*wanted, *looked_at] or "all"
-        )
-    if settings.bloom and not frames["bloom"][:, :, :3].any():
-        note(_about_no_bloom(picture.pixels, settings))
-    if not looked_at:
-        return frames
-    return vkbloom.Frames(
-        {name: array for name, array in frames.items() if name != "bloom"},
-        timings=frames.timings,
-        settings=frames.settings,
-        info=frames.info,
-    )
-
-
-def _about_no_bloom(pixels: NDArray[Any], settings: vkbloom.Settings) -> str:
-    """Say why the bloom of an image may be zero everywhere."""
-    colours = pixels[:, :, :3]
-    scale = np.float32(255 if pixels.dtype == np.uint8 else 1)
-    brightest = float(np.max(colours, initial=0, where=np.isfinite(colours)) / scale)
-    known = f"the brightest value is {brightest:.3g}"
-    if settings.threshold is None:
-        return f"the bloom is zero everywhere; {known}"
-    return (
-        f"the bloom is zero everywhere: nothing lies above the threshold {settings.threshold:g}; "
-        f"{known}"
-    )
 
 
 def _written(

@@ -27,6 +27,7 @@ REDUCTIONS: Final[Mapping[str, type[reductions.Reduction]]] = {
     "flip": reductions.FLIP,
 }
 
+_PRESET: Final = "preset"
 _RANGE_PARTS: Final = (3, 4)
 _MOST_DIGITS: Final = 18
 # Number of values of all axes together.
@@ -41,7 +42,7 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     words : sequence of str
         ``NAME=FIRST:LAST:COUNT`` (evenly spaced, both ends included), the same with ``:log``
         (logarithmically spaced), or ``NAME=VALUE,VALUE,...``. Values that contain commas are
-        separated by semicolons.
+        separated by semicolons. The NAME "preset" has names of `vkbloom.presets`.
     settings : Settings
         The settings whose fields are varied.
 
@@ -50,10 +51,14 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     click.UsageError
         A word has another form, or names a field that the settings lack.
     """
-    # Fields only, not class variables: all points of the grid have the same method.
-    hints = typing.get_type_hints(type(settings))
-    types = {field.name: hints[field.name] for field in dataclasses.fields(settings)}
-    types["time"] = float
+    types = _types_of([settings])
+    lacking = f"the method {settings.method} has no field"
+    for word in words:
+        name, _, text = word.partition("=")
+        if name.strip() == _PRESET:
+            named = [preset_named(one.strip()) for one in text.split(",")]
+            types = {**_types_of(named), _PRESET: str}
+            lacking = "not all of these presets have the field"
     found: dict[str, Sequence[Any]] = {}
     for word in words:
         name, sign, text = word.partition("=")
@@ -61,10 +66,26 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
         if not sign or not text:
             raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
         if name not in types:
-            raise click.UsageError(f"--axis: the method {settings.method} has no field {name!r}")
+            raise click.UsageError(f"--axis: {lacking} {name!r}")
         room = _MOST_VALUES - sum(map(len, found.values()))
         found[name] = _values(word, text, types[name], room)
     return found
+
+
+def preset_named(name: str) -> vkbloom.Settings:
+    """Return the settings of a preset, or raise click.UsageError."""
+    try:
+        return vkbloom.presets[name]
+    except KeyError as error:
+        raise click.UsageError(f"--axis {_PRESET}: {error.args[0]}") from None
+
+
+def _types_of(settings: Sequence[vkbloom.Settings]) -> dict[str, Any]:
+    """Return the types of the fields that all of them have, and of the time."""
+    # Fields only, not class variables: no axis changes the method.
+    shared = [{field.name for field in dataclasses.fields(one)} for one in settings]
+    hints = typing.get_type_hints(type(settings[0]))
+    return {"time": float, **{name: hints[name] for name in set.intersection(*shared)}}
 
 
 def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any]:
@@ -75,11 +96,13 @@ def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any
     if not values:
         raise click.UsageError(f"--axis {word}: has no values; give at least one")
     # The option's own type converts each value, so that axes and options have one syntax.
-    kind = click.BOOL if annotation is bool else fields.option_type(annotation)
+    plain = {bool: click.BOOL, str: click.STRING}
+    kind = plain[annotation] if annotation in plain else fields.option_type(annotation)
     try:
         return [kind.convert(part.strip(), None, None) for part in values]
     except click.BadParameter as error:
-        raise click.UsageError(f"--axis {word}: {error.message}") from error
+        hint = "; a range is FIRST:LAST:COUNT" if ":" in text else ""
+        raise click.UsageError(f"--axis {word}: {error.message}{hint}") from error
 
 
 def _range(word: str, parts: Sequence[str], room: int) -> Sequence[float]:

@@ -21,7 +21,7 @@ import click
 
 import vkbloom
 from vkbloom.checks import import_extra
-from vkbloom.cli import axis_options
+from vkbloom.cli import axis_options, no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
 from vkbloom.cli.image_files import (
@@ -34,10 +34,11 @@ from vkbloom.cli.image_files import (
 from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
-from vkbloom.cli.settings_options import settings_options
+from vkbloom.cli.settings_options import default_preset, settings_options
 from vkbloom.grid.image_files import FileForm, GridFiles
-from vkbloom.grid.plan import Layout, ask
+from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
+from vkbloom.grid.sources import visit
 from vkbloom.io import image_writing, safe_writing
 from vkbloom.io.images import Colour, Picture
 from vkbloom.settings import SHADINGS, Shading
@@ -60,9 +61,9 @@ _STORE: Final = ".zarr"
     "axis_words",
     metavar="NAME=VALUES",
     multiple=True,
-    help="A settings field, or time, and its values: FIRST:LAST:COUNT, FIRST:LAST:COUNT:log, or "
-    "A,B,... (A;B;... if values contain commas). Repeat it for more axes; the dimensions have the "
-    "order of the options.",
+    help="A settings field, time or preset, and its values: FIRST:LAST:COUNT, "
+    "FIRST:LAST:COUNT:log, or A,B,... (A;B;... if values contain commas). Repeat it for more axes; "
+    "the dimensions have the order of the options.",
 )
 @click.option(
     FILE_OPTION,
@@ -177,7 +178,16 @@ def command(
         raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
     _check_drawing("--sheet", sheet, (".png",))
     _check_drawing("--curves", curves, (".png", ".svg", ".pdf"))
+    chunks = axis_options.chunk_counts(chunk_words)
+    if not axis_words and len(images) < 2:
+        raise click.UsageError("nothing varies; give an --axis such as exposure=-1:1:5")
     axes = axis_options.axis_values(axis_words, settings)
+    begun = None if "preset" in axes else settings
+    if begun is None and settings != vkbloom.presets[default_preset(bool(images))]:
+        raise click.UsageError(
+            "--axis preset has the settings; leave out options of settings, and vary a field by an "
+            "--axis of its own"
+        )
     reduce = axis_options.named_reductions(reduce_words, settings)
     pictures = [
         read_picture(image, subimage, input_colour, layer=layer, raw=raw) for image in images
@@ -191,18 +201,20 @@ def command(
         "reduce": reduce,
     }
     with as_wrong_use():
-        grid = ask(source, settings, axes, **shared)
+        grid = ask(source, begun, axes, **shared)
     if curves and max(grid.shape, default=1) < 2:
         raise click.UsageError("--curves needs an --axis of more than one value")
+    if not workers and not scheduler:
+        _note_no_bloom(grid, adapter, validation)
     with _client(workers, scheduler) as client:
         device = {"client": client, "adapter": adapter, "validation": validation}
         if is_store:
             dataset = vkbloom.grid_to_zarr(
                 source,
-                settings,
+                begun,
                 axes,
                 out,
-                chunks=axis_options.chunk_counts(chunk_words),
+                chunks=chunks,
                 resume=resume,
                 on_mended=note,
                 progress=True,
@@ -229,6 +241,19 @@ def command(
         vkbloom.response_curves(dataset).savefig(drawn, format=Path(curves).suffix[1:].lower())
         safe_writing.write_file(Path(curves), drawn.getvalue())
         click.echo(f"wrote {curves}")
+
+
+def _note_no_bloom(grid: Grid, adapter: str, validation: bool) -> None:
+    """Say it where both the first and the last point of a grid have no bloom."""
+    corners = (tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape))
+    points = [point for point in map(grid.point, dict.fromkeys(corners)) if point.settings.bloom]
+    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+        zero = [
+            no_bloom.is_without(frames)
+            for _, frames in visit(renderer, grid.source, points, ("bloom",))
+        ]
+    if points and all(zero):
+        note(f"at the first and the last point, {no_bloom.reason(points[-1].settings)}")
 
 
 def _check_combination(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
 from typing import Any, Final
 
 import click
@@ -56,7 +57,7 @@ def input_colour_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
     """Read an image file; the only message of a failure is that of the exception."""
-    with _silenced():
+    with silenced():
         return image_reading.load(path, subimage, layer)
 
 
@@ -124,16 +125,30 @@ def read_picture(
     return picture
 
 
-@contextmanager
-def _silenced() -> Iterator[None]:
-    """Redirect standard error to the null device while the C image libraries run.
+_quiet = threading.Lock()
 
-    For damaged files, libpng prints messages itself instead of passing them to OpenImageIO.
+
+@contextmanager
+def silenced() -> Iterator[None]:
+    """Keep the C image libraries, which print messages of their own, off standard error.
+
+    For damaged files, libpng prints messages itself instead of passing them to OpenImageIO. What
+    this program prints meanwhile goes to where standard error was. Within another call it does
+    nothing.
     """
-    if sys.stderr is None:
-        # Closed before this process began: descriptor 2 may belong to another file.
+    # Closed before this process began: descriptor 2 may belong to another file.
+    if sys.stderr is None or not _quiet.acquire(blocking=False):
         yield
         return
+    try:
+        with _redirected():
+            yield
+    finally:
+        _quiet.release()
+
+
+@contextmanager
+def _redirected() -> Iterator[None]:
     sys.stderr.flush()
     try:
         kept = os.dup(_STANDARD_ERROR)
@@ -144,8 +159,27 @@ def _silenced() -> Iterator[None]:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, _STANDARD_ERROR)
-        yield
+        with _elsewhere(kept):
+            yield
     finally:
         os.dup2(kept, _STANDARD_ERROR)
         os.close(nowhere)
         os.close(kept)
+
+
+@contextmanager
+def _elsewhere(descriptor: int) -> Iterator[None]:
+    """Write what Python's standard error gets to a descriptor, if it was that of the process."""
+    stream = sys.stderr
+    try:
+        is_own = stream.fileno() == _STANDARD_ERROR
+    except (OSError, ValueError, AttributeError):
+        is_own = False
+    if not is_own:
+        yield
+        return
+    own = os.fdopen(
+        descriptor, "w", 1, encoding=stream.encoding, errors=stream.errors, closefd=False
+    )
+    with own, redirect_stderr(own):
+        yield

@@ -16,6 +16,9 @@ import vkbloom
 #: Names of the modules of this package that have a click command called `command`.
 COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", "doctor")
 
+#: As shells report a program that Ctrl-C has ended.
+_INTERRUPTED: Final = 130
+
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
 
@@ -39,7 +42,7 @@ class Program(click.Group):
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **options: Any
     ) -> NoReturn:
-        """Run the program and exit with 0 (done), 1 (failed) or 2 (wrong use)."""
+        """Run the program and exit: 0 done, 1 failed, 2 wrong use, 130 interrupted."""
         options["standalone_mode"] = False
         try:
             status = super().main(args, prog_name, **options)
@@ -49,10 +52,10 @@ class Program(click.Group):
         except click.ClickException as error:
             _exit(1, error.format_message())
         except click.Abort:
-            _exit(1, "interrupted")
+            _exit(_INTERRUPTED, "interrupted")
         except Exception as error:
             if _is_from_interrupt(error):
-                _exit(1, "interrupted")
+                _exit(_INTERRUPTED, "interrupted")
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))
             raise

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -13,12 +14,15 @@ from rich.table import Table
 from tqdm import tqdm
 
 import vkbloom
+from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
-from vkbloom.cli.program import as_wrong_use
+from vkbloom.cli.image_files import note
+from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.cli.terminal import show
+from vkbloom.io.animations import animation
 from vkbloom.settings import SHADINGS, Shading
 
 
@@ -43,7 +47,17 @@ from vkbloom.settings import SHADINGS, Shading
     "count",
     metavar="N",
     type=click.IntRange(min=1),
-    help="Render N frames of one period of the animation, starting at --time, to numbered files.",
+    help="Render N frames of one period of the animation, starting at --time, to numbered files "
+    "or to one GIF.",
+)
+@click.option(
+    "--fps",
+    "rate",
+    metavar="N",
+    type=click.IntRange(min=1, max=100),
+    default=25,
+    show_default=True,
+    help="Frames a second of a GIF.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @click.option(
@@ -60,6 +74,7 @@ def command(
     size: tuple[int, int],
     time: float,
     count: int | None,
+    rate: int,
     shading: Shading,
     attachments: str | None,
     adapter: str,
@@ -69,11 +84,18 @@ def command(
 ) -> None:
     """Render a scene with its bloom and write the framebuffers."""
     wanted = attachments or ("all" if count is None else "final")
+    names = wanted if wanted == "all" else wanted.split(",")
+    is_gif = count is not None and Path(out).suffix.lower() == ".gif"
+    if is_gif and (wanted == "all" or len(names) > 1):
+        raise click.UsageError("a GIF shows one framebuffer; name one with --attachments")
+    if given("rate") and not is_gif:
+        raise click.UsageError("--fps is for --frames and a GIF; leave it out")
     loaded = scene()
     written: list[Path] = []
     seconds: dict[str, list[float]] = {}
-    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+    with vkbloom.Renderer(adapter, validation=validation) as renderer, ExitStack() as stack:
         click.echo(f"Rendering on {renderer.info.summary}")
+        add = stack.enter_context(animation(Path(out), rate)) if is_gif else None
         # None: tqdm shows the bar if standard error is a terminal.
         disable = True if count is None or sys.stderr is None else None
         turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
@@ -84,13 +106,22 @@ def command(
                     settings,
                     size,
                     time=time + index / (count or 1),
-                    attachments=wanted if wanted == "all" else wanted.split(","),
+                    # Of an animation, the first frame shows whether there is a bloom.
+                    attachments=names if index else no_bloom.with_bloom(names, settings),
                     shading=shading,
                 )
-                target = out if count is None else _numbered(out, index, count)
-                written += frames.save(target)
+                if index == 0 and loaded.glow is not None and no_bloom.is_without(frames):
+                    note(no_bloom.reason(settings))
+                shown = no_bloom.only(frames, names)
+                if add is not None:
+                    add(shown[wanted])
+                else:
+                    target = out if count is None else _numbered(out, index, count)
+                    written += shown.save(target)
             for name, duration in frames.timings.items():
                 seconds.setdefault(name, []).append(duration)
+    if add is not None:
+        written.append(Path(out))
     show(_times(seconds, "CPU" if renderer.info.type == "cpu" else "GPU"))
     for line in _listed(written, is_animation=count is not None):
         click.echo(line)

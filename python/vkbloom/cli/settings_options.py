@@ -48,12 +48,16 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
         **rest: object,
     ) -> object:
         if preset is None and method is None:
-            is_image = any(rest.get(name) for name in _IMAGES)
-            preset = PRESET_OF_IMAGES if is_image else _PRESET_OF_SCENES
+            preset = default_preset(any(rest.get(name) for name in _IMAGES))
         begun = _begun(preset, method)
         return command(settings=_changed(begun, {**shared, **own}), **rest)
 
     return run
+
+
+def default_preset(is_image: bool) -> str:
+    """Return the name of what settings start from without --preset and --method."""
+    return PRESET_OF_IMAGES if is_image else _PRESET_OF_SCENES
 
 
 def _begun(preset: str | None, method: str | None) -> vkbloom.Settings:

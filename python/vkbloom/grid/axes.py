@@ -7,18 +7,22 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_time
-from vkbloom.settings import Settings
+from vkbloom.presets import presets
+from vkbloom.settings import Settings, check_settings
 from vkbloom.views.descriptions import described_parameters
 
-__all__ = ["Axis", "image_axis", "read_axes", "unit_and_description"]
+__all__ = ["WHOLE", "Axis", "image_axis", "read_axes", "unit_and_description"]
 
-Kind = Literal["settings", "time", "image"]
+Kind = Literal["settings", "time", "image", "preset"]
+
+#: Axes whose values are settings of any methods, on which the other axes' fields are changed.
+WHOLE: Final = ("preset", "settings")
 
 _TIME_DESCRIPTION = "Time of the animation; its period is 1"
 
@@ -30,10 +34,12 @@ class Axis:
     Parameters
     ----------
     name : str
-        A settings field, "time" or "image".
+        A settings field, "time", "image", "preset" or "settings".
     values : tuple
-        The values as the settings store them; floats for "time", labels for "image".
-    kind : {"settings", "time", "image"}
+        The values as the settings store them; floats for "time", labels for "image", names for
+        "preset", Settings for "settings".
+    kind : {"settings", "time", "image", "preset"}
+        "preset" is the kind of the axis "settings", too: its values are settings of any methods.
     unit : str
         "1" for a number without a unit.
     description : str
@@ -52,6 +58,10 @@ class Axis:
     def attributes(self) -> dict[str, str]:
         """Attributes of the coordinate."""
         described = {"long_name": self.name, "units": self.unit, "description": self.description}
+        if self.name == "preset":
+            # What the names meant when the grid was rendered.
+            found = {name: presets[name].to_dict() for name in self.values}
+            described["settings"] = json.dumps(found)
         return {name: text for name, text in described.items() if text}
 
     @property
@@ -59,7 +69,7 @@ class Axis:
         """The values as an array of numbers, bools or text.
 
         None is NaN among numbers and "none" among text; tuples (sizes, weights, layers) are JSON
-        text, such as "[256, 256]".
+        text, such as "[256, 256]", and so are settings.
         """
         present = [value for value in self.values if value is not None]
         if present and all(isinstance(value, bool) for value in self.values):
@@ -91,7 +101,27 @@ class Axis:
 def _text(value: Any) -> str:
     if value is None:
         return "none"
+    if isinstance(value, Settings):
+        return value.to_json()
     return value if isinstance(value, str) else json.dumps(value)
+
+
+def _whole_axis(name: str, values: object) -> Axis:
+    """Check an axis of presets or of settings."""
+    listed = _sequence(name, values)
+    if name == "preset":
+        for one in listed:
+            try:
+                presets[one]
+            except KeyError as error:
+                raise ValueError(f"axes: preset: {error.args[0]}") from None
+            except TypeError:
+                raise TypeError(f"axes: preset: {one!r} is not a name") from None
+        return Axis(name, tuple(listed), "preset", "", "The name of the settings")
+    for one in listed:
+        if not isinstance(one, Settings):
+            raise TypeError(f"axes: settings: {one!r} is not Settings")
+    return Axis(name, tuple(listed), "preset", "", "The settings as JSON")
 
 
 def unit_and_description(settings: Settings, name: str) -> tuple[str, str]:
@@ -113,15 +143,17 @@ def _sequence(name: str, values: object) -> list[Any]:
     return listed
 
 
-def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) -> tuple[Axis, ...]:
+def read_axes(
+    settings: Settings | None, axes: Mapping[str, Any], *, has_time: bool
+) -> tuple[Axis, ...]:
     """Check the requested axes.
 
     Parameters
     ----------
-    settings : Settings
-        The settings that the axes vary.
+    settings : Settings or None
+        The settings that the axes vary; None: the default.
     axes : mapping of str to sequence
-        Values by settings field or "time".
+        Values by settings field or "time", names by "preset", or Settings by "settings".
     has_time : bool
         Whether the source is animated.
 
@@ -137,24 +169,46 @@ def read_axes(settings: Settings, axes: Mapping[str, Any], *, has_time: bool) ->
     """
     if not isinstance(axes, Mapping):
         raise TypeError(f"axes: {axes!r} is not a mapping of field names to values")
-    fields = [field.name for field in dataclasses.fields(settings)]
+    whole = {name: _whole_axis(name, axes[name]) for name in WHOLE if name in axes}
+    if len(whole) > 1:
+        raise ValueError("axes: preset and settings exclude each other; give one of them")
+    if whole and settings is not None:
+        raise ValueError(
+            f"settings: the axis {next(iter(whole))} has the settings; leave the argument out, and "
+            "vary a field by an axis of its own"
+        )
+    bases = [one for axis in whole.values() for one in settings_of(axis)] or [
+        check_settings(settings)
+    ]
     found: list[Axis] = []
     for name, values in axes.items():
+        if name in whole:
+            found.append(whole[name])
+            continue
         if name == "time" and has_time:
             times = tuple(check_time(value) for value in _sequence(name, values))
             found.append(Axis(name, times, "time", "turn", _TIME_DESCRIPTION))
             continue
-        if name not in fields:
-            raise ValueError(
-                f"axes: {name!r} is not a field of the method {settings.method}"
-                f"{' or time' if has_time else ''}: {', '.join(fields)}"
-            )
+        for base in bases:
+            fields = [field.name for field in dataclasses.fields(base)]
+            if name not in fields:
+                raise ValueError(
+                    f"axes: {name!r} is not a field of the method {base.method}"
+                    f"{' or time' if has_time else ''}: {', '.join(fields)}"
+                )
         # `replace` checks each value and converts it to the type that the settings store.
-        own = tuple(
-            getattr(settings.replace(**{name: value}), name) for value in _sequence(name, values)
-        )
-        found.append(Axis(name, own, "settings", *unit_and_description(settings, name)))
+        listed = _sequence(name, values)
+        own = [
+            tuple(getattr(base.replace(**{name: value}), name) for value in listed)
+            for base in bases
+        ]
+        found.append(Axis(name, own[0], "settings", *unit_and_description(bases[0], name)))
     return tuple(found)
+
+
+def settings_of(axis: Axis) -> tuple[Settings, ...]:
+    """Return the settings at each value of an axis of presets or settings."""
+    return tuple(presets[one] if axis.name == "preset" else one for one in axis.values)
 
 
 def image_axis(labels: tuple[Any, ...]) -> Axis:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +13,7 @@ import numpy as np
 from vkbloom.checks import import_extra
 from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import blocks, default_chunk
-from vkbloom.grid.plan import Grid, Layout, attributes_of, lay_out
+from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of, lay_out
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.sources import FrameRenderer
 
@@ -38,6 +41,45 @@ def chunk_of(grid: Grid, layout: Layout) -> tuple[int, ...]:
     return default_chunk(grid.shape, layout.ranking, max(most, 1))
 
 
+def check_fits(grid: Grid, variables: Mapping[str, Variable]) -> None:
+    """Raise MemoryError for a grid that is larger than the memory that is left."""
+    points = math.prod(grid.shape)
+    size = points * sum(variable.size for variable in variables.values())
+    left = _memory_left()
+    if left is not None and size > left:
+        raise MemoryError(
+            f"a grid of {points} points with {', '.join(variables)} takes {_gigabytes(size)}, and "
+            f"{_gigabytes(left)} of memory are left: grid_to_zarr writes it to a store, and "
+            "attachments=() keeps figures of `reduce` alone"
+        )
+
+
+def _gigabytes(size: int) -> str:
+    return f"{size / 1e9:,.1f} GB"
+
+
+def _memory_left() -> int | None:
+    """Return the bytes that this process may still get; None where that is not known."""
+    left = []
+    try:
+        for line in Path("/proc/meminfo").read_text("ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                left.append(int(line.split()[1]) << 10)
+    except OSError:
+        if "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ()):
+            left.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    try:
+        # Of a container.
+        most, used = (
+            int(Path(f"/sys/fs/cgroup/memory.{name}").read_text("ascii"))
+            for name in ("max", "current")
+        )
+        left.append(max(most - used, 0))
+    except (OSError, ValueError):
+        pass
+    return min(left, default=None)
+
+
 def in_memory(grid: Grid, renderer: FrameRenderer, progress: bool | None) -> xarray.Dataset:
     """Render a grid into a Dataset.
 
@@ -54,7 +96,7 @@ def in_memory(grid: Grid, renderer: FrameRenderer, progress: bool | None) -> xar
         The Dataset that `vkbloom.Renderer.grid` documents.
     """
     xr = import_extra("xarray", "grid", "Renderer.grid")
-    layout = lay_out(grid, renderer)
+    layout = lay_out(grid, renderer, lambda variables: check_fits(grid, variables))
     shape = grid.shape
     arrays = {
         name: np.empty((*shape, *variable.shape), variable.dtype)

@@ -16,7 +16,7 @@ from vkbloom import _core
 from vkbloom.checks import check_attachments
 from vkbloom.framebuffers import dimensions, leading
 from vkbloom.frames import Frames
-from vkbloom.grid.axes import Axis, image_axis, read_axes
+from vkbloom.grid.axes import Axis, image_axis, read_axes, settings_of
 from vkbloom.grid.order import Index, ranking_of, walk
 from vkbloom.grid.reductions import Comparing, Reduction
 from vkbloom.grid.sources import FrameRenderer, Point, Source, read_source, visit
@@ -42,7 +42,7 @@ class Grid:
     ----------
     source : Source
     settings : Settings
-        The settings that the axes vary.
+        The settings that the axes vary, unless one of them has them all.
     axes : tuple of Axis
         The axes, in the order of the result's dimensions.
     attachments : "all" or tuple of str
@@ -75,13 +75,16 @@ class Grid:
     def point(self, index: Index) -> Point:
         """Return the point at an index."""
         place = self.source.place
+        base = self.settings
         changes = {}
         for axis, number in zip(self.axes, index, strict=True):
-            if axis.kind == "settings":
+            if axis.kind == "preset":
+                base = settings_of(axis)[number]
+            elif axis.kind == "settings":
                 changes[axis.name] = axis.values[number]
             else:
                 place = number if axis.kind == "image" else axis.values[number]
-        return Point(index, self.settings.replace(**changes) if changes else self.settings, place)
+        return Point(index, base.replace(**changes) if changes else base, place)
 
     def named(self, index: Index) -> str:
         """Return a point's axis values as text for messages."""
@@ -90,7 +93,9 @@ class Grid:
 
     @property
     def remaining_settings(self) -> dict[str, Any]:
-        """The settings that no axis varies, and the method."""
+        """The settings that no axis varies, and the method; none where an axis has them all."""
+        if any(axis.kind == "preset" for axis in self.axes):
+            return {}
         varied = {axis.name for axis in self.axes}
         return {k: v for k, v in self.settings.to_dict().items() if k not in varied}
 
@@ -189,7 +194,8 @@ def ask(
     TypeError, ValueError
         One of them is wrong.
     """
-    settings = check_settings(settings)
+    if settings is not None:
+        settings = check_settings(settings)
     checked = read_source(source, size, shading, time)
     found = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     if checked.labels:
@@ -204,18 +210,26 @@ def ask(
             raise TypeError(f"reduce: {name}: {reduction!r} is not callable")
     if names == () and not reductions:
         raise ValueError("attachments: empty, and there are no reductions; request one of them")
-    grid = Grid(checked, settings, found, "all" if names is None else names, reductions)
+    grid = Grid(
+        checked, check_settings(settings), found, "all" if names is None else names, reductions
+    )
     grid.references()
     return grid
 
 
-def lay_out(grid: Grid, renderer: FrameRenderer) -> Layout:
+def lay_out(
+    grid: Grid,
+    renderer: FrameRenderer,
+    check: Callable[[Mapping[str, Variable]], object] = lambda variables: None,
+) -> Layout:
     """Ask a renderer for all that has to be known of a grid before its points are rendered.
 
     Parameters
     ----------
     grid : Grid
     renderer : FrameRenderer
+    check : callable, optional
+        Gets the framebuffers' variables before anything is rendered.
 
     Returns
     -------
@@ -229,6 +243,7 @@ def lay_out(grid: Grid, renderer: FrameRenderer) -> Layout:
     """
     framebuffers, structural = _survey(grid, renderer)
     variables = _frame_variables(framebuffers)
+    check(variables)
     coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
     for variable in variables.values():
         if len(variable.dims) == 3:
@@ -284,7 +299,7 @@ def ranking(grid: Grid) -> tuple[int, ...]:
             for (stepped, _), ran in zip(steps, names, strict=True):
                 if stepped is not None:
                     costs[stepped] += len(ran)
-    return ranking_of(costs, [axis.kind == "settings" for axis in grid.axes])
+    return ranking_of(costs, [axis.kind in ("settings", "preset") for axis in grid.axes])
 
 
 def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
@@ -358,17 +373,33 @@ def _survey(
     expected = _graph_of(grid, renderer, first)[0]
     names = tuple(expected) if grid.attachments == "all" else grid.attachments
     ranges = (range(len(axis)) if i in structural else (0,) for i, axis in enumerate(grid.axes))
+    promoted: dict[str, Framebuffer] = dict(expected)
     for index in itertools.product(*ranges):
         found = _graph_of(grid, renderer, index)[0]
         if grid.attachments == "all" and set(found) != set(expected):
             names = tuple(sorted(set(found) ^ set(expected)))
-        for name in names:
-            if found.get(name) != expected.get(name):
+        for name in (name for name in names if name in expected or name in found):
+            common = _common(promoted.get(name), found.get(name))
+            if common is None:
                 _refuse(grid, name, (first, expected.get(name)), (index, found.get(name)))
+            else:
+                promoted[name] = common
     for name in names:
         if name not in expected:
             raise ValueError(f"attachments: there is no {name!r} here, only {', '.join(expected)}")
-    return {name: expected[name] for name in names}, tuple(sorted(structural))
+    return {name: promoted[name] for name in names}, tuple(sorted(structural))
+
+
+def _common(one: Framebuffer | None, other: Framebuffer | None) -> Framebuffer | None:
+    """Return what holds both framebuffers: floats of the larger dtype; None: nothing does.
+
+    A level of uint8 is another value than the same number as a float.
+    """
+    if one is None or other is None or one[0] != other[0]:
+        return None
+    if one[1] != other[1] and "u" in (one[1].kind, other[1].kind):
+        return None
+    return one[0], np.promote_types(one[1], other[1])
 
 
 def _refuse(

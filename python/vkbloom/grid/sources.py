@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
-import itertools
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,11 +13,13 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 
 from vkbloom import _core
-from vkbloom.checks import check_image, check_size, check_time
+from vkbloom.checks import check_attachments, check_image, check_size, check_time
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
+from vkbloom.image import Image
+from vkbloom.requests import IMAGES_AHEAD, Work
 from vkbloom.settings import Settings, check_shading
-from vkbloom.sources import image_source, scene_source
+from vkbloom.sources import image_source, is_image, scene_source
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,30 +53,16 @@ class FrameRenderer(Protocol):
     def info(self) -> AdapterInfo:
         """The adapter."""
 
-    def apply_many(
-        self,
-        image: NDArray[Any],
-        settings_seq: Iterable[Settings],
-        *,
-        attachments: str | Sequence[str],
-    ) -> Iterator[Frames]:
-        """Add bloom to an image with each of the settings."""
+    _core: _core.Renderer
 
-    def render_many(
-        self,
-        scene: Scene,
-        settings_seq: Iterable[Settings],
-        size: tuple[int, int],
-        *,
-        shading: Shading,
-        time: float,
-        attachments: str | Sequence[str],
+    def _run_work(
+        self, sequence: Iterable[Work], names: tuple[str, ...] | None
     ) -> Iterator[Frames]:
-        """Render a scene with one settings after the other."""
+        """Run requests in their order."""
 
     def plan(
         self,
-        source: Scene | NDArray[Any],
+        source: Scene | NDArray[Any] | Image,
         settings: Settings,
         size: tuple[int, int] | None = None,
         *,
@@ -105,17 +92,15 @@ def visit(
     (tuple of int, Frames)
         Index and frames of each point.
     """
-    for place, group in itertools.groupby(points, key=lambda point: point.place):
-        drawn: deque[Index] = deque()
-        for frames in source.many(renderer, _noted(group, drawn), place, attachments):
-            yield drawn.popleft(), frames
+    drawn: deque[Index] = deque()
 
+    def work() -> Iterator[Work]:
+        for point in points:
+            drawn.append(point.index)
+            yield Work(source.on(renderer, point.place), point.settings)
 
-def _noted(points: Iterable[Point], drawn: deque[Index]) -> Iterator[Settings]:
-    """Yield the settings of points, and append the index of each to `drawn`."""
-    for point in points:
-        drawn.append(point.index)
-        yield point.settings
+    for frames in renderer._run_work(work(), check_attachments(attachments)):
+        yield drawn.popleft(), frames
 
 
 class ImageSource:
@@ -125,19 +110,30 @@ class ImageSource:
     #: Of points where no axis gives another.
     place = 0.0
 
-    def __init__(self, images: Sequence[NDArray[Any]], labels: tuple[Any, ...] = ()) -> None:
+    def __init__(
+        self, images: Sequence[NDArray[Any] | Image], labels: tuple[Any, ...] = ()
+    ) -> None:
         self.images = tuple(images)
         self.labels = labels
+        #: Images that a renderer's device has, by place, the latest last.
+        self._uploaded: tuple[_core.Renderer | None, dict[int, _core.Source]] = None, {}
 
-    def many(
-        self,
-        renderer: FrameRenderer,
-        settings: Iterable[Settings],
-        place: float,
-        attachments: str | Sequence[str],
-    ) -> Iterator[Frames]:
-        """Yield the frames of some settings on one image."""
-        return renderer.apply_many(self.images[int(place)], settings, attachments=attachments)
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The device is not sent to other processes.
+        return type(self), (self.images, self.labels)
+
+    def on(self, renderer: FrameRenderer, place: float) -> _core.Source:
+        """Return an image on a renderer's device, where the latest stay."""
+        image = self.images[int(place)]
+        if isinstance(image, Image):
+            return image_source(image)
+        core, held = self._uploaded
+        if core is not renderer._core:
+            core, held = self._uploaded = renderer._core, {}
+        if int(place) not in held:
+            spare = held.pop(next(iter(held))) if len(held) == IMAGES_AHEAD else None
+            held[int(place)] = core.upload(image_source(image), spare, True)
+        return held[int(place)]
 
     def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
         """Tell what would be made of an image, without rendering."""
@@ -155,6 +151,7 @@ class ImageSource:
             "images": [
                 {"shape": list(image.shape), "dtype": image.dtype.name, "sha256": digest(image)}
                 for image in self.images
+                if not isinstance(image, Image)
             ],
         }
 
@@ -172,23 +169,17 @@ class SceneSource:
         self.size = size
         self.shading: Shading = shading
         self.place = time
+        self._latest: tuple[float, _core.Source] | None = None
 
-    def many(
-        self,
-        renderer: FrameRenderer,
-        settings: Iterable[Settings],
-        place: float,
-        attachments: str | Sequence[str],
-    ) -> Iterator[Frames]:
-        """Yield the frames of some settings at one time."""
-        return renderer.render_many(
-            self.scene,
-            settings,
-            self.size,
-            shading=self.shading,
-            time=place,
-            attachments=attachments,
-        )
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.scene, self.size, self.shading, self.place)
+
+    def on(self, renderer: FrameRenderer, place: float) -> _core.Source:
+        """Return the scene at a time; what the device has of it stays there by itself."""
+        # One object for each time, so that requests of the same time share submissions.
+        if self._latest is None or self._latest[0] != place:
+            self._latest = place, self.for_core(place)
+        return self._latest[1]
 
     def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
         """Tell what would be made of the scene, without rendering."""
@@ -248,8 +239,8 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     ):
         if is_given:
             raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-    if hasattr(source, "__array__") or hasattr(source, "__dlpack__"):
-        return ImageSource([check_image(source)])
+    if is_image(source):
+        return ImageSource([_checked(source)])
     labels: list[Any]
     if isinstance(source, Mapping):
         images, labels = list(source.values()), [str(label) for label in source]
@@ -261,7 +252,11 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         )
     if not images:
         raise ValueError("source: the list of images is empty")
-    return ImageSource([check_image(image) for image in images], tuple(labels))
+    return ImageSource([_checked(image) for image in images], tuple(labels))
+
+
+def _checked(image: object) -> NDArray[Any] | Image:
+    return image if isinstance(image, Image) else check_image(image)
 
 
 def digest(value: object) -> str:

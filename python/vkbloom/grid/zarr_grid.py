@@ -16,7 +16,9 @@ from vkbloom.grid.memory import chunk_of
 from vkbloom.grid.order import Index
 from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
+from vkbloom.grid.sources import ImageSource
 from vkbloom.grid.store import IDENTITY, ROOT, GridStore, read_json, stored_identity
+from vkbloom.image import Image
 from vkbloom.settings import Settings, Shading
 
 if TYPE_CHECKING:
@@ -130,6 +132,10 @@ def grid_to_zarr(
         attachments=attachments,
         reduce=reduce,
     )
+    if isinstance(grid.source, ImageSource) and any(
+        isinstance(image, Image) for image in grid.source.images
+    ):
+        raise TypeError("source: an uploaded image belongs to one renderer; give the array itself")
     if "done" in (axis.name for axis in grid.axes):
         raise ValueError("axes: 'done' is not a possible name; the store uses it for its marks")
     if client is not None and not keys.is_shared:

@@ -1,0 +1,97 @@
+"""Images one after the other: some are read and written while the device works on another."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any, Final, TypeVar
+
+import click
+
+import vkbloom
+from vkbloom.io.images import Picture
+
+__all__ = ["read_ahead", "rendered", "written_behind"]
+
+# Images that are read before they are asked for, and results that wait to be written.
+_AHEAD: Final = 1
+_BEHIND: Final = 1
+
+Read = TypeVar("Read")
+
+
+def read_ahead(read: Callable[[str], Read], sources: Iterable[str]) -> Iterator[Read]:
+    """Yield what is read of each source; the next one is read meanwhile, in a thread.
+
+    Parameters
+    ----------
+    read : callable
+        Takes a source. What it raises is raised in its turn.
+    sources : iterable of str
+    """
+    context = click.get_current_context()
+
+    def read_in_context(source: str) -> Read:
+        with context.scope(cleanup=False):
+            return read(source)
+
+    with _thread("vkbloom-read") as pool:
+        ahead: deque[Future[Read]] = deque()
+        for source in sources:
+            ahead.append(pool.submit(read_in_context, source))
+            if len(ahead) > _AHEAD:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
+
+
+def rendered(
+    renderer: vkbloom.Renderer,
+    pictures: Iterable[Picture],
+    settings: vkbloom.Settings,
+    attachments: str | list[str],
+) -> Generator[tuple[Picture, vkbloom.Frames], None, None]:
+    """Yield each picture with its frames."""
+    waiting: deque[Picture] = deque()
+
+    def pixels() -> Iterator[Any]:
+        for picture in pictures:
+            waiting.append(picture)
+            yield picture.pixels
+
+    for frames in renderer.apply_each(pixels(), settings, attachments=attachments):
+        yield waiting.popleft(), frames
+
+
+@contextmanager
+def written_behind() -> Iterator[Callable[[Callable[[], object]], None]]:
+    """Give a function that runs writes in their order, in a thread.
+
+    It raises what an earlier write raised, and so does leaving. What is written when something else
+    fails is complete.
+    """
+    with _thread("vkbloom-write") as pool:
+        behind: deque[Future[object]] = deque()
+
+        def add(write: Callable[[], object]) -> None:
+            behind.append(pool.submit(write))
+            while len(behind) > _BEHIND:
+                behind.popleft().result()
+
+        try:
+            yield add
+        finally:
+            # Also after a failure, whose exception goes on: images before it are complete.
+            while behind:
+                behind.popleft().result()
+
+
+@contextmanager
+def _thread(name: str) -> Iterator[ThreadPoolExecutor]:
+    pool = ThreadPoolExecutor(1, name)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

@@ -1,0 +1,52 @@
+"""Say it where settings give no bloom: the picture looks as without."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+
+__all__ = ["brightest_of", "is_without", "only", "reason", "with_bloom"]
+
+
+def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | list[str]:
+    """Return framebuffers to ask for: the bloom as well, unless it is turned off."""
+    if isinstance(names, str):
+        return names
+    return [*names, *["bloom"] * (settings.bloom and "bloom" not in names)]
+
+
+def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
+    """Return the frames with those framebuffers alone; "all" are all."""
+    if isinstance(names, str) or set(frames) == set(names):
+        return frames
+    return vkbloom.Frames(
+        {name: array for name, array in frames.items() if name in names},
+        timings=frames.timings,
+        settings=frames.settings,
+        info=frames.info,
+    )
+
+
+def is_without(frames: vkbloom.Frames) -> bool:
+    """Whether there is a bloom, and it is zero everywhere."""
+    return "bloom" in frames and not frames["bloom"][:, :, :3].any()
+
+
+def brightest_of(pixels: NDArray[Any]) -> float:
+    """Return the largest finite value of an image, 255 of uint8 being 1."""
+    colours = pixels[:, :, :3]
+    scale = np.float32(255 if pixels.dtype == np.uint8 else 1)
+    return float(np.max(colours, initial=0, where=np.isfinite(colours)) / scale)
+
+
+def reason(settings: vkbloom.Settings, brightest: float | None = None) -> str:
+    """Say that the bloom is zero, and what is known of why."""
+    text = "the bloom is zero everywhere"
+    if settings.threshold is not None:
+        text += f": nothing lies above the threshold {settings.threshold:g}"
+    return text if brightest is None else f"{text}; the brightest value is {brightest:.3g}"

@@ -1,0 +1,60 @@
+"""An image that stays on a renderer's device."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from vkbloom import _core
+
+__all__ = ["Image"]
+
+
+class Image:
+    """A snapshot of an image on the device of one renderer, made by `Renderer.upload`.
+
+    It is accepted wherever an image is, by the renderer that made it: `apply`, `apply_many`,
+    `apply_each`, `plan` and `grid`. Its pixels travel to the device once, and are compared with
+    nothing. Its memory is free again when the handle is collected, or the renderer is closed.
+
+    Attributes
+    ----------
+    shape : (int, int, int)
+        (H, W, 3) or (H, W, 4), as of the array that it was made of.
+    dtype : numpy.dtype
+        uint8, float16 or float32.
+
+    See Also
+    --------
+    Renderer.upload : Makes it.
+
+    Examples
+    --------
+    >>> array = np.zeros((90, 160, 3), np.float16)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     image = renderer.upload(array)
+    ...     array[:] = 1.0
+    ...     final = renderer.apply(image)["final"]
+    >>> image
+    <vkbloom.Image of 160 x 90 pixels, 3 channels, float16>
+    >>> float(final.max())
+    0.0
+    """
+
+    __slots__ = ("__weakref__", "_source", "dtype", "shape")
+
+    def __init__(
+        self, source: _core.Source, shape: tuple[int, int, int], dtype: np.dtype[Any]
+    ) -> None:
+        self._source = source
+        self.shape = shape
+        self.dtype = dtype
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("an Image cannot be copied or pickled; it is on one renderer's device")
+
+    def __repr__(self) -> str:
+        height, width, channels = self.shape
+        return f"<vkbloom.Image of {width} x {height} pixels, {channels} channels, {self.dtype}>"
