@@ -19,6 +19,7 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
+from vkbloom.cli.glow_options import accompanying, glow_options, uploaded
 from vkbloom.cli.image_files import (
     COLOURS,
     input_colour_option,
@@ -78,6 +79,7 @@ from vkbloom.settings import Encoding
 )
 @subimage_option
 @layer_option
+@glow_options
 @device_options
 @settings_options
 def command(
@@ -92,6 +94,8 @@ def command(
     raw: bool,
     subimage: int,
     layer: str | None,
+    mask: str | None,
+    emission: str | None,
     adapter: str,
     validation: bool,
     settings: vkbloom.Settings,
@@ -116,7 +120,11 @@ def command(
     values are encoded already and written as they come. EXIF, resolution and a JPEG's chroma
     subsampling are kept.
 
-    Alpha is kept, and colours are neither multiplied nor divided by it. Grey images become RGB
+    --mask limits what glows, --emission glows in the image's place; of several INs they are for
+    each.
+
+    Alpha is kept, unless --alpha says otherwise, and colours are neither multiplied nor divided by
+    it. Grey images become RGB
     and grey again. Of an OpenEXR file whose data window is smaller than its display window, the
     rest is black; a larger data window takes part, and is kept where OUT can have one. Images
     are turned upright where the file has an orientation. Of files with several parts the first
@@ -164,14 +172,19 @@ def command(
 
         # Before the device is opened: the most likely failure comes at once.
         first = taken(work[0][0])
+        given_with = accompanying(mask, emission, input_colour, raw=raw)
         pictures = itertools.chain([first], read_ahead(taken, [name for name, _ in work[1:]]))
         # None: shown where standard error is a terminal.
         disable = None if several and sys.stderr is not None else True
         with vkbloom.Renderer(adapter, validation=validation) as renderer:
             _say(f"Rendering on {renderer.info.summary}", out)
+
+            def prepared(picture: Picture) -> Any:
+                return uploaded(renderer, picture.pixels, given_with(picture.pixels))
+
             with as_wrong_use():
-                renderer.plan(first.pixels, settings, attachments=wanted)
-            results = rendered(renderer, pictures, settings, wanted)
+                renderer.plan(prepared(first), settings, attachments=wanted)
+            results = rendered(renderer, pictures, settings, wanted, prepared)
             del first
             bar = tqdm(results, total=len(work), unit="image", leave=False, disable=disable)
             with written_behind() as write_next, contextlib.closing(results):
