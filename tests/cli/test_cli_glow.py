@@ -59,14 +59,31 @@ def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
     # Files need not have the same channels and numbers.
     images = [picture(24, 16, 4, seed=seed) for seed in (2, 3)]
     emission = picture(24, 16, 3, "float16", seed=4)
-    sources = [stored(tmp_path / f"f{i}.exr", image) for i, image in enumerate(images)]
+    sources = [tmp_path / f"f{i}.exr" for i in range(2)]
+    for source, image in zip(sources, images, strict=True):
+        vkbloom.write(source, image, premultiplied=True)
     glow = stored(tmp_path / "glow.exr", emission)
     done("apply", *sources, tmp_path / "out", *PYRAMID, "--alpha", "max", "--emission", glow)
     alike = np.concatenate([emission, np.ones((16, 24, 1))], axis=2).astype(np.float32)
     for source, image in zip(sources, images, strict=True):
-        found = vkbloom.read(tmp_path / "out" / source.name)
+        found = vkbloom.read(tmp_path / "out" / source.name, premultiplied=True)
         wanted = expected(image, SETTINGS.replace(alpha="max"), emission=alike)
         assert_array_equal(found, wanted)
+
+
+def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
+    levels = picture(24, 16, 4, "uint8")
+    levels[:, :12, 3] = 0
+    source, out = stored(tmp_path / "a.png", levels), tmp_path / "out.png"
+    done("apply", source, out, *PYRAMID, "--alpha", "blur")
+    image = vkbloom.read(source, premultiplied=True)
+    final = expected(image, SETTINGS.replace(alpha="blur"))
+    vkbloom.write(tmp_path / "own.png", final, premultiplied=True)
+    difference = vkbloom.read(out) - vkbloom.read(tmp_path / "own.png")
+    assert np.abs(difference).max() <= 0.01
+    assert vkbloom.read(out)[:, 11, 3].min() > 0
+    refused = run("apply", source, out, "--alpha", "blur", "--encoding", "srgb")
+    assert refused.exit_code == 2
 
 
 def test_what_does_not_fit(tmp_path: Path) -> None:

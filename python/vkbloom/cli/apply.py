@@ -19,7 +19,13 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.glow_options import accompanying, glow_options, uploaded
+from vkbloom.cli.glow_options import (
+    accompanying,
+    glow_options,
+    has_straight,
+    premultiplied,
+    uploaded,
+)
 from vkbloom.cli.image_files import (
     COLOURS,
     input_colour_option,
@@ -34,6 +40,7 @@ from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.io import image_writing
+from vkbloom.io.array_files import divided
 from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.settings import Encoding
 
@@ -124,7 +131,8 @@ def command(
     each.
 
     Alpha is kept, unless --alpha says otherwise, and colours are neither multiplied nor divided by
-    it. Grey images become RGB
+    it: with --alpha max or blur files of straight colours are multiplied first, and the result is
+    divided. Grey images become RGB
     and grey again. Of an OpenEXR file whose data window is smaller than its display window, the
     rest is black; a larger data window takes part, and is kept where OUT can have one. Images
     are turned upright where the file has an orientation. Of files with several parts the first
@@ -133,14 +141,7 @@ def command(
 
     OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
     """
-    if raw and (input_colour or output_colour):
-        raise click.UsageError(
-            "--raw does not convert colours; leave out --input-colour and --output-colour"
-        )
-    if settings.encoding != "none" and output_colour:
-        raise click.UsageError(
-            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
-        )
+    _check_colours(settings, input_colour, output_colour, raw=raw)
     given, out = _arguments(sources, out)
     if out == PIPE and attachments != "final":
         raise click.UsageError("standard output takes final alone, without --attachments")
@@ -153,11 +154,13 @@ def command(
     names = attachments if attachments == "all" else ["final", *attachments.split(",")]
     wanted = no_bloom.with_bloom(names, settings)
     several = len(work) > 1
+    is_blended = settings.alpha != "keep"
     with tempfile.TemporaryDirectory() as folder, silenced():
 
         def taken(source: str) -> Picture:
             file = _piped_in(folder) if source == PIPE else source
-            return read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            picture = read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            return premultiplied(picture) if is_blended else picture
 
         def write(picture: Picture, frames: vkbloom.Frames, target: str) -> None:
             if several:
@@ -172,7 +175,7 @@ def command(
 
         # Before the device is opened: the most likely failure comes at once.
         first = taken(work[0][0])
-        given_with = accompanying(mask, emission, input_colour, raw=raw)
+        given_with = accompanying(mask, emission, input_colour, raw=raw, is_blended=is_blended)
         pictures = itertools.chain([first], read_ahead(taken, [name for name, _ in work[1:]]))
         # None: shown where standard error is a terminal.
         disable = None if several and sys.stderr is not None else True
@@ -197,6 +200,29 @@ def command(
                     )
     if several:
         click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
+
+
+def _check_colours(
+    settings: vkbloom.Settings,
+    input_colour: Colour | None,
+    output_colour: SavedColour | None,
+    *,
+    raw: bool,
+) -> None:
+    """Raise click.UsageError for options that do not go together."""
+    if raw and (input_colour or output_colour):
+        raise click.UsageError(
+            "--raw does not convert colours; leave out --input-colour and --output-colour"
+        )
+    if settings.encoding != "none" and settings.alpha != "keep":
+        raise click.UsageError(
+            f"--alpha {settings.alpha} is for linear colours; leave out --encoding, OUT is encoded "
+            "as its format needs"
+        )
+    if settings.encoding != "none" and output_colour:
+        raise click.UsageError(
+            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
+        )
 
 
 def _arguments(sources: tuple[str, ...], out: str | None) -> tuple[list[str], str]:
@@ -230,7 +256,7 @@ def _written(
     """Write `final` and the other framebuffers, and return the files."""
     written = _save_others(frames, target)
     notes = image_writing.save(
-        _result(picture, frames["final"], frames.settings.encoding),
+        _result(picture, _straight(picture, frames), frames.settings.encoding),
         target,
         colour,
         {
@@ -264,3 +290,9 @@ def _result(
     """Return the picture with its bloom, with the encoding that its pixels now have."""
     done = picture.encoding if encoding == "none" else encoding
     return dataclasses.replace(picture, pixels=final, encoding=done)
+
+
+def _straight(picture: Picture, frames: vkbloom.Frames) -> NDArray[Any]:
+    """Return `final` with colours as the file's were, multiplied by alpha or not."""
+    final = frames["final"]
+    return divided(final) if frames.settings.alpha != "keep" and has_straight(picture) else final

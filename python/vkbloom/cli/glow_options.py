@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any
@@ -12,9 +13,10 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.cli.image_files import read_picture
-from vkbloom.io.images import Colour
+from vkbloom.io.array_files import multiplied
+from vkbloom.io.images import Colour, Picture
 
-__all__ = ["accompanying", "glow_options", "uploaded"]
+__all__ = ["accompanying", "glow_options", "has_straight", "premultiplied", "uploaded"]
 
 Array = NDArray[Any]
 
@@ -44,9 +46,16 @@ def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def accompanying(
-    mask: str | None, emission: str | None, colour: Colour | None = None, *, raw: bool = False
+    mask: str | None,
+    emission: str | None,
+    colour: Colour | None = None,
+    *,
+    raw: bool = False,
+    is_blended: bool = False,
 ) -> Callable[[Array], dict[str, Any]]:
     """Read both files, and return what gives an image's arguments `mask` and `emission`.
+
+    `is_blended`: the emission's colours are to be multiplied by its alpha.
 
     Raises
     ------
@@ -54,13 +63,28 @@ def accompanying(
         A file cannot be read, or the mask has colours.
     """
     mask_values = None if mask is None else _read_mask(mask)
-    glow = None if emission is None else read_picture(emission, 0, colour, raw=raw).pixels
+    glow = None
+    if emission is not None:
+        read = read_picture(emission, 0, colour, raw=raw)
+        glow = (premultiplied(read) if is_blended else read).pixels
 
     def arguments(image: Array) -> dict[str, Array]:
         given = {} if mask_values is None else {"mask": mask_values}
         return given if glow is None else {**given, "emission": _alike(glow, image)}
 
     return arguments
+
+
+def has_straight(picture: Picture) -> bool:
+    """Whether a picture's file has an alpha by which its colours are not multiplied."""
+    return picture.pixels.shape[2] == 4 and not picture.stored.associated
+
+
+def premultiplied(picture: Picture) -> Picture:
+    """Return a picture whose colours are multiplied by alpha, if there is one."""
+    if not has_straight(picture):
+        return picture
+    return dataclasses.replace(picture, pixels=multiplied(picture.pixels))
 
 
 def _read_mask(file: str) -> Array:
