@@ -10,7 +10,8 @@ python=/opt/python/bin/python3.11
 cd "$source"
 # volk is compiled in, so its licence comes along.
 cp /build/vulkan/usr/share/doc/libvulkan-volk-dev/copyright LICENSE.volk
+export VKBLOOM_CFLAGS="-include packaging/glibc_2_28.h" VKBLOOM_LDFLAGS=-Wl,--strip-all
 VULKAN_SDK=/build/vulkan/usr "$python" -m pip --quiet wheel \
     --no-deps --no-build-isolation --no-index --wheel-dir dist .
-"$python" -m wheel tags --remove --platform-tag "$PLATFORM" dist/*.whl
+"$python" -m wheel tags --remove --platform-tag "manylinux_${CORE_GLIBC}_x86_64" dist/*.whl
 mv dist/*.whl "$wheels"

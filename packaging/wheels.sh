@@ -31,11 +31,13 @@ for step in core.sh lavapipe/build.sh; do
         sh "/build/vkbloom/packaging/$step" "$folder" /build/wheels
 done
 # Names that promise more than the files keep must not leave here.
-chroot "$root" sh -c 'for library in /build/vkbloom/build/lib*/vkbloom/_core.abi3.so \
-        /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so; do
-    newest=$(objdump -T "$library" | grep -o "GLIBC_[0-9.]*" | sort -uV | tail -n 1)
-    echo "$library needs $newest"
-    test "$(printf "%s\n" "$newest" GLIBC_2.31 | sort -V | tail -n 1)" = GLIBC_2.31 || exit 1
-done'
+check_glibc() {
+    newest=$(chroot "$root" sh -c "objdump -T $2" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -n 1)
+    most=GLIBC_$(echo "$1" | tr _ .)
+    echo "$2 needs $newest; at most $most"
+    test "$(printf '%s\n' "$newest" "$most" | sort -V | tail -n 1)" = "$most"
+}
+check_glibc "$CORE_GLIBC" '/build/vkbloom/build/lib*/vkbloom/_core.abi3.so'
+check_glibc "$DRIVER_GLIBC" /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so
 cp "$root"/build/wheels/*.whl dist/
 ls -l dist

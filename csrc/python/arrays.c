@@ -1,21 +1,20 @@
-// The Pages type: a run of a renderer's pages with the buffer protocol. NumPy's arrays are views of
-// it, so that the pages come back when the last of them is gone, which may be long after the
-// renderer.
+// The Pages type: a run of a renderer's pages with the buffer protocol. NumPy arrays are views of
+// it. The pages are returned when the last view is gone, which may be long after the renderer is
+// closed.
 #include "python/module.h"
 
 struct pages_object {
     PyObject_HEAD
     struct vkb_pages *pages;
     struct vkb_page_run *run;
-    Py_ssize_t size;  // asked for; the run may have more
-    long process;     // whose device the run goes back to
+    Py_ssize_t size;  // the requested size; the run may be larger
+    long process;     // the process that opened the renderer
 };
 
 PyObject *vkb_new_pages(PyObject *object, PyObject *argument)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyTypeObject *type = (PyTypeObject *)state->pages_type;
     const Py_ssize_t size = PyLong_AsSsize_t(argument);
     struct vkb_error error = {0};
 
@@ -27,8 +26,7 @@ PyObject *vkb_new_pages(PyObject *object, PyObject *argument)
     }
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
-    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
-    struct pages_object *self = (struct pages_object *)allocate(type, 0);
+    struct pages_object *self = vkb_new_object(state->pages_type);
     if (!self)
         return NULL;
     self->size = size;
@@ -45,14 +43,11 @@ PyObject *vkb_new_pages(PyObject *object, PyObject *argument)
 static void dealloc(PyObject *object)
 {
     struct pages_object *self = (struct pages_object *)object;
-    PyTypeObject *type = Py_TYPE(object);
-    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
 
-    // A forked process keeps its copies: the device is its parent's.
+    // A forked process returns nothing: the device belongs to its parent.
     if (self->run && self->process == vkb_current_process())
         vkb_pages_give_back(self->pages, self->run);
-    release(self);
-    Py_DECREF(type);
+    vkb_free_object(object);
 }
 
 static int get_buffer(PyObject *object, Py_buffer *view, int flags)
@@ -71,11 +66,11 @@ static PyType_Slot slots[] = {
     {Py_tp_dealloc, dealloc},
     {Py_bf_getbuffer, get_buffer},
     {Py_sq_length, length},
-    {Py_tp_doc, "Memory of a renderer's that the device writes to without a copy."},
+    {Py_tp_doc, "Memory of a renderer, to which the device writes without a copy."},
     {0},
 };
 
-// It holds no references, so that the collector has nothing to see.
+// No garbage collection: it holds no references to objects.
 PyType_Spec vkb_pages_spec = {
     .name = "vkbloom._core.Pages",
     .basicsize = sizeof(struct pages_object),

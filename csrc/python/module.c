@@ -221,6 +221,22 @@ static PyObject *new_error(const struct vkb_module_state *state, const struct er
     return type;
 }
 
+void *vkb_new_object(PyObject *type)
+{
+    const allocfunc allocate = (allocfunc)PyType_GetSlot((PyTypeObject *)type, Py_tp_alloc);
+
+    return allocate((PyTypeObject *)type, 0);
+}
+
+void vkb_free_object(PyObject *object)
+{
+    PyTypeObject *type = Py_TYPE(object);
+    const freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
+
+    release(object);
+    Py_DECREF(type);
+}
+
 static bool add_type(PyObject *module, PyType_Spec *spec, const char *name, PyObject **type)
 {
     *type = PyType_FromModuleAndSpec(module, spec, NULL);

@@ -1,6 +1,4 @@
-// What the files that speak Python share: module.c, renderer.c, source.c, plan.c, requests.c,
-// arrays.c, arguments.c, scene_arguments.c, and faults.c in test builds. The only header of the
-// core that includes Python.h.
+// Shared by the files of this folder. The only header of the core that includes Python.h.
 #ifndef VKB_MODULE_H
 #define VKB_MODULE_H
 
@@ -17,12 +15,17 @@
 struct vkb_module_state {
     PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
-    PyObject *attributes;                   // tuple of the names that vkb_read_settings asks for
+    PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);
 
-// Raises the exception that fits; returns NULL.
+// Creates an object of a heap type with zeroed members. NULL with an exception set.
+void *vkb_new_object(PyObject *type);
+// Frees an object whose members have been released, and releases its type: the end of tp_dealloc.
+void vkb_free_object(PyObject *object);
+
+// Raises the exception class of the error; returns NULL.
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
 
 // (name, type, driver, driver_info, api_version, driver UUID as bytes)
@@ -31,12 +34,12 @@ PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
     vkb_pages_spec;
 
-// What a submission needs until the device is done with it. Once it is abandoned, because nobody
-// waits for it any more, the renderer has it.
+// The data of a submission until the device has finished it. If nobody waits for it any more, it is
+// abandoned: the renderer owns it.
 struct vkb_pending {
     struct vkb_submission *submission;  // NULL: not submitted
-    PyObject *plans;                    // a tuple: their graphs are read until then
-    PyObject *source;                   // what the device reads until then
+    PyObject *plans;   // a tuple: their graphs are read until the device has finished
+    PyObject *source;  // read by the device until then
     struct vkb_request *requests;
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
@@ -49,75 +52,75 @@ struct vkb_pending {
 
 struct vkb_renderer {
     PyObject_HEAD
-    PyThread_type_lock lock;  // held, without the GIL, around all that touches the device
-    unsigned long holder;     // the thread that holds it, 0: none; read and written with the GIL
-    PyThreadState *thread;    // that thread's, while it has given the GIL back
-    struct vkb_pending *abandoned;  // touched with the GIL
-    long process;      // that opened it: the device is no other's, not even a forked one's
-    atomic_bool open;  // changed with the lock, looked at without
-    const struct vkb_messages *before;  // whose the messages are when the holder leaves
-    uint64_t serial;                    // by which plans know it; never 0
-    struct vkb_pages *pages;            // of large arrays; NULL: closed
-    struct vkb_residents *residents;    // of handles; NULL: closed
-    size_t pipeline_count;              // made so far; read and written with the GIL
-    struct vkb_cached cached;           // read and written with the GIL
+    PyThread_type_lock lock;        // held, without the GIL, around all device work
+    unsigned long holder;           // the thread with the lock, 0: none; accessed with the GIL
+    PyThreadState *thread;          // of that thread, while it has released the GIL
+    struct vkb_pending *abandoned;  // accessed with the GIL
+    long process;                   // that opened it; a forked process must not use the device
+    atomic_bool open;               // written with the lock, read without it
+    const struct vkb_messages
+        *before;                      // receives the messages when the thread with the lock leaves
+    uint64_t serial;                  // identifies the renderer of a plan; never 0
+    struct vkb_pages *pages;          // of large arrays; NULL: closed
+    struct vkb_residents *residents;  // of handles; NULL: closed
+    size_t pipeline_count;            // created so far; accessed with the GIL
+    struct vkb_cached cached;         // accessed with the GIL
     enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
 };
 
-// Fails where the renderer is closed or another process's, or its device lost.
+// Fails if the renderer is closed, belongs to another process, or has lost its device.
 bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *error);
 
-// Takes the renderer's lock and gives the GIL back, and the other way round. Waiting for the lock
-// can be interrupted by a signal; then, and where a signal's handler asks for what the thread that
-// it interrupted has, the first one fails, with the GIL. The second one releases what is
-// abandoned and over.
+// vkb_renderer_enter takes the renderer's lock and releases the GIL. It fails, with the GIL, if a
+// signal interrupts the wait for the lock, or if a signal handler runs in the thread that has the
+// lock. vkb_renderer_leave does the reverse, and releases abandoned submissions that have finished.
 bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
 void vkb_renderer_leave(struct vkb_renderer *renderer);
 
-// Whether what was `done` is so without a validation message either: such a message says more than
-// the failure that it led to. After an interruption, whose exception is set, the messages wait for
-// the next call. With the lock.
+// Returns `done`, or false if there are validation messages; then the error has these, since they
+// explain a failure better. After an interruption, with its exception set, the messages are kept
+// for the next call. Called with the lock.
 bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struct vkb_error *error);
 
 // Whether this is the process that opened the renderer.
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
-// Takes over what nobody waits for any more. With the GIL.
+// Makes the renderer the owner of a submission that nobody waits for. With the GIL.
 void vkb_renderer_abandon(struct vkb_renderer *renderer, struct vkb_pending *pending);
 
-// With the GIL; the device must be done with it.
+// With the GIL; the device must have finished the submission.
 void vkb_pending_release(struct vkb_pending *pending);
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg);
 
-// Makes what vkb_read_settings keeps in the state; false with an exception set.
+// Creates the names that vkb_read_settings reads; false with an exception set.
 bool vkb_make_attributes(struct vkb_module_state *state);
 
-// A settings object's attributes; one that it lacks keeps its default. False with an
+// Reads the attributes of a settings object; missing ones have their defaults. False with an
 // exception set.
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 
-// Whether it is a tuple, as PyArg_ParseTuple must have it; else with a TypeError set.
+// Whether the object is a tuple, which PyArg_ParseTuple requires; otherwise sets a TypeError.
 bool vkb_require_tuple(PyObject *object, const char *what);
 
-// Converters of PyArg_ParseTuple ("O&"), whose own codes for unsigned integers take any
-// number modulo 2^32. 0 with an exception set.
+// Converters for PyArg_ParseTuple ("O&"): its own codes for unsigned integers accept any number
+// modulo 2^32. 0 with an exception set.
 int vkb_read_uint32(PyObject *object, void *number);
 int vkb_read_serial(PyObject *object, void *number);  // 64 bits, not 0
 
 // (position, rotation, fov, near, far), the first two of three numbers each.
 bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
 
-// The buffer protocol's code of the element type; 0 for anything but one number in this machine's
-// byte order.
+// The buffer protocol's code of the element type; 0 if it is not a single number in native byte
+// order.
 char vkb_element_code(const Py_buffer *view);
 bool vkb_has_element(const Py_buffer *view, const char *codes);
 
-// The format of pixels whose channels have that element type: B, e or f.
+// The format of pixels whose channels have the element type B, e or f.
 enum vkb_format vkb_pixel_format(char code);
 
-// A scene's arrays, held until vkb_release_scene, which may be called on a zeroed or half-read one.
+// The arrays of a scene, held until vkb_release_scene. Releasing a zeroed or half-read one is safe.
 struct vkb_held_scene {
     struct vkb_scene_data data;
     Py_buffer *views;
@@ -130,8 +133,8 @@ struct vkb_held_scene {
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
 void vkb_release_scene(struct vkb_held_scene *scene);
 
-// An image's pixels, held until vkb_release_image, which may be called on a zeroed or half-read
-// one.
+// The pixels of an image, held until vkb_release_image. Releasing a zeroed or half-read one is
+// safe.
 struct vkb_held_image {
     struct vkb_input input;
     Py_buffer view;
@@ -163,11 +166,11 @@ struct vkb_plan_object {
     PyObject_HEAD
     struct vkb_source source;
     struct vkb_plan plan;
-    uint64_t renderer;  // whose plan it is; 0: nobody's, to be looked at
+    uint64_t renderer;  // serial of its renderer; 0: none, for inspection only
     PyObject *outputs;  // ((name, shape, dtype), ...)
 };
 
-// Bytes of an output in the caller's array.
+// Size in bytes of an output in the caller's array.
 size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 
 // Functions of the module.

@@ -132,9 +132,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
                           enum vkb_variants variants, uint64_t renderer, PyObject *source,
                           const struct vkb_settings *settings, PyObject *names)
 {
-    PyTypeObject *type = (PyTypeObject *)state->plan_type;
-    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
-    struct vkb_plan_object *self = (struct vkb_plan_object *)allocate(type, 0);
+    struct vkb_plan_object *self = vkb_new_object(state->plan_type);
     struct vkb_error error = {0};
 
     if (!self)
@@ -423,14 +421,11 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
 static void dealloc(PyObject *object)
 {
     struct vkb_plan_object *self = (struct vkb_plan_object *)object;
-    PyTypeObject *type = Py_TYPE(object);
-    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
 
     PyObject_GC_UnTrack(object);
     vkb_plan_destroy(&self->plan);
     Py_XDECREF(self->outputs);
-    release(object);
-    Py_DECREF(type);
+    vkb_free_object(object);
 }
 
 static PyMethodDef methods[] = {
@@ -454,7 +449,7 @@ static PyGetSetDef attributes[] = {
     {0},
 };
 
-// What it holds is set once and holds no objects of the collector's: there is nothing to clear.
+// No tp_clear: `outputs` cannot be part of a reference cycle, and a submission may need the graph.
 static PyType_Slot slots[] = {
     {Py_tp_dealloc, dealloc},
     {Py_tp_traverse, traverse},

@@ -1,4 +1,4 @@
-// The Renderer type: a device and all that lives on it.
+// The Renderer type: a device with everything on it.
 #include "python/module.h"
 
 static struct vkb_module_state *state_of(PyObject *self)
@@ -21,7 +21,7 @@ static bool require_ours(const struct vkb_renderer *self, struct vkb_error *erro
                     self->process, vkb_current_process());
 }
 
-// The device's question between the slices of a wait: whether a signal's handler raised.
+// Called between the slices of a wait: whether a signal handler raised an exception.
 static bool interrupted(void *context)
 {
     struct vkb_renderer *self = context;
@@ -47,14 +47,15 @@ static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
     return true;
 }
 
-// Takes out of what is abandoned what is over. With the lock and the GIL, or without a device.
+// Removes the finished submissions from the abandoned ones and returns them. With the lock and the
+// GIL, or without a device.
 static struct vkb_pending *take_over(struct vkb_renderer *self)
 {
     struct vkb_pending **link = &self->abandoned, *over = NULL;
 
     while (*link) {
         struct vkb_pending *pending = *link;
-        // Without a device all is over; one that was left behind at work keeps what it has.
+        // Without a device, all are finished. A busy device that was not destroyed keeps its own.
         if (self->device.handle
             && !(self->open && vkb_frame_drop(&self->device, &self->frame, pending->submission))) {
             link = &pending->next;
@@ -67,8 +68,8 @@ static struct vkb_pending *take_over(struct vkb_renderer *self)
     return over;
 }
 
-// With the GIL, without the lock: it runs Python's code, which may wait for another thread that
-// waits for the renderer. An exception that is set stays.
+// Called with the GIL and without the lock: it may run Python code, which may wait for a thread
+// that waits for the renderer. A set exception is kept.
 static void release_all(struct vkb_pending *over)
 {
     PyObject *type, *value, *traceback;
@@ -127,8 +128,8 @@ bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vk
     return vkb_messages_check(&self->device.messages, error) && done;
 }
 
-// create(adapter, driver, validation, variants, read_cache): read_cache(driver_uuid) gives the
-// bytes of an earlier run's pipeline cache, or None.
+// create(adapter, driver, validation, variants, read_cache): read_cache(driver_uuid) returns the
+// stored pipeline cache as bytes, or None.
 static bool create(struct vkb_renderer *self, const char *adapter, const char *driver,
                    bool validation, const char *variants, PyObject *read_cache,
                    struct vkb_error *error)
@@ -187,8 +188,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         PyErr_SetString(PyExc_ValueError, "frame_seconds: a number above 0 is needed");
         return NULL;
     }
-    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
-    struct vkb_renderer *self = (struct vkb_renderer *)allocate(type, 0);
+    struct vkb_renderer *self = vkb_new_object((PyObject *)type);
     if (!self)
         return NULL;
     static uint64_t last_serial;
@@ -212,21 +212,21 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     return NULL;
 }
 
-// With the lock, without the GIL. With the validation layer, an object left behind is a message
-// here. A wait that is interrupted leaves the renderer open. A device that is at work for too long
-// is left as it is, with all that it may still use.
+// Called with the lock and without the GIL. The validation layer reports objects that were not
+// destroyed. After an interrupted wait the renderer stays open. A device that is busy for too long
+// is not destroyed, nor is anything that it may still use.
 static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
 {
     if (!self->open)
         return true;
     if (self->device.timed_out)
-        self->device.frame_seconds = 0.0;  // it has been waited for: one slice
+        self->device.frame_seconds = 0.0;  // one slice: an earlier wait has timed out
     if (!vkb_frame_end(&self->device, &self->frame, error)) {
         if (error->kind == VKB_ERROR_INTERRUPTED)
             return false;
         self->open = false;
         return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
-                        "the device is still at work; what it uses is kept until the process ends");
+                        "the device is still busy; what it uses is kept until the process ends");
     }
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
@@ -240,8 +240,8 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     return vkb_messages_check(&self->device.messages, error);
 }
 
-// The device's question while nobody can be told of an exception: a Ctrl-C ends the wait, and its
-// handler runs as soon as Python's code goes on.
+// Called between the slices of a wait in dealloc, where no exception can be raised: Ctrl-C ends the
+// wait, and its handler runs when Python code continues.
 static bool interrupted_at_the_end(void *context)
 {
     struct vkb_renderer *self = context;
@@ -257,8 +257,6 @@ static bool interrupted_at_the_end(void *context)
 static void dealloc(PyObject *object)
 {
     struct vkb_renderer *self = (struct vkb_renderer *)object;
-    PyTypeObject *type = Py_TYPE(object);
-    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
     struct vkb_error error = {0};
 
     PyObject_GC_UnTrack(object);
@@ -271,8 +269,8 @@ static void dealloc(PyObject *object)
         PyEval_RestoreThread(self->thread);
     }
     self->open = false;
-    // A device that is at work still, or another process's, is left behind, and with it what the
-    // driver may still use: what is abandoned, and this object, which has the device's messages.
+    // A device that is still busy or belongs to another process is not destroyed. Everything that
+    // the driver may still use is kept: abandoned submissions, and this object with its messages.
     if (self->device.handle)
         return;
     release_all(take_over(self));
@@ -280,8 +278,7 @@ static void dealloc(PyObject *object)
     vkb_residents_close(self->residents);
     if (self->lock)
         PyThread_free_lock(self->lock);
-    release(self);
-    Py_DECREF(type);
+    vkb_free_object(object);
 }
 
 bool vkb_require_open(const struct vkb_renderer *self, struct vkb_error *error)
@@ -361,24 +358,23 @@ static PyObject *get_cached(PyObject *object, void *unused)
 }
 
 static PyMethodDef methods[] = {
-    {"close", close_renderer, METH_NOARGS, "Gives all back; may be called twice."},
+    {"close", close_renderer, METH_NOARGS, "Releases the device; may be called twice."},
     {"plan", vkb_renderer_plan, METH_VARARGS,
-     "plan(source, settings, names) -> Plan. Without a wait, without the device; None: all "
-     "framebuffers."},
+     "plan(source, settings, names) -> Plan. Makes no device call; names None: all framebuffers."},
     {"run", vkb_renderer_run, METH_VARARGS,
-     "run(source, plans, arrays[, first, count]) -> Submission. Hands plans with the same images "
-     "to "
-     "the device; arrays holds a tuple for each plan, in the order of its outputs, or for rows "
-     "first to first + count of each."},
+     "run(source, plans, arrays[, first, count]) -> Submission. Submits plans with the same "
+     "images; "
+     "arrays has a tuple for each plan, in the order of its outputs, or of rows first to first + "
+     "count of each."},
     {"upload", vkb_renderer_upload, METH_VARARGS,
      "upload(source, spare, recycled, height=0) -> Source. A copy of an image on the device. "
      "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "
-     "`recycled`: it will be one; `height`: rows in all, where `fill` gives it more."},
+     "`recycled`: it will be one; `height`: rows in all, if `fill` provides more of them."},
     {"fill", vkb_renderer_fill, METH_VARARGS,
-     "fill(source, rows, first). Gives an uploaded image rows of an image in host memory, from row "
-     "`first` on, before anything uses it."},
+     "fill(source, rows, first). Copies rows of an image into an uploaded image, from row `first` "
+     "on, before anything uses it."},
     {"pages", vkb_new_pages, METH_O,
-     "pages(size) -> Pages. Memory for an array, used again when the array is gone."},
+     "pages(size) -> Pages. Memory for an array; reused when the array is gone."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };
@@ -392,7 +388,7 @@ static PyGetSetDef attributes[] = {
     {0},
 };
 
-// There is nothing to clear: what is abandoned stays until the device is done with it.
+// No tp_clear: abandoned submissions are kept until the device has finished them.
 static int traverse(PyObject *object, visitproc visit, void *arg)
 {
     const struct vkb_renderer *self = (const struct vkb_renderer *)object;
@@ -412,7 +408,7 @@ static PyType_Slot slots[] = {
     {Py_tp_traverse, traverse},
     {Py_tp_methods, methods},
     {Py_tp_getset, attributes},
-    {Py_tp_doc, "A device and all that lives on it; vkbloom.Renderer wraps it."},
+    {Py_tp_doc, "A device with everything on it; vkbloom.Renderer wraps it."},
     {0},
 };
 

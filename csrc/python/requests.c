@@ -6,7 +6,7 @@
 struct submission {
     PyObject_HEAD
     struct vkb_renderer *renderer;
-    struct vkb_pending *pending;  // NULL: waited for, or abandoned
+    struct vkb_pending *pending;  // NULL: finished or abandoned
 };
 
 static struct vkb_module_state *state_of(PyObject *object)
@@ -54,7 +54,7 @@ static bool check_plans(const struct vkb_renderer *renderer, const struct vkb_so
     return true;
 }
 
-// Room for what the requests need beside their plans.
+// Allocates the memory that the requests need in addition to their plans.
 static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct vkb_error *error)
 {
     struct vkb_resident *resident = ((struct vkb_source_object *)source)->resident;
@@ -138,7 +138,7 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
         .row_count = rows ? rows->count : row->height,
         .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
         .memory = view->buf,
-        // (Whoever keeps many arrays shall not pay for each small one.)
+        // Only large arrays are looked up: the search takes time in proportion to the kept arrays.
         .pages = view->len >= VKB_IMPORTED_BYTES && renderer->pages
                    ? vkb_pages_find(renderer->pages, view->buf)
                    : NULL,
@@ -189,9 +189,7 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
                                          PyObject *plans, const struct rows *rows, PyObject *arrays)
 {
     struct vkb_module_state *state = state_of((PyObject *)renderer);
-    PyTypeObject *type = (PyTypeObject *)state->submission_type;
-    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
-    struct submission *self = (struct submission *)allocate(type, 0);
+    struct submission *self = vkb_new_object(state->submission_type);
     struct vkb_error error = {0};
 
     if (!self)
@@ -247,7 +245,7 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     struct submission *self =
         new_submission(renderer, source, plans, PyTuple_Size(arguments) > 3 ? &rows : NULL, arrays);
     if (self && !submit(renderer, (struct vkb_source_object *)source, self->pending, &error)) {
-        // Also with an exception set, which is kept: whoever hears of the arrays' end is Python.
+        // The exception is kept while the arrays are released, which may run Python code.
         vkb_raise(state, &error);
         PyObject *type, *value, *traceback;
         PyErr_Fetch(&type, &value, &traceback);
@@ -288,7 +286,7 @@ static PyObject *results(const struct vkb_pending *pending)
 
 static PyObject *refuse_to_wait(void)
 {
-    PyErr_SetString(PyExc_RuntimeError, "a submission is waited for once");
+    PyErr_SetString(PyExc_RuntimeError, "wait: the submission was already waited for");
     return NULL;
 }
 
@@ -304,7 +302,7 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
         return refuse_to_wait();
     if (!vkb_renderer_enter(renderer, &error))
         return vkb_raise(state_of(object), &error);
-    // Another thread may have had it since it was asked for.
+    // Another thread may have taken it before this one got the lock.
     struct vkb_pending *pending = self->pending;
     self->pending = NULL;
     if (!pending) {
@@ -338,14 +336,14 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     return self->pending ? vkb_pending_traverse(self->pending, visit, arg) : 0;
 }
 
-// What the device may write to is left to the renderer until the device is done.
+// While the device may still write to the arrays, the renderer keeps them.
 static int clear(PyObject *object)
 {
     struct submission *self = (struct submission *)object;
     struct vkb_pending *pending = self->pending;
 
     self->pending = NULL;
-    // A forked process has no device that could write.
+    // In a forked process no device can write to them.
     if (pending && pending->submission && vkb_renderer_is_ours(self->renderer))
         vkb_renderer_abandon(self->renderer, pending);
     else if (pending)
@@ -356,19 +354,15 @@ static int clear(PyObject *object)
 
 static void dealloc(PyObject *object)
 {
-    PyTypeObject *type = Py_TYPE(object);
-    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
-
     PyObject_GC_UnTrack(object);
     clear(object);
-    release(object);
-    Py_DECREF(type);
+    vkb_free_object(object);
 }
 
 static PyMethodDef methods[] = {
     {"wait", wait_for, METH_NOARGS,
-     "wait() -> ([timings, ...], (NaNs, infinities of the input)). Waits until the device has run "
-     "it; the arrays are filled then."},
+     "wait() -> ([timings, ...], (NaNs, infinities of the input)). Waits until the device has "
+     "finished; then the arrays are filled."},
     {0},
 };
 
@@ -377,7 +371,7 @@ static PyType_Slot slots[] = {
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
     {Py_tp_methods, methods},
-    {Py_tp_doc, "Plans that the device runs in one go."},
+    {Py_tp_doc, "Plans that the device runs as one submission."},
     {0},
 };
 

@@ -1,17 +1,9 @@
-// The Source type: what frames are made from, an image or a scene, read once from Python's objects.
+// The Source type: an image or a scene, converted once from Python objects.
 #include "python/module.h"
 
 #include <stdio.h>
 
-static struct vkb_source_object *new_source(PyObject *module)
-{
-    PyTypeObject *type = (PyTypeObject *)vkb_module_state(module)->source_type;
-    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
-
-    return (struct vkb_source_object *)allocate(type, 0);
-}
-
-// Whether what accompanies the image fits it; one that is not there does.
+// Whether the emission or the mask fits the image. A missing one does.
 static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind kind)
 {
     const struct vkb_input *image = &self->images[VKB_INPUT_IMAGE].input;
@@ -23,9 +15,10 @@ static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind
                 || (other->format == image->format && other->channels == image->channels))))
         return true;
     if (kind == VKB_INPUT_MASK)
-        PyErr_SetString(PyExc_ValueError, "mask: it does not have the image's size");
+        PyErr_SetString(PyExc_ValueError, "mask: its size is not that of the image");
     else
-        PyErr_SetString(PyExc_ValueError, "emission: it does not have the image's shape and dtype");
+        PyErr_SetString(PyExc_ValueError,
+                        "emission: its shape and dtype are not those of the image");
     return false;
 }
 
@@ -35,7 +28,7 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O|OO:image_source", &image, &emission, &mask))
         return NULL;
-    struct vkb_source_object *self = new_source(module);
+    struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
         return NULL;
     if (!vkb_read_image(image, "image", &self->images[VKB_INPUT_IMAGE])
@@ -84,7 +77,7 @@ PyObject *vkb_scene_source(PyObject *module, PyObject *arguments)
                           &scene->glow_intensity)
         || !vkb_read_camera(camera, &scene->camera) || !read_shading(shading, &source))
         return NULL;
-    struct vkb_source_object *self = new_source(module);
+    struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
         return NULL;
     if (!vkb_read_scene(scene_tuple, &self->scene)) {
@@ -180,8 +173,7 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
     }
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
-    allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
-    struct vkb_source_object *self = (struct vkb_source_object *)allocate(type, 0);
+    struct vkb_source_object *self = vkb_new_object(state->source_type);
     if (!self)
         return NULL;
     if (height < source->source.image.size.height)
@@ -250,7 +242,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     return 0;
 }
 
-// What is left is of no kind, so that nothing runs on it.
+// The cleared source has no kind, so that no plan fits it.
 static int clear(PyObject *object)
 {
     struct vkb_source_object *self = (struct vkb_source_object *)object;
@@ -271,13 +263,9 @@ static int clear(PyObject *object)
 
 static void dealloc(PyObject *object)
 {
-    PyTypeObject *type = Py_TYPE(object);
-    freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
-
     PyObject_GC_UnTrack(object);
     clear(object);
-    release(object);
-    Py_DECREF(type);
+    vkb_free_object(object);
 }
 
 static PyObject *is_resident(PyObject *object, void *unused)
@@ -296,7 +284,7 @@ static PyType_Slot slots[] = {
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
     {Py_tp_getset, attributes},
-    {Py_tp_doc, "What frames are made from: an image or a scene."},
+    {Py_tp_doc, "The input of frames: an image or a scene."},
     {0},
 };
 

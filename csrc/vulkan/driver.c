@@ -8,9 +8,9 @@
 #include <dlfcn.h>
 #endif
 
-// The first version whose drivers make and destroy surfaces themselves, of which there are none
-// here, is 3; 5 tells the driver that Vulkan 1.1 is known.
-enum { INTERFACE_VERSION = 5 };
+// Drivers keep the lowest version that was ever negotiated, and a loader opens a single driver
+// (VK_LUNARG_direct_driver_loading, for validation) of version 7 alone.
+enum { INTERFACE_VERSION = 7 };
 
 typedef VkResult(VKAPI_PTR *negotiate_function)(uint32_t *version);
 

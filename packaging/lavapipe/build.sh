@@ -66,5 +66,5 @@ cp /usr/share/doc/zlib1g-dev/copyright LICENSE.zlib
 cp /usr/share/doc/libzstd-dev/copyright LICENSE.zstd
 cp /usr/share/doc/gcc-10-base/copyright LICENSE.gcc
 "$python" -m pip --quiet wheel --no-deps --no-build-isolation --no-index --wheel-dir dist .
-"$python" -m wheel tags --remove --python-tag py3 --abi-tag none --platform-tag "$PLATFORM" dist/*.whl
+"$python" -m wheel tags --remove --python-tag py3 --abi-tag none --platform-tag "manylinux_${DRIVER_GLIBC}_x86_64" dist/*.whl
 mv dist/*.whl "$wheels"

@@ -108,7 +108,7 @@ def test_special_values_of_a_handle_are_counted(renderer: Renderer) -> None:
 def test_a_handle_has_its_mask_and_emission(
     renderer: Renderer, with_mask: bool, with_emission: bool
 ) -> None:
-    given: Any = {}
+    given: dict[str, Any] = {}
     if with_mask:
         given["mask"] = np.linspace(0, 1, 21 * 33, dtype=np.float32).reshape(21, 33)
     if with_emission:
@@ -128,7 +128,7 @@ def test_a_handle_has_its_mask_and_emission(
         assert (frames["final"] == expected["final"]).all() or frames.info["nan"] == 0
     for name, array in {"mask": np.ones((21, 33), np.float32), "emission": image}.items():
         with pytest.raises(ValueError, match=f"{name}: the image was uploaded already"):
-            renderer.apply(handle, settings, **{name: array})
+            renderer.apply(handle, settings, **{name: array})  # type: ignore[arg-type]
 
 
 def test_rows_of_an_image(renderer: Renderer) -> None:

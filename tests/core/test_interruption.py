@@ -348,7 +348,7 @@ def test_a_device_that_takes_too_long(
     with pytest.raises(DeviceLostError):
         renderer.render(scene, SHORT, RIGHT_SIZE)
     # What the device is at work on cannot be destroyed, and nobody waits for it.
-    with pytest.raises(DeviceLostError, match="still at work"):
+    with pytest.raises(DeviceLostError, match="still busy"):
         renderer.close()
     assert renderer.closed
     renderer.close()

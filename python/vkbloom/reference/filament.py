@@ -8,102 +8,71 @@ filament/src/PostProcessManager.cpp @ 003e5005713c.
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .image import Storage
+from .levels import halved
 from .pyramid import downsample
-from .sampling import Array, sample
-from .threshold import brightest, masked
+from .sampling import Array, sample, weighted_mean
+from .threshold import brightest, firefly_weight, masked
 from .upsampling import combine, linear, tent_of_target
+
+if TYPE_CHECKING:
+    from vkbloom.published import FilamentBloom
 
 __all__ = ["gain", "passes"]
 
 
-class FilamentSettings(Protocol):
-    """What this blur reads of `vkbloom.FilamentBloom`."""
-
-    @property
-    def threshold(self) -> float | None: ...
-    @property
-    def levels(self) -> int: ...
-    @property
-    def resolution(self) -> int: ...
-    @property
-    def highlight(self) -> float: ...
-
-
 def passes(
     glow: Array,
-    settings: FilamentSettings,
+    settings: FilamentBloom,
     size: tuple[int, int],
     store: Storage,
     mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    down_0 is `resolution` high and as wide as the frame's aspect asks for, both floored to
-    multiples of 16. The frame is halved until less than halving remains, then reduced to down_0,
-    each time by the 3 x 3 binomial, whose first use also has the threshold. Further levels are
-    floored halves, by nine taps, or 13 where a side of the level above is odd. The levels are
-    added on the way up by a tent of one pixel of the larger level, the bloom is up_0, bilinear,
-    divided by the number of levels.
-
-    Parameters
-    ----------
-    glow : ndarray of float64, shape (H, W, C)
-    settings : vkbloom.FilamentBloom
-    size : (int, int)
-        Width and height of the bloom.
-    store : Storage
-        What storing in a bloom buffer does to the values.
-    mask : ndarray of float64, shape (h, w, 1), optional
-        Multiplies what the threshold lets through.
-
-    Returns
-    -------
-    dict of str to ndarray
-        "down_0" to "down_N-1", "up_N-2" to "up_0" and "bloom", (height, width, C).
+    down_0 is `resolution` high, and its width follows from the aspect of the frame; both sides are
+    floored to multiples of 16. The frame is halved until down_0 is more than half of it, then
+    reduced to down_0, each time by the 3 x 3 binomial. The first of these steps includes the
+    threshold. Each further level has half the size, by nine taps, or by 13 if a side of the level
+    above is odd. up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level; the
+    bloom is up_0, bilinear, divided by the number of levels.
     """
     height, width, _ = glow.shape
-    width_of_frame, height_of_frame = width, height
     top = settings.resolution
-    first = (
+    level = (
         16 * max(1, math.floor(top * width / height / 16)),
         16 * max(1, math.floor(top / 16)),
     )
-    image, threshold = glow, settings.threshold
-    while first[0] * 2 < width or first[1] * 2 < height:
-        width, height = max(1, width // 2), max(1, height // 2)
-        image = _reduce(image, (width, height), threshold, settings.highlight)
-        image = store(masked(image, mask))
+    image, above, threshold = glow, (width, height), settings.threshold
+    while level[0] * 2 < above[0] or level[1] * 2 < above[1]:
+        above = halved(above)
+        image = store(masked(_reduce(image, above, threshold, settings.highlight), mask))
         threshold = mask = None
-    downs = [store(masked(_reduce(image, first, threshold, settings.highlight), mask))]
-    longer = math.floor(max(top * width_of_frame / height_of_frame, top))
+    downs = [store(masked(_reduce(image, level, threshold, settings.highlight), mask))]
+    longer = math.floor(max(top * width / height, top))
     count = min(settings.levels, math.floor(math.log2(longer)) + 1)
-    for k in range(1, count):
-        level = (max(1, first[0] >> k), max(1, first[1] >> k))
-        even = downs[-1].shape[0] % 2 == 0 and downs[-1].shape[1] % 2 == 0
-        down = _nine_taps(downs[-1], level) if even else downsample(downs[-1], level, False)
-        downs.append(store(down))
+    for _ in range(1, count):
+        is_even = level[0] % 2 == 0 and level[1] % 2 == 0
+        level = halved(level)
+        downs.append(store((_nine_taps if is_even else downsample)(downs[-1], level)))
     ones = [1.0] * count
-    return {
-        **{f"down_{k}": down for k, down in enumerate(downs)},
-        **combine(
-            downs,
-            size,
-            store,
-            own=ones,
-            coarse=ones,
-            upsample=tent_of_target,
-            last=linear,
-            gain=1 / count,
-        ),
-    }
+    return combine(
+        downs,
+        size,
+        store,
+        own=ones,
+        coarse=ones,
+        upsample=tent_of_target,
+        last=linear,
+        gain=1 / count,
+    )
 
 
-def gain(settings: FilamentSettings) -> float:
+def gain(settings: FilamentBloom) -> float:
     """Return what a flat image of 1 becomes: what passes the threshold."""
     if settings.threshold is None:
         return 1.0
@@ -114,27 +83,26 @@ def gain(settings: FilamentSettings) -> float:
 def _reduce(
     image: Array, size: tuple[int, int], threshold: float | None, highlight: float
 ) -> Array:
-    """Read the image convolved with (1 2 1)^2 / 16 between its texels, and apply the threshold.
+    """Sample the image convolved with (1 2 1)^2 / 16, and apply the threshold.
 
-    The texels around a position weigh (1 - f, 2 - f, 1 + f, f) / 4 along each axis. They are
-    read as two pairs, so that four taps remain, which with a threshold are weighted by
-    1 / (1 + their brightest channel).
+    Along each axis, the texels around a position have the weights (1 - f, 2 - f, 1 + f, f) / 4.
+    They are read as two pairs, which makes four taps. With a threshold, each tap is also weighted
+    by 1 / (1 + brightest channel).
     """
-    total, shares = np.zeros((size[1], size[0], image.shape[2])), np.zeros((size[1], size[0], 1))
+    taps: list[tuple[Array, Array]] = []
     for rows, row_share in _pairs(image, size[1]):
         for columns, column_share in _pairs(rows.swapaxes(0, 1), size[0]):
             tap = columns.swapaxes(0, 1)
             share = row_share * column_share.swapaxes(0, 1)
             if threshold is not None:
-                share = share / (1 + np.maximum(brightest(tap), 0))
-            total += share * tap
-            shares += share
-    mean: Array = total / shares
+                share = share * firefly_weight(brightest(tap))
+            taps.append((share, tap))
+    mean = weighted_mean(taps)
     if threshold is None:
         return mean
     kept = np.maximum(mean[..., :3] - threshold, 0)
     compressed = kept / (1 + brightest(kept) / highlight)
-    # The threshold subtracts: alpha takes the factor of the brightest channel.
+    # This threshold subtracts. Alpha is multiplied by the factor of the brightest channel.
     value = brightest(mean)
     factor = np.where(value > 0, brightest(compressed) / np.where(value > 0, value, 1), 0)
     return np.concatenate([compressed, factor * mean[..., 3:]], axis=-1)

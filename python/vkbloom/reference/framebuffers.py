@@ -49,13 +49,29 @@ class Settings(CompositeSettings, Protocol):
 
 
 class _Method(NamedTuple):
-    # (glow, settings, size of the bloom, storing) -> framebuffers after the glow; of a published
-    # method also with a mask at the end.
+    """The functions of a method's module.
+
+    Parameters
+    ----------
+    passes : callable
+        ``passes(glow, settings, size, store)`` returns the framebuffers after the glow, in the
+        order of the data flow; the last one is "bloom". `glow` is the content of the first bloom
+        buffer, (H, W, C) of float64, with 1, 3 or, with alpha, 4 channels where a method reads a
+        luminance. `size` is the width and height of the bloom. `store` converts values as storing
+        in a bloom buffer does. A published method also takes a mask, (h, w, 1) of float64 or None,
+        which multiplies the result of its threshold.
+    gain : callable
+        ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns what a flat image of 1
+        becomes.
+    published : bool
+        Whether `passes` reduces the frame and applies the threshold itself.
+    sized : bool
+        Whether the gain depends on the size of the frame.
+    """
+
     passes: Callable[..., dict[str, Array]]
     gain: Callable[..., float]
-    # Reduces and thresholds the frame in its own way, which its passes begin with.
     published: bool = False
-    # The number of levels that are added follows from the frame's size, and so does the gain.
     sized: bool = False
 
 

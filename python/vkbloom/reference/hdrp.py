@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .image import Storage
-from .sampling import Array, read_rows, sample
-from .threshold import masked
+from .sampling import Array, read_rows, sample, weighted_mean
+from .threshold import firefly_weight, luminance, masked
 from .upsampling import combine, cubic, spline_taps
+
+if TYPE_CHECKING:
+    from vkbloom.published import HdrpBloom
 
 __all__ = ["gain", "passes"]
 
@@ -27,62 +30,33 @@ _RADIUS = 4
 _KERNEL = [math.comb(2 * _RADIUS, i) / 4**_RADIUS for i in range(2 * _RADIUS + 1)]
 
 
-class HdrpSettings(Protocol):
-    """What this blur reads of `vkbloom.HdrpBloom`."""
-
-    @property
-    def scatter(self) -> float: ...
-    @property
-    def high_quality_filtering(self) -> bool: ...
-    @property
-    def anamorphism(self) -> float: ...
-
-
 def passes(
     glow: Array,
-    settings: HdrpSettings,
+    settings: HdrpBloom,
     size: tuple[int, int],
     store: Storage,
     mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    Level k is the frame's size / 2^(k + 1), rounded, halves to even; an anamorphism a below 0
-    multiplies the width by 1 + a / 2, one above 0 the height by 1 - a / 2. Five taps of the frame,
-    weighted by 1 / (1 + luminance), go into an image of the size of down_0, which is that image
-    blurred; each further level is the one above it, bilinear at positions one pixel of the level
-    apart, blurred. The blur is the binomial of order 8 along each axis. On the way up the smaller
-    level, by the cubic B-spline or bilinear, and the level are mixed by the scatter; the bloom is
-    the cubic B-spline of up_0.
+    Level k has the size of the frame / 2^(k + 1), rounded, ties to even. A negative anamorphism a
+    multiplies its width by 1 + a / 2, a positive one its height by 1 - a / 2. Five taps of the
+    frame, weighted by 1 / (1 + luminance), are stored at the size of down_0; down_0 is this image,
+    blurred. Each further level is the one above it, read bilinearly at positions one pixel of the
+    level apart, and blurred. The blur is the binomial of order 8 along each axis. up_k mixes the
+    level with the smaller one, enlarged by the cubic B-spline or bilinearly, by the scatter. The
+    bloom is the cubic B-spline of up_0.
 
-    The borders are not the same on all sides. Before the first pixel down_0 reads the first two in
-    turn, n mod 2. Beyond the last pixel all levels read the last one's sample. On the way up no
-    position lies beyond the middle between the last two texels, and no tap of the cubic filter
-    beyond 1 - 1 / size of the larger level.
-
-    Parameters
-    ----------
-    glow : ndarray of float64, shape (H, W, C)
-        1, 3 or, with alpha, 4 channels.
-    settings : vkbloom.HdrpBloom
-    size : (int, int)
-        Width and height of the bloom.
-    store : Storage
-        What storing in a bloom buffer does to the values.
-    mask : ndarray of float64, shape (h, w, 1), optional
-        Multiplies the prefiltered image.
-
-    Returns
-    -------
-    dict of str to ndarray
-        "down_0" to "down_N-1", "up_N-2" to "up_0" and "bloom", (height, width, C).
+    The borders differ. Before its first pixel, down_0 reads its pixels n mod 2. Beyond the last
+    pixel, all levels read the last sample. In up_k, no position is beyond the middle of the last
+    two texels, and no tap of the cubic filter beyond 1 - 1 / size of the larger level.
     """
     height, width, _ = glow.shape
     count = min(max(math.floor(math.log2(max(width, height)) - 2), 1), 16)
-    across = width * (1 + min(settings.anamorphism, 0) / 2)
-    down = height * (1 - max(settings.anamorphism, 0) / 2)
+    reduced_width = width * (1 + min(settings.anamorphism, 0) / 2)
+    reduced_height = height * (1 - max(settings.anamorphism, 0) / 2)
     sizes = [
-        (max(1, round(across / 2 ** (k + 1))), max(1, round(down / 2 ** (k + 1))))
+        (max(1, round(reduced_width / 2 ** (k + 1))), max(1, round(reduced_height / 2 ** (k + 1))))
         for k in range(count)
     ]
     reduced = store(masked(_prefilter(glow, sizes[0]), mask))
@@ -92,34 +66,25 @@ def passes(
     share = 0.05 + (0.95 - 0.05) * settings.scatter
     is_cubic = settings.high_quality_filtering and width >= 800 and height >= 450
     rows = _cubic_rows if is_cubic else _linear_rows
-    return {
-        **{f"down_{k}": down for k, down in enumerate(downs)},
-        **combine(
-            downs,
-            size,
-            store,
-            own=[1 - share] * count,
-            coarse=[share] * count,
-            upsample=lambda image, larger: _along_both(image, larger, rows),
-            last=cubic,
-        ),
-    }
+    return combine(
+        downs,
+        size,
+        store,
+        own=[1 - share] * count,
+        coarse=[share] * count,
+        upsample=lambda image, larger: _along_both(image, larger, rows),
+        last=cubic,
+    )
 
 
-def gain(settings: HdrpSettings) -> float:
-    """Return what a flat image of 1 becomes: 1, for all filters and mixes keep it."""
+def gain(settings: HdrpBloom) -> float:
+    """Return what a flat image of 1 becomes: 1, since no filter and no mix changes it."""
     return 1.0
 
 
 def _prefilter(image: Array, size: tuple[int, int]) -> Array:
-    total, shares = np.zeros((size[1], size[0], image.shape[2])), np.zeros((size[1], size[0], 1))
-    for x, y in _PREFILTER_TAPS:
-        tap = sample(image, size, [(x, 1.0)], [(y, 1.0)])
-        grey = tap if tap.shape[2] == 1 else (tap[..., :3] * _LUMINANCE).sum(axis=-1, keepdims=True)
-        share = 1 / (1 + np.maximum(grey, 0))
-        total += share * tap
-        shares += share
-    return total / shares
+    taps = [sample(image, size, [(x, 1.0)], [(y, 1.0)]) for x, y in _PREFILTER_TAPS]
+    return weighted_mean((firefly_weight(luminance(tap, _LUMINANCE)), tap) for tap in taps)
 
 
 def _along_both(
@@ -128,14 +93,14 @@ def _along_both(
     rows: Callable[[Array, int], Array],
     store: Storage | None = None,
 ) -> Array:
-    """Apply a filter of rows along x, then along y; `store` is between the two and at the end."""
-    across = rows(image.swapaxes(0, 1), size[0]).swapaxes(0, 1)
-    down = rows(across if store is None else store(across), size[1])
-    return np.ascontiguousarray(down) if store is None else store(down)
+    """Apply a filter of rows along x, then along y; each result is stored if `store` is given."""
+    horizontal = rows(image.swapaxes(0, 1), size[0]).swapaxes(0, 1)
+    both = rows(horizontal if store is None else store(horizontal), size[1])
+    return np.ascontiguousarray(both) if store is None else store(both)
 
 
 def _convolve(rows: Array, count: int) -> Array:
-    """Apply the binomial to rows of which the first is _RADIUS before the result's first."""
+    """Apply the binomial to rows that start _RADIUS rows before the result."""
     total = np.zeros((count, *rows.shape[1:]))
     for i, weight in enumerate(_KERNEL):
         total += weight * rows[i : i + count]
@@ -154,7 +119,7 @@ def _shrink_rows(image: Array, count: int) -> Array:
 
 
 def _up_positions(length: int, count: int) -> Array:
-    """Return where the pixels of the larger level fall, in texels of the smaller one."""
+    """Return the positions of the larger level's pixels, in texels of the smaller one."""
     return np.minimum((np.arange(count) + 0.5) * length / count - 0.5, length - 1.5)
 
 
@@ -163,7 +128,7 @@ def _linear_rows(image: Array, count: int) -> Array:
 
 
 def _cubic_rows(image: Array, count: int) -> Array:
-    """Read the cubic B-spline as two bilinear taps, neither beyond 1 - 1 / count."""
+    """Sample the cubic B-spline as two bilinear taps, neither beyond 1 - 1 / count."""
     length = image.shape[0]
     furthest = (1 - 1 / count) * length - 0.5
     total = np.zeros((count, *image.shape[1:]))

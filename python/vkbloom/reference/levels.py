@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-__all__ = ["level_sizes"]
+__all__ = ["halved", "level_sizes"]
+
+
+def halved(size: tuple[int, int]) -> tuple[int, int]:
+    """Return half of a size, each side floored but at least 1."""
+    return max(1, size[0] // 2), max(1, size[1] // 2)
 
 
 def level_sizes(size: tuple[int, int], levels: int) -> list[tuple[int, int]]:
     """Return the sizes of the levels below an image, largest first.
 
-    Each level is the floored half of the one before, never under 1. A level whose sides are
-    both 1 ends the chain and is not part of it, save where it is the first: there is always
-    one level.
+    Each level has half the size of the one before (`halved`). The chain ends before a level of
+    1 x 1, except that it always has one level.
 
     Parameters
     ----------
     size : (int, int)
         Width and height of the image above the first level, in pixels.
     levels : int
-        How many levels are wanted, 1 or more.
+        The number of levels, at least 1.
 
     Returns
     -------
@@ -25,10 +29,9 @@ def level_sizes(size: tuple[int, int], levels: int) -> list[tuple[int, int]]:
         Width and height of each level; 1 to `levels` entries.
     """
     sizes: list[tuple[int, int]] = []
-    width, height = size
     for _ in range(levels):
-        width, height = max(1, width // 2), max(1, height // 2)
-        if sizes and (width, height) == (1, 1):
+        size = halved(size)
+        if sizes and size == (1, 1):
             break
-        sizes.append((width, height))
+        sizes.append(size)
     return sizes

@@ -8,12 +8,12 @@ the columns. The matrices are banded; they are built and applied in blocks of ou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CENTRE", "Array", "Taps", "read_rows", "sample"]
+__all__ = ["CENTRE", "Array", "Taps", "read_rows", "sample", "weighted_mean"]
 
 Array = NDArray[np.float64]
 
@@ -109,3 +109,23 @@ def read_rows(image: Array, positions: Array) -> Array:
     )
     rows: Array = (1 - part) * first + part * second
     return rows
+
+
+def weighted_mean(parts: Iterable[tuple[Array | float, Array]]) -> Array:
+    """Return the mean of images, each with its weight.
+
+    Parameters
+    ----------
+    parts : iterable of (float or ndarray, ndarray)
+        A number or an array of shape (H, W, 1), and the image, shape (H, W, C).
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, C)
+    """
+    total, weights = np.zeros(()), np.zeros(())
+    for weight, image in parts:
+        total = total + weight * image
+        weights = weights + weight
+    mean: Array = total / weights
+    return mean

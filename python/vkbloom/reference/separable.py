@@ -2,72 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
 
+if TYPE_CHECKING:
+    from vkbloom.settings import Separable
+
 __all__ = ["gain", "passes"]
-
-
-class SeparableSettings(Protocol):
-    """What this blur reads of `vkbloom.Separable`."""
-
-    @property
-    def blur_scale(self) -> float: ...
-    @property
-    def blur_strength(self) -> float: ...
-    @property
-    def weights(self) -> tuple[float, ...]: ...
-    @property
-    def loops(self) -> int: ...
-    @property
-    def layers(self) -> tuple[tuple[float, float], ...]: ...
-    @property
-    def first_tap(self) -> int: ...
-    @property
-    def texel(self) -> str: ...
-    @property
-    def direct(self) -> bool: ...
 
 
 def passes(
     glow: Array,
-    settings: SeparableSettings,
+    settings: Separable,
     size: tuple[int, int],
     store: Storage,
 ) -> dict[str, Array]:
-    """Return the blur's framebuffers.
+    """Return the framebuffers.
 
     One direction is w0 tap(0) + strength * sum over i >= 1 of w_i (tap(+i step) +
-    tap(-i step)), the step being one texel times the scale. A loop is one vertical and one
-    horizontal pass at the size of the glow; the last horizontal pass is evaluated at every
-    pixel of `size`. Each layer is such a blur of the glow at its own scale, added with its own
-    strength, and the sum is clamped after each layer.
+    tap(-i step)); the step is one texel times the scale. A loop is one vertical and one horizontal
+    pass at the size of the glow. The last horizontal pass is evaluated at every pixel of `size`.
+    Each layer is such a blur of the glow with its own scale. It is multiplied by its own strength
+    and added, and the sum is clamped after each layer.
 
-    With ``settings.direct`` a loop is a single pass that reads a grid of N x N taps, weighted
-    by the products of the kernel with itself, and no vertical framebuffer exists.
-
-    Parameters
-    ----------
-    glow : ndarray of float64, shape (H, W, C)
-    settings : vkbloom.Separable
-    size : (int, int)
-        Width and height of the bloom, in pixels.
-    store : callable
-        What storing in a bloom buffer does to the values.
-
-    Returns
-    -------
-    dict of str to ndarray
-        "blur_vertical", (H, W, C), of the last loop of the last layer, not with
-        ``settings.direct``; "bloom", (height, width, C).
+    With ``settings.direct``, a loop is one pass that reads N x N taps, weighted by the products of
+    the kernel with itself, and there is no "blur_vertical".
     """
     height, width, _ = glow.shape
     kernel = _kernel(settings)
-    # Both axes step by 1 / width in normalized coordinates for texel="x".
+    # With texel="x", the step along both axes is 1 / width in normalized coordinates.
     texel_y = height / width if settings.texel == "x" else 1.0
     bloom = np.zeros((size[1], size[0], glow.shape[2]))
     framebuffers: dict[str, Array] = {}
@@ -91,22 +58,23 @@ def passes(
     return {**framebuffers, "bloom": store(bloom)}
 
 
-def gain(settings: SeparableSettings) -> float:
+def gain(settings: Separable) -> float:
     """Return what a flat image of 1 becomes: the sum over the layers of s * g^(2 loops).
 
-    g is the sum of the effective kernel, for the tutorial's 1.3865 and so 1.922 in all.
+    g is the sum of the effective kernel: 1.3865 with the default weights, so that the result is
+    1.922.
     """
     one_direction = sum(weight for _, weight in _kernel(settings))
-    whole: float = one_direction ** (2 * settings.loops)
-    return whole * sum(strength for _, strength in settings.layers)
+    all_loops: float = one_direction ** (2 * settings.loops)
+    return all_loops * sum(strength for _, strength in settings.layers)
 
 
-def _kernel(settings: SeparableSettings) -> list[tuple[int, float]]:
-    """Return the offsets, in steps, and the effective weights of all taps of a direction."""
+def _kernel(settings: Separable) -> list[tuple[int, float]]:
+    """Return the offsets (in steps) and the effective weights of all taps of one direction."""
     centre, *sides = settings.weights
     strength = settings.blur_strength
     if settings.first_tap == 0:
-        # The loop over the sides begins at the centre, and so takes it twice more.
+        # The loop over the sides starts at the centre, so that it adds the centre twice more.
         centre *= 1 + 2 * strength
     taps = [(0, centre)]
     for i, weight in enumerate(sides, start=1):

@@ -6,36 +6,41 @@ import numpy as np
 
 from .sampling import Array, sample
 
-__all__ = ["apply_threshold", "brightest", "luminance", "masked", "soften"]
+__all__ = ["apply_threshold", "brightest", "firefly_weight", "luminance", "masked", "soften"]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def luminance(rgb: Array) -> Array:
-    """Return the Rec. 709 luminance 0.2126 r + 0.7152 g + 0.0722 b.
+def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
+    """Return the luminance, by default that of Rec. 709: 0.2126 r + 0.7152 g + 0.0722 b.
 
     Parameters
     ----------
-    rgb : ndarray of float64, shape (..., 3) or (..., 4)
-        Alpha does not count.
+    rgb : ndarray of float64, shape (..., 3), (..., 4) or (..., 1)
+        A fourth channel is alpha, which does not count. One channel is grey, whose luminance is
+        itself.
+    coefficients : ndarray of float64, shape (3,)
+        Sources differ in the last digits.
 
     Returns
     -------
     ndarray of float64, shape (..., 1)
     """
-    weighted: Array = (rgb[..., :3] * _LUMINANCE).sum(axis=-1, keepdims=True)
+    if rgb.shape[-1] == 1:
+        return rgb
+    weighted: Array = (rgb[..., :3] * coefficients).sum(axis=-1, keepdims=True)
     return weighted
 
 
 def brightest(image: Array) -> Array:
-    """Return the largest of the colours' channels, (..., 1); a fourth channel is alpha."""
+    """Return the largest colour channel, (..., 1); a fourth channel is alpha."""
     largest: Array = image[..., :3].max(axis=-1, keepdims=True)
     return largest
 
 
 def masked(image: Array, mask: Array | None) -> Array:
-    """Return what passed a threshold times the mask, read bilinearly at the image's pixel centres.
+    """Return the image times the mask, which is read bilinearly at the image's pixel centres.
 
     Parameters
     ----------
@@ -48,22 +53,28 @@ def masked(image: Array, mask: Array | None) -> Array:
     return image * sample(mask, (width, height))
 
 
+def firefly_weight(brightness: Array) -> Array:
+    """Return 1 / (1 + brightness), with negative brightness as 0 (Karis, 2013)."""
+    weight: Array = 1 / (1 + np.maximum(brightness, 0.0))
+    return weight
+
+
 def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
     """Keep what is brighter than the threshold.
 
-    Without a knee, a colour stays whole where its luminance is greater than the threshold and
-    is 0 elsewhere. With one, with b = max(r, g, b), k = threshold * knee and
-    q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
-    max(q, b - threshold) / max(b, 1e-5): a quadratic that joins 0 at threshold - k to the line
-    b - threshold at threshold + k. Both formulas are those of the interface's table of
-    settings.
+    Without a knee, a colour does not change if its luminance is greater than the threshold, and
+    becomes 0 otherwise. With a knee, the colour is scaled by max(q, b - threshold) / max(b, 1e-5)
+    with b = max(r, g, b), k = threshold * knee and
+    q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5). This is a quadratic from 0 at
+    threshold - k to the line b - threshold at threshold + k. Both formulas are documented with
+    `vkbloom.Settings`.
 
     Parameters
     ----------
     rgb : ndarray of float64, shape (..., 3) or (..., 4)
         Alpha is scaled like the colour.
     threshold : float or None
-        In the image's units; None keeps everything.
+        In the units of the image; None keeps everything.
     knee : float
         Half-width of the soft part, as a fraction of the threshold; 0 for the hard one.
 
@@ -80,17 +91,19 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
 
 
 def soften(rgb: Array, threshold: float, half_width: float, divisor: float, least: float) -> Array:
-    """Scale colours by max(q, b - threshold) / max(b, least), b being their brightest channel.
+    """Scale colours by max(q, b - threshold) / max(b, least).
 
-    q = clamp(b - threshold + half_width, 0, 2 half_width)^2 / divisor.
+    b is the brightest channel, and q = clamp(b - threshold + half_width, 0, 2 half_width)^2 /
+    divisor.
 
     Parameters
     ----------
     rgb : ndarray of float64, shape (..., C)
     threshold, half_width : float
-        Middle and half-width of the soft part, in the image's units.
+        Middle and half-width of the soft part, in the units of the image.
     divisor, least : float
-        About 4 half_width, and the least brightness that is divided by: sources differ there.
+        About 4 half_width, and the lower bound of the brightness in the division. Sources differ
+        in both.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""three.js' UnrealBloomPass, in its form since kernels and factor of 2025.
+"""three.js' UnrealBloomPass, with the kernels and the factor of 2025.
 
 From mrdoob/three.js: examples/jsm/postprocessing/UnrealBloomPass.js with pull requests #31528
 (kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4.
@@ -7,13 +7,16 @@ From mrdoob/three.js: examples/jsm/postprocessing/UnrealBloomPass.js with pull r
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
-from .threshold import masked
+from .threshold import luminance, masked
+
+if TYPE_CHECKING:
+    from vkbloom.published import UnrealBloom
 
 __all__ = ["gain", "passes"]
 
@@ -23,50 +26,20 @@ _LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
 _NODES_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-class UnrealSettings(Protocol):
-    """What this blur reads of `vkbloom.UnrealBloom`."""
-
-    @property
-    def threshold(self) -> float | None: ...
-    @property
-    def smooth_width(self) -> float: ...
-    @property
-    def radius(self) -> float: ...
-    @property
-    def node(self) -> bool: ...
-
-
 def passes(
     glow: Array,
-    settings: UnrealSettings,
+    settings: UnrealBloom,
     size: tuple[int, int],
     store: Storage,
     mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    down_0 and "bright" have half of the frame's size, rounded (of `node` floored), each next level
-    half of the one above, likewise. Each level is the one above it, the first one "bright", blurred
-    by a Gaussian along x with taps one pixel of the level apart, then along y. up_0 is the sum of
-    the levels, each bilinear and with its factor; the bloom is up_0, bilinear. In buffers that end
-    at 1, up_0 is divided by the sum of the factors, 3.
-
-    Parameters
-    ----------
-    glow : ndarray of float64, shape (H, W, C)
-        1, 3 or, with alpha, 4 channels.
-    settings : vkbloom.UnrealBloom
-    size : (int, int)
-        Width and height of the bloom.
-    store : Storage
-        What storing in a bloom buffer does to the values.
-    mask : ndarray of float64, shape (h, w, 1), optional
-        Multiplies bright after the threshold.
-
-    Returns
-    -------
-    dict of str to ndarray
-        "bright", "down_0" to "down_4", "up_0" and "bloom", (height, width, C).
+    down_0 and "bright" have half the size of the frame, rounded (with `node` floored), and each
+    next level half the size of the one above. Each level is the image above it ("bright" for
+    down_0), blurred by a Gaussian along x, then along y, with taps one pixel of the level apart.
+    up_0 is the sum of the levels, enlarged bilinearly and multiplied by their factors; the bloom is
+    up_0, bilinear. In rgba8unorm buffers, up_0 is divided by the sum of the factors, 3.
     """
     height, width, _ = glow.shape
     half = _halved((width, height), settings)
@@ -77,17 +50,17 @@ def passes(
         width, height = _halved((width, height), settings)
         ratio = image.shape[1] / width
         x_taps = [(i * ratio, weight) for i, weight in _kernel(k)]
-        across = store(sample(image, (width, height), x_taps=x_taps))
-        image = store(sample(across, (width, height), y_taps=_kernel(k)))
+        horizontal = store(sample(image, (width, height), x_taps=x_taps))
+        image = store(sample(horizontal, (width, height), y_taps=_kernel(k)))
         framebuffers[f"down_{k}"] = image
         total += factor * sample(image, half)
-    whole = sum(_factors(settings.radius)) if store.high == 1 else 1.0
-    framebuffers["up_0"] = store(total / whole)
-    framebuffers["bloom"] = store.end(whole * sample(framebuffers["up_0"], size))
+    sum_of_factors = sum(_factors(settings.radius)) if store.high == 1 else 1.0
+    framebuffers["up_0"] = store(total / sum_of_factors)
+    framebuffers["bloom"] = store.end(sum_of_factors * sample(framebuffers["up_0"], size))
     return framebuffers
 
 
-def gain(settings: UnrealSettings) -> float:
+def gain(settings: UnrealBloom) -> float:
     """Return what a flat image of 1 becomes: about 3, as the kernels sum to nearly 1."""
     value, total = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]), 0.0
     for k, factor in enumerate(_factors(settings.radius)):
@@ -96,8 +69,8 @@ def gain(settings: UnrealSettings) -> float:
     return total
 
 
-def _halved(size: tuple[int, int], settings: UnrealSettings) -> tuple[int, int]:
-    """Return half of a size, rounded up from .5, or floored but never under 1."""
+def _halved(size: tuple[int, int], settings: UnrealBloom) -> tuple[int, int]:
+    """Return half of a size, at least 1: rounded, ties up, or floored with `node`."""
     more = 0 if settings.node else 1
     width, height = (max(1, (side + more) // 2) for side in size)
     return width, height
@@ -116,10 +89,9 @@ def _kernel(level: int) -> list[tuple[float, float]]:
     ]
 
 
-def _prefilter(rgb: Array, settings: UnrealSettings) -> Array:
+def _prefilter(rgb: Array, settings: UnrealBloom) -> Array:
     if settings.threshold is None:
         return rgb
-    weights = _NODES_LUMINANCE if settings.node else _LUMINANCE
-    grey = rgb if rgb.shape[2] == 1 else (rgb[..., :3] * weights).sum(axis=-1, keepdims=True)
+    grey = luminance(rgb, _NODES_LUMINANCE if settings.node else _LUMINANCE)
     t = np.clip((grey - settings.threshold) / settings.smooth_width, 0, 1)
     return rgb * (t * t * (3 - 2 * t))

@@ -1,4 +1,4 @@
-"""The way up a chain of levels: filters that enlarge, and how levels become one image."""
+"""Upsampling of a chain of levels: filters that enlarge, and the combination of the levels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def linear(image: Array, size: tuple[int, int]) -> Array:
 
 
 def tent(image: Array, size: tuple[int, int], x_step: float = 1.0, y_step: float = 1.0) -> Array:
-    """Read 3 x 3 bilinear taps, so many texels of the image apart, with (1 2 1)^2 / 16."""
+    """Read 3 x 3 bilinear taps with the weights (1 2 1)^2 / 16; steps in texels of the image."""
     x_taps, y_taps = (((-step, 0.25), (0.0, 0.5), (step, 0.25)) for step in (x_step, y_step))
     return sample(image, size, x_taps, y_taps)
 
@@ -99,13 +99,16 @@ def combine(
     coarse: Sequence[float],
     upsample: Filter,
     last: Filter,
+    smallest: float = 1.0,
     gain: float = 1.0,
+    end: Callable[[Array], Array] | None = None,
 ) -> dict[str, Array]:
-    """Return the framebuffers of the way up.
+    """Return the framebuffers of a chain of levels.
 
-    up_N-1 = down_N-1, up_k = own[k] down_k + coarse[k] upsample(up_k+1), and the bloom is
-    gain * last(up_0). In buffers that end at 1, up_k is divided by the value that it has where
-    all levels are 1, and the bloom is multiplied by that of up_0.
+    up_N-1 = smallest * down_N-1, up_k = own[k] down_k + coarse[k] upsample(up_k+1), and the bloom
+    is gain * last(up_0). Buffers of rgba8unorm hold values up to 1: there up_k is divided by the
+    value that it has if all levels are 1 (with the sizes of the shares instead of the shares), and
+    the bloom is multiplied by that of up_0.
 
     Parameters
     ----------
@@ -119,28 +122,32 @@ def combine(
         Shares of the level and of those below it; N - 1 entries are read.
     upsample, last : callable
         The filters between levels and to the bloom.
-    gain : float, optional
-        Factor of the bloom.
+    smallest, gain : float, optional
+        Factors of the smallest level and of the bloom.
+    end : callable, optional
+        What storing the bloom does to the values; by default ``store.end``.
 
     Returns
     -------
     dict of str to ndarray
-        "up_N-2" to "up_0" and "bloom".
+        "down_0" to "down_N-1", "up_N-2" to "up_0" and "bloom".
     """
-    framebuffers: dict[str, Array] = {}
-    up, whole = downs[-1], 1.0
+    framebuffers = {f"down_{k}": down for k, down in enumerate(downs)}
+    # up_k is what is stored, times the factor. The smallest level is stored without its factor.
+    up, factor = downs[-1], smallest
     for k in range(len(downs) - 2, -1, -1):
         height, width, _ = downs[k].shape
-        up = own[k] * downs[k] + coarse[k] * whole * upsample(up, (width, height))
-        whole = own[k] + coarse[k] * whole if store.high == 1 else 1.0
-        up = store(up / whole)
+        below = coarse[k] * factor
+        total = own[k] * downs[k] + below * upsample(up, (width, height))
+        factor = (abs(own[k]) + abs(below) or 1.0) if store.high == 1 else 1.0
+        up = store(total / factor)
         framebuffers[f"up_{k}"] = up
-    framebuffers["bloom"] = store.end(gain * whole * last(up, size))
+    framebuffers["bloom"] = (end or store.end)(gain * factor * last(up, size))
     return framebuffers
 
 
 def flat_gain(own: Sequence[float], coarse: Sequence[float], levels: Sequence[float]) -> float:
-    """Return what `combine` makes of levels that are flat, for a gain of 1."""
+    """Return the bloom that `combine` computes from flat levels, for a gain of 1."""
     value = levels[-1]
     for k in range(len(levels) - 2, -1, -1):
         value = own[k] * levels[k] + coarse[k] * value
