@@ -219,7 +219,7 @@ class Viewer:
     ) -> tuple[Frames, list[str]]:
         """Return one framebuffer, the one of that name or else `final`, and the names of all."""
         if self._scene is None:
-            given = dict(self._image_of(size))
+            given: dict[str, Any] = dict(self._image_of(size))
             image = given.pop("image")
             if "mask" in given:
                 # Averages of 0 to 1 can be beyond it by a rounding.
