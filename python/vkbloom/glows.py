@@ -1,6 +1,7 @@
-"""Settings of the blooms of Godot, Blender and pygfx, each class one engine's method.
+"""Settings of the bloom methods of Godot, Blender and pygfx: one class for each engine.
 
-As in `vkbloom.published`: they start from the whole frame and threshold where their source does.
+As in `vkbloom.published`, they start from the complete frame, and apply the threshold where their
+source does.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from vkbloom.settings import (
 
 __all__ = ["GODOT_LEVELS", "BlenderGlare", "GodotBloom", "PygfxBloom"]
 
-#: Levels that have a weight in Godot.
+#: Number of levels that have a weight in Godot.
 GODOT_LEVELS = 7
 
 
@@ -36,22 +37,23 @@ class GodotBloom(Settings):
     threshold_scale : float
         Brightness over which the threshold fades in, 0 to 65504.
     luminance_cap : float
-        Most that a channel of ``down_0`` holds, 0 to 65504.
+        Largest value of a channel of ``down_0``, 0 to 65504.
     glow_bloom : float
-        Least share of a colour that glows, whatever the threshold, 0 to 1.
+        Share of every colour that glows regardless of the threshold, 0 to 1.
     strength : float
         Factor of each level's blur, 0 to 16.
     level_weights : sequence of float
         Seven weights, one for each level, 0 or more.
     bicubic : bool
-        The levels are enlarged by the cubic B-spline, as on the desktop, not bilinearly.
+        Whether to enlarge the levels by the cubic B-spline, as Godot does on desktop systems,
+        instead of bilinearly.
     white : float
-        Brightness that the composite "screen" does not go beyond, 0.01 to 65504.
+        Largest brightness of the composite "screen", 0.01 to 65504.
     composite : {"screen", "soft_light", "add", "replace", "mix"}
-        With s the scene, g the bloom times the intensity i: s + g - s g / white with g clamped to
-        0..white; after the tone map, which g passes too, s + g (f(s) - s) with g clamped to 0..1
-        and f(s) = ((16 s - 12) s + 4) s up to 1/4, then sqrt(s), and s itself above 1; s + g; g;
-        (1 - i) s + g.
+        With s the scene and g the bloom times the intensity i. "screen": s + g - s g / white with g
+        clamped to 0..white. "soft_light": s + g (f(s) - s) with s and g after the tone map, g
+        clamped to 0..1, and f(s) = ((16 s - 12) s + 4) s up to 1/4, then sqrt(s), and s above 1.
+        "add": s + g. "replace": g. "mix": (1 - i) s + g.
     exposure : float
         In stops. It multiplies the scene before the composite, and ``down_0`` before the threshold.
     **settings
@@ -63,17 +65,18 @@ class GodotBloom(Settings):
 
     Notes
     -----
-    Level i has the size floor(side / 2) >> i of the frame, never under 1. It is the image above it,
-    the first one the frame, read bilinearly at the level's pixel centres, then blurred by the
-    half-kernel 0.2024, 0.1790, 0.1240, 0.0672, 0.0285 along both axes, times the strength. Samples
-    come in pairs: place n reads clamp(2 floor(n / 2), 0, W - 2) + n mod 2, so that beyond the
-    border the last two repeat, and of an odd width the last pixel reads the one before it. Sides of
-    1 are undefined in Godot; here all their places read the one sample. For the first level c is
-    divided by 1 + L before the blur and by 1 - L after it, L = max((0.299, 0.587, 0.114) . c, 0) /
-    max(cap, 6); then follow strength and exposure, then the factor
-    max(smoothstep(threshold, threshold + scale, max(c)), glow_bloom), then the cap. ``bloom`` is
-    the sum of the levels, enlarged, times their weights; a weight up to 0.0001 counts as 0, and
-    levels after the last one that counts are not made.
+    Level i has the size floor(side / 2) >> i of the frame, at least 1. It is the image above it
+    (for level 0 the frame), read bilinearly at the level's pixel centres. It is blurred by the
+    half-kernel 0.2024, 0.1790, 0.1240, 0.0672, 0.0285 along both axes, and multiplied by the
+    strength. Samples are read in pairs: place n reads clamp(2 floor(n / 2), 0, W - 2) + n mod 2. So
+    the last two repeat beyond the border, and the last pixel of an odd width reads the one before
+    it. Sides of 1 are undefined in Godot; here all their places read the one sample.
+
+    In the first level, c is divided by 1 + L before the blur and by 1 - L after it, with
+    L = max((0.299, 0.587, 0.114) . c, 0) / max(cap, 6). Strength and exposure follow, then the
+    factor max(smoothstep(threshold, threshold + scale, max(c)), glow_bloom), then the cap.
+    ``bloom`` is the weighted sum of the enlarged levels. A weight up to 0.0001 counts as 0, and
+    levels after the last weight that is not 0 do not exist.
 
     Source: godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl
     @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc.
@@ -119,9 +122,9 @@ class BlenderGlare(Settings):
     smoothness : float
         Width of the soft parts of the threshold and of the maximum, 0 to 1.
     size : float
-        Share of the frame that the glare covers, 0 to 1.
+        Size of the glare as a share of the frame, 0 to 1.
     maximum : float or None
-        Most that is kept above the threshold, 0 to 65504. None: no limit.
+        Largest brightness above the threshold, 0 to 65504. None: no limit.
     composite : {"add"}
     intensity : float
         The node's strength, 0 to 1.
@@ -134,15 +137,16 @@ class BlenderGlare(Settings):
 
     Notes
     -----
-    There are n = floor(log2(size * shorter side)) levels, one at least. ``down_0`` has the frame's
-    size: with v a colour's brightest channel it is c (v' - threshold) / v, 0 where v <= 0, with
-    v' = smooth_min(smooth_max(v, threshold), threshold + maximum). smooth_min(a, b) is
-    min(a, b) - h^2 k / 4, h = max(1 - abs(a - b) / k, 0), and smooth_max its mirror image; k is the
-    smoothness, but no more than their end is away from 0 and from the other end. Each next level is
-    the floored half of the one before by the 13 taps of `Pyramid`; for ``down_1`` the four taps of
-    each group are weighted by 1 / (1 + brightest channel). up_k = down_k + tent(up_k+1) with a tent
-    of one pixel of the larger level, and ``bloom`` is up_0 / n. The other qualities, saturation and
-    tint are left out.
+    There are n = floor(log2(size * shorter side)) levels, at least one. ``down_0`` has the size of
+    the frame. With v the brightest channel of a colour c, it is c (v' - threshold) / v, or 0 if
+    v <= 0, with v' = smooth_min(smooth_max(v, threshold), threshold + maximum). smooth_min(a, b) is
+    min(a, b) - h^2 k / 4 with h = max(1 - abs(a - b) / k, 0), and smooth_max is its mirror image. k
+    is the smoothness, but not more than the distance of the end from 0 and from the other end.
+
+    Each next level has half the size of the one before, floored, by the 13 taps of `Pyramid`. For
+    ``down_1``, the four taps of each group are weighted by 1 / (1 + brightest channel).
+    up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level, and ``bloom`` is
+    up_0 / n. The other qualities, saturation and tint are not supported.
 
     Source: the formulas of the compositor of Blender 4.5, source/blender/nodes/composite/nodes/
     node_composite_glare.cc.
@@ -160,7 +164,7 @@ class BlenderGlare(Settings):
     intensity: float = number_field("intensity", range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     smoothness: float = number_field("smoothness")
-    # --size is that of a frame.
+    # On the command line, --size is the size of a frame.
     size: float = number_field("size", option="glare-size")
     maximum: float | None = None
 
@@ -176,11 +180,11 @@ class PygfxBloom(Settings):
     Parameters
     ----------
     levels : int
-        Of the chain, 1 to 16, at most floor(log2(longer side of down_0)) + 1.
+        Number of levels, 1 to 16; at most floor(log2(longer side of down_0)) + 1.
     filter_radius : float
         Distance of the tent's taps as a share of the width, 0 to 1.
     karis_average : bool
-        ``down_0`` is the mean of the five groups, weighted by 1 / (1 + luminance) alone.
+        Whether ``down_0`` is the mean of the five groups, weighted by 1 / (1 + luminance) only.
     threshold : None
         pygfx has none.
     composite : {"mix"}
@@ -195,10 +199,10 @@ class PygfxBloom(Settings):
 
     Notes
     -----
-    ``down_0`` is the floored half of the frame, each next level that of the one before, all by the
-    13 taps of `Pyramid`; negative values become 0. up_k = down_k + tent(up_k+1), the tent's taps
-    `filter_radius` of the smaller level's width apart along both axes. ``bloom`` is one bilinear
-    sample of up_0, the sum of the levels.
+    ``down_0`` has half the size of the frame, each next level half of the one before, floored, by
+    the 13 taps of `Pyramid`. Negative values become 0. up_k = down_k + tent(up_k+1). The taps of
+    the tent are `filter_radius` of the smaller level's width apart along both axes. ``bloom`` is
+    one bilinear sample of up_0, the sum of the levels.
 
     Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
 
@@ -222,6 +226,4 @@ class PygfxBloom(Settings):
         super().__post_init__()
         check_no_knee(self)
         if self.threshold is not None:
-            raise ValueError(
-                f"threshold: {self.threshold!r} is out of range, None, for pygfx has no threshold"
-            )
+            raise ValueError(f"threshold: {self.threshold!r} is not None; pygfx has no threshold")

@@ -1,4 +1,4 @@
-"""What a call would do: its framebuffers and its passes, known before anything is rendered."""
+"""Plans: the framebuffers and passes of a request, known before it is rendered."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Pass(NamedTuple):
     Attributes
     ----------
     name : str
-        The key of `Frames.timings`. Passes that draw into the same images are timed as one, as are
-        the steps of one thing: they have the same name.
+        The key of `Frames.timings`. Passes that draw into the same images, and the steps of one
+        result, have the same name and one time.
     shader : str
-        The shader's module, such as "blur_frag".
+        The SPIR-V module of the shader, such as "blur_frag".
     reads, writes : tuple of str
-        Names of images: framebuffers, or steps towards them.
+        Names of images: framebuffers and intermediate images.
     variant : str
-        What runs in place of the method's own pass on this class of devices; "fragment" is that
-        pass itself, drawn.
+        The variant that this class of devices runs instead of the method's own pass. "fragment":
+        the pass itself, drawn by a fragment shader.
 
     See Also
     --------
@@ -55,15 +55,15 @@ class Pass(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Plan:
-    """What a renderer would do for one source and one settings.
+    """The passes and framebuffers of one request: one source with one settings.
 
-    Made by `Renderer.plan`. Two plans are equal, and have the same hash, where all attributes but
-    the last two are: the passes are those of the renderer that was asked.
+    Made by `Renderer.plan`. Two plans are equal, and have the same hash, if all attributes except
+    the last two are equal: outputs and passes may depend on the renderer.
 
     Attributes
     ----------
     source : {"image", "forward", "deferred"}
-        An image, or a scene in that shading.
+        An image, or a scene with this shading.
     size : (int, int)
         Width and height of the frame in pixels.
     dtype : numpy.dtype or None
@@ -74,12 +74,12 @@ class Plan:
         Whether the image has one (`Renderer.upload`).
     settings : Settings
     attachments : tuple of str
-        Names of the framebuffers that are wanted, in the order that the data flows.
+        Names of the requested framebuffers, in the order of the data flow.
     outputs : mapping of str to (tuple of int, numpy.dtype)
-        Shape and dtype of each framebuffer that is wanted.
+        Shape and dtype of each requested framebuffer.
     passes : tuple of Pass
-        In their order, where nothing has run before: a pass whose result is there already is left
-        out when it runs.
+        In the order in which they run on a new renderer. A renderer skips passes whose results are
+        up to date.
 
     See Also
     --------
@@ -136,8 +136,8 @@ class Plan:
         Returns
         -------
         str
-            Framebuffers are boxes, with their size and dtype, and other images are round; passes
-            are hexagons, with their shader. GitHub, JupyterLab and many editors draw it.
+            Framebuffers are boxes with their size and dtype, other images have round corners, and
+            passes are hexagons with their shader. GitHub, JupyterLab and many editors draw it.
 
         Examples
         --------
@@ -183,7 +183,7 @@ class Plan:
 
 
 def framebuffers(plan: _core.Plan) -> dict[str, Framebuffer]:
-    """Return shape and dtype of each output of a core's plan."""
+    """Return shape and dtype of each output of a plan of the core."""
     return {name: (shape, np.dtype(dtype)) for name, shape, dtype in plan.outputs}
 
 

@@ -1,6 +1,6 @@
-"""Settings under the names of where they were published.
+"""Settings under their published names.
 
-``docs/presets.md`` gives the source of each, its formula and what differs from it.
+``docs/presets.md`` has the source and the formula of each, and the differences from its source.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ if TYPE_CHECKING:
 
 
 class _Presets(dict[str, "Settings"]):
-    """Settings by name; an unknown name is told with those that there are."""
+    """Settings by name; the error for an unknown name lists the known ones."""
 
     def __missing__(self, name: object) -> Settings:
-        # Late: only for the error.
+        # Imported here, since only the error needs it.
         import difflib  # noqa: PLC0415
 
         near = difflib.get_close_matches(str(name), self, n=1, cutoff=0.3)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise KeyError(f"there is no preset {name!r}; {hint}there are: {', '.join(self)}")
+        raise KeyError(f"unknown preset {name!r}; {hint}available: {', '.join(self)}")
 
 
 #: Name to settings.
 #:
 #: - ``"tutorial"``: the forward system, 256 x 256 bloom buffers, nine taps.
-#: - ``"outline"``: the same passes with a loop that starts at the centre and a vertical step of
-#:   one texel of the width.
-#: - ``"deferred"``: the deferred HDR system's nine weights, which add up to less than 1, in three
-#:   loops. For ``shading="deferred"``, and for images too.
+#: - ``"outline"``: the same passes, with a loop that starts at the centre, and with a step of one
+#:   texel of the width in both directions.
+#: - ``"deferred"``: the nine weights of the deferred HDR system, whose sum is less than 1, in three
+#:   loops. For ``shading="deferred"`` and for images.
 #: - ``"jimenez2014"``: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced
 #:   Warfare", SIGGRAPH 2014; six levels as in LearnOpenGL's guest article on it
 #:   (JoeyDeVries/LearnOpenGL @ a545a703f958), mixed in with the talk's 0.04.
@@ -49,11 +49,11 @@ class _Presets(dict[str, "Settings"]):
 #: - ``"filament"``: google/filament, filament/include/filament/Options.h @ 2fac13e154fb, at its
 #:   low quality; the strength is the intensity.
 #: - ``"unity_urp"``: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal,
-#:   Runtime/Overrides/Bloom.cs @ a085de35f86e, with an intensity of 1 (Unity's own is 0, off).
+#:   Runtime/Overrides/Bloom.cs @ a085de35f86e, with an intensity of 1 (Unity's default is 0, off).
 #: - ``"unity_hdrp"``: Unity-Technologies/Graphics,
 #:   Packages/com.unity.render-pipelines.high-definition, Runtime/PostProcessing/Components/Bloom.cs
-#:   @ 2084a9d19159, with an intensity of 0.2 (Unity's own is 0, off; of its i HDRP makes
-#:   2^i - 1).
+#:   @ 2084a9d19159, with an intensity of 0.2 (Unity's default is 0, off; HDRP uses 2^i - 1 of its
+#:   intensity i).
 #: - ``"threejs_unreal"``: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since
 #:   #31528 and #32517 (2025), with the defaults of its successor BloomNode: strength 1, radius
 #:   and threshold 0.
@@ -76,7 +76,7 @@ presets: Mapping[str, Settings] = MappingProxyType(
             "jimenez2014": Pyramid(
                 levels=6, radius=1.0, firefly_filter=True, composite="mix", intensity=0.04
             ),
-            # KWin spreads six strengths of four iterations evenly over the offsets 3 to 8.
+            # In KWin, the six strengths with four iterations have evenly spaced offsets, 3 to 8.
             "dual_kawase": DualKawase(levels=4, offset=3 + 5 / 6),
             "bevy_natural": BevyBloom(),
             "kino": KinoBloom(),

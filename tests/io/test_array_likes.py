@@ -104,7 +104,7 @@ def test_unknown_presets_suggest_the_nearest() -> None:
     with pytest.raises(KeyError) as caught:
         vkbloom.presets["unity"]
     text = str(caught.value)
-    assert "there is no preset 'unity'; did you mean 'unity_" in text
+    assert "unknown preset 'unity'; did you mean 'unity_" in text
     assert all(name in text for name in vkbloom.presets)
     assert vkbloom.presets.get("unity") is None
     assert "unity" not in vkbloom.presets

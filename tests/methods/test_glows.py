@@ -134,7 +134,7 @@ def test_levels_after_the_last_weight_are_not_made(renderer: Renderer) -> None:
     [
         ({"level_weights": (1.0,)}, "level_weights: 1 weights are out of range, 7"),
         ({"level_weights": (0, 0, 0, 0, 0, 0, -1)}, "level_weights: -1.0 is out of range, 0 to"),
-        ({"knee": 0.5}, "knee: 0.5 is out of range, 0"),
+        ({"knee": 0.5}, "knee: 0.5 is not 0"),
         ({"white": 0.0}, "white: 0.0 is out of range, 0.01"),
         ({"composite": "under"}, "composite: 'under' is not one of add"),
     ],
@@ -231,7 +231,7 @@ def test_pygfx_is_its_reference(
 
 
 def test_pygfx_has_no_threshold() -> None:
-    with pytest.raises(ValueError, match=r"threshold: 1\.0 is out of range, None"):
+    with pytest.raises(ValueError, match=r"threshold: 1\.0 is not None"):
         PygfxBloom(threshold=1.0)
     with pytest.raises(ValueError, match=r"composite: .add. is not one of mix, which"):
         PygfxBloom(composite="add")
