@@ -19,6 +19,7 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import Command
 from vkbloom.cli.glow_options import (
     accompanying,
     glow_options,
@@ -45,7 +46,7 @@ from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.settings import Encoding
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("sources", metavar="IN... OUT", nargs=-1, required=True, type=click.Path())
 @click.option(
     "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, in place of OUT."

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.fields import SIZE
+from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.glow_options import accompanying, glow_options
 from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
 from vkbloom.cli.program import as_wrong_use, given
@@ -27,7 +27,7 @@ from vkbloom.settings import SHADINGS, Shading
 _LARGEST_PORT: Final = 65535
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
 @click.option(
     "--port",

@@ -16,7 +16,7 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.fields import SIZE
+from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.image_files import note
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
@@ -26,7 +26,7 @@ from vkbloom.io.animations import animation
 from vkbloom.settings import SHADINGS, Shading
 
 
-@click.command()
+@click.command(cls=Command)
 @click.option(
     "-o",
     "--out",
