@@ -1,7 +1,7 @@
-"""One viewer of a source: takes the messages of a page, gives pictures and values.
+"""One viewer of a source: answers the messages of a page with pictures and values.
 
-The same for a notebook and for a page of its own; what carries the messages is none of its
-concern. Messages are plain values that JSON can hold:
+It is the same for notebooks and for the page of ``vkbloom explore``, and does not depend on how
+messages are transported. Messages are values that JSON can represent:
 
 ======== ============================================= =========================================
 kind     asked                                         answered
@@ -13,8 +13,8 @@ frame    sides: settings of "a", "b" or both;          of each side: a picture (
 probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
 ======== ============================================= =========================================
 
-``view`` and ``id`` come back as they were sent. A page asks for its next frame when it has the one
-before, so that between the two only the newest change counts.
+``view`` and ``id`` are returned as they were sent. A page asks for its next frame when it has
+received the one before. Of the changes in between, only the newest one is rendered.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ __all__ = ["SIDES", "Viewer"]
 SIDES: Final = ("a", "b")
 
 _LARGEST_SIDE: Final = 8192
-# Views come without taking leave; what the pointer needs of more than these is forgotten.
+# Views do not say when they are closed. The framebuffers of the oldest ones are dropped.
 _VIEWS_KEPT: Final = 8
 _FAILURES: Final = (_core.Error, TypeError, ValueError, MemoryError)
 
@@ -52,14 +52,14 @@ Answer = tuple[dict[str, Any], list[bytes]]
 
 
 class Viewer:
-    """A source and the two settings that it is looked at with.
+    """A source and the settings of both sides.
 
     Parameters
     ----------
     source, settings, mask, emission, against, size, shading, renderer
         As for `vkbloom.explore`.
     adapter : str
-        Of the renderer, where none is given.
+        Adapter of the new renderer, if `renderer` is None.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Viewer:
                     raise ValueError(f"{name}: the source is a scene; leave the argument out")
         else:
             self._scene = None
-            # A copy, since the page may ask for it long after the caller has changed it.
+            # Copies, since the caller may change the arrays while the page is open.
             image = np.array(check_image(source), order="C")
             self._own_size = (image.shape[1], image.shape[0])
             self._image = {"image": image}
@@ -124,7 +124,7 @@ class Viewer:
         self._shown: dict[object, dict[str, NDArray[Any]]] = {}
 
     def close(self) -> None:
-        """Close the renderer, unless it was given; may be called twice."""
+        """Close the renderer, unless the caller passed it; may be called twice."""
         if self._owned:
             self.renderer.close()
 
@@ -139,8 +139,8 @@ class Viewer:
         Returns
         -------
         (dict, list of bytes)
-            The answer and its pictures; ``{"kind": "error", "error": ...}`` where the message
-            makes no sense.
+            The answer and its pictures; ``{"kind": "error", "error": ...}`` if the message is
+            invalid.
         """
         kinds = {"setup": self._setup, "frame": self._frame, "probe": self._probe}
         kind = message.get("kind") if isinstance(message, Mapping) else None
@@ -190,7 +190,7 @@ class Viewer:
                     stops=float(stops),
                 )
             except _FAILURES as error:
-                # The other side, or the picture before, is still worth looking at.
+                # The other side is still shown.
                 sides[side] = {"error": _described(error)}
                 continue
             self.settings[side], self.frames[side] = settings, frames
@@ -217,7 +217,7 @@ class Viewer:
     def _render(
         self, settings: Settings, size: tuple[int, int], name: object, time: float
     ) -> tuple[Frames, list[str]]:
-        """Return one framebuffer, the one of that name or else `final`, and the names of all."""
+        """Return the framebuffer of that name, or `final` if there is none, and all names."""
         if self._scene is None:
             given: dict[str, Any] = dict(self._image_of(size))
             image = given.pop("image")
@@ -248,7 +248,7 @@ class Viewer:
         return self._reduced[1]
 
     def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:
-        """Return the framebuffers that a view shows, by side, to be read and written."""
+        """Return the dict of the framebuffers that a view shows, by side."""
         arrays = self._shown.pop(str(view), {})
         self._shown[str(view)] = arrays
         while len(self._shown) > _VIEWS_KEPT:
@@ -257,7 +257,7 @@ class Viewer:
 
 
 def _finite(timings: Mapping[str, float]) -> dict[str, float]:
-    """Return the times that JSON can hold."""
+    """Return the times that are finite, which JSON requires."""
     return {name: seconds for name, seconds in timings.items() if math.isfinite(seconds)}
 
 
@@ -275,6 +275,6 @@ def _place(at: object) -> tuple[float, float]:
 
 def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
     height, width = array.shape[:2]
-    # 1 is the edge of the last pixel.
+    # A position of 1 is the far edge of the last pixel.
     x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
     return {"x": x, "y": y, "values": texts_of(array[y, x])}
