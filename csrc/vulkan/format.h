@@ -2,6 +2,7 @@
 #ifndef VKB_FORMAT_H
 #define VKB_FORMAT_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <vulkan/vulkan_core.h>
 
@@ -19,6 +20,10 @@ enum vkb_format {
 // The longest side of an image, for which the integers in sampling.glsl fit 32 bits.
 enum { VKB_MAX_SIDE = 32768 };
 
+// Images of a CPU are also buffers of such words.
+enum { VKB_WORD_SIZE = 16 };
+#define VKB_WORD_FORMAT VK_FORMAT_R32G32B32A32_UINT
+
 struct vkb_format_info {
     const char *name;   // "rgba8unorm"
     const char *dtype;  // "uint8"
@@ -34,6 +39,12 @@ extern const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT];
 static inline uint32_t vkb_pixel_size(enum vkb_format format)
 {
     return vkb_formats[format].channels * vkb_formats[format].channel_size;
+}
+
+// Whether the largest value is 1: sums of levels do not fit.
+static inline bool vkb_ends_at_one(enum vkb_format format)
+{
+    return vkb_formats[format].limit < 2.0f;
 }
 
 // The format of that name; VKB_FORMAT_NONE if there is none.

@@ -9,6 +9,7 @@ import itertools
 import json
 import sys
 import tempfile
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,13 @@ import vkbloom
 from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command
+from vkbloom.cli.glow_options import (
+    accompanying,
+    glow_options,
+    has_straight,
+    premultiplied,
+    uploaded,
+)
 from vkbloom.cli.image_files import (
     COLOURS,
     check_input_colour,
@@ -38,6 +46,7 @@ from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_reading, image_writing
+from vkbloom.io.array_files import divided
 from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage
 from vkbloom.settings import Encoding
 
@@ -90,6 +99,7 @@ from vkbloom.settings import Encoding
 )
 @subimage_option
 @layer_option
+@glow_options
 @device_options
 @settings_options
 def command(  # noqa: PLR0915  one step after the other
@@ -105,6 +115,8 @@ def command(  # noqa: PLR0915  one step after the other
     half: bool | None,
     subimage: int,
     layer: str | None,
+    mask: str | None,
+    emission: str | None,
     adapter: str,
     validation: bool,
     settings: vkbloom.Settings,
@@ -129,7 +141,12 @@ def command(  # noqa: PLR0915  one step after the other
     values are encoded already and written as they come. EXIF, resolution and a JPEG's chroma
     subsampling are kept.
 
-    Alpha is kept, and colours are neither multiplied nor divided by it. Grey images become RGB
+    --mask limits what glows, --emission glows in the image's place; of several INs they are for
+    each.
+
+    Alpha is kept, unless --alpha says otherwise, and colours are neither multiplied nor divided by
+    it: with --alpha max or blur files of straight colours are multiplied first, and the result is
+    divided. Grey images become RGB
     and grey again. Of an OpenEXR file whose data window is smaller than its display window, the
     rest is black; a larger data window takes part, and is kept where OUT can have one. Images
     are turned upright where the file has an orientation. Of files with several parts the first
@@ -141,14 +158,7 @@ def command(  # noqa: PLR0915  one step after the other
 
     OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
     """
-    if raw and (input_colour or output_colour):
-        raise click.UsageError(
-            "--raw does not convert colours; leave out --input-colour and --output-colour"
-        )
-    if settings.encoding != "none" and output_colour:
-        raise click.UsageError(
-            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
-        )
+    _check_colours(settings, input_colour, output_colour, raw=raw)
     check_input_colour(input_colour)
     given, out = _arguments(sources, out)
     if out == PIPE and attachments != "final":
@@ -162,11 +172,13 @@ def command(  # noqa: PLR0915  one step after the other
     names = attachments if attachments == "all" else ["final", *attachments.split(",")]
     wanted = no_bloom.with_bloom(names, settings)
     several = len(work) > 1
+    is_blended = settings.alpha != "keep"
     with tempfile.TemporaryDirectory() as folder, silenced():
 
         def taken(source: str) -> Picture:
             file = _piped_in(folder) if source == PIPE else source
-            return read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            picture = read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            return premultiplied(picture) if is_blended else picture
 
         def write(picture: Picture, frames: vkbloom.Frames, target: str) -> None:
             if several:
@@ -183,8 +195,8 @@ def command(  # noqa: PLR0915  one step after the other
             return image_reading.decode(rows, input_colour, raw=raw)
 
         def by_rows(name: str) -> bool:
-            is_plain = attachments == "final" and out != PIPE and not (layer or subimage or raw)
-            return is_plain and is_large(name)
+            others = (layer, subimage, raw, mask, emission, is_blended, out == PIPE)
+            return attachments == "final" and not any(others) and is_large(name)
 
         def write_large(renderer: vkbloom.Renderer, name: str, target: str) -> None:
             if several:
@@ -203,6 +215,7 @@ def command(  # noqa: PLR0915  one step after the other
             if not several:
                 click.echo(f"wrote {target}")
 
+        given_with = accompanying(mask, emission, input_colour, raw=raw, is_blended=is_blended)
         # None: shown where standard error is a terminal.
         disable = None if sys.stderr is not None else True
         with ExitStack() as stack:
@@ -218,10 +231,12 @@ def command(  # noqa: PLR0915  one step after the other
                     for name, target in files:
                         write_large(renderer, name, target)
                     continue
+                prepared = functools.partial(_prepared, renderer, given_with)
                 with as_wrong_use():
-                    renderer.plan(first.pixels, settings, attachments=wanted)
+                    renderer.plan(prepared(first), settings, attachments=wanted)
                 ahead = read_ahead(taken, [name for name, _ in files[1:]])
-                results = rendered(renderer, itertools.chain([first], ahead), settings, wanted)
+                pictures = itertools.chain([first], ahead)
+                results = rendered(renderer, pictures, settings, wanted, prepared)
                 del first
                 bar = tqdm(
                     results,
@@ -239,6 +254,36 @@ def command(  # noqa: PLR0915  one step after the other
                         write_next(functools.partial(write, picture, kept, target))
     if several:
         click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
+
+
+def _check_colours(
+    settings: vkbloom.Settings,
+    input_colour: Colour | None,
+    output_colour: SavedColour | None,
+    *,
+    raw: bool,
+) -> None:
+    """Raise click.UsageError for options that do not go together."""
+    if raw and (input_colour or output_colour):
+        raise click.UsageError(
+            "--raw does not convert colours; leave out --input-colour and --output-colour"
+        )
+    if settings.encoding != "none" and settings.alpha != "keep":
+        raise click.UsageError(
+            f"--alpha {settings.alpha} is for linear colours; leave out --encoding, OUT is encoded "
+            "as its format needs"
+        )
+    if settings.encoding != "none" and output_colour:
+        raise click.UsageError(
+            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
+        )
+
+
+def _prepared(
+    renderer: vkbloom.Renderer, given_with: Callable[[NDArray[Any]], Any], picture: Picture
+) -> Any:
+    """Return a picture's image with its mask and emission."""
+    return uploaded(renderer, picture.pixels, given_with(picture.pixels))
 
 
 def _arguments(sources: tuple[str, ...], out: str | None) -> tuple[list[str], str]:
@@ -272,7 +317,7 @@ def _written(
     """Write `final` and the other framebuffers, and return the files."""
     written = _save_others(frames, target)
     notes = image_writing.save(
-        _result(picture, frames["final"], frames.settings.encoding),
+        _result(picture, _straight(picture, frames), frames.settings.encoding),
         target,
         colour,
         {
@@ -306,3 +351,9 @@ def _result(
     """Return the picture with its bloom, with the encoding that its pixels now have."""
     done = picture.encoding if encoding == "none" else encoding
     return dataclasses.replace(picture, pixels=final, encoding=done)
+
+
+def _straight(picture: Picture, frames: vkbloom.Frames) -> NDArray[Any]:
+    """Return `final` with colours as the file's were, multiplied by alpha or not."""
+    final = frames["final"]
+    return divided(final) if frames.settings.alpha != "keep" and has_straight(picture) else final
