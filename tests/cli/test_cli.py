@@ -304,6 +304,27 @@ def test_the_help_of_an_option_is_the_fields_docstring() -> None:
     ]
 
 
+@pytest.mark.parametrize("name", ["apply", "render", "grid", "explore"])
+def test_the_help_groups_options_by_method(name: str) -> None:
+    sections: dict[str, str] = {}
+    title = ""
+    for line in vkb(name, "--help").output.splitlines():
+        if line.endswith(":") and not line.startswith(" "):
+            title = line[:-1]
+        sections[title] = sections.get(title, "") + line + "\n"
+    of_methods = {f"Settings of the method {method}" for method in METHODS}
+    # HDRP and others have a section only where a field is theirs alone.
+    assert len(of_methods & set(sections)) > len(METHODS) / 2
+    for option, title in {
+        "--adapter": "Options",
+        "--threshold": "Settings of every method",
+        "--levels": "Settings of several methods",
+        "--blur-scale": "Settings of the method separable",
+        "--firefly-filter": "Settings of the method pyramid",
+    }.items():
+        assert [one for one in sections if f"\n  {option} " in sections[one]] == [title]
+
+
 def test_none_that_is_given_is_not_the_default() -> None:
     @dataclasses.dataclass
     class Cut:

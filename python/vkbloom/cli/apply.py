@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 import vkbloom
 from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import Command
 from vkbloom.cli.image_files import (
     COLOURS,
     input_colour_option,
@@ -32,7 +33,7 @@ from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.settings import Encoding
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("sources", metavar="IN... OUT", nargs=-1, required=True, type=click.Path())
 @click.option(
     "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, in place of OUT."

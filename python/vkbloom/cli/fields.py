@@ -111,13 +111,48 @@ class _Dataclass(Protocol):
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
 
+class FieldOption(click.Option):
+    """An option of a field, which `Command` lists under the labels of the classes that have it."""
+
+    labels: tuple[str, ...] = ()
+
+
+class Command(click.Command):
+    """A command whose help groups the options of fields: of all, of one class, of several."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the command's own options, then those of each group."""
+        groups: dict[tuple[str, ...] | None, list[tuple[str, str]]] = {None: []}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None and isinstance(parameter, click.Option):
+                labels = parameter.labels if isinstance(parameter, FieldOption) else None
+                groups.setdefault(labels, []).append(record)
+        # Those of many classes first, then class by class.
+        order = sorted((labels for labels in groups if labels), key=lambda labels: -len(labels))
+        shared = [labels for labels in order if len(labels) > 1]
+        with formatter.section("Options"):
+            formatter.write_dl(groups[None])
+        if () in groups:
+            with formatter.section("Settings of every method"):
+                formatter.write_dl(groups[()])
+        if shared:
+            with formatter.section("Settings of several methods"):
+                formatter.write_dl([record for labels in shared for record in groups[labels]])
+        for labels in order:
+            if len(labels) == 1:
+                with formatter.section(f"Settings of the method {labels[0]}"):
+                    formatter.write_dl(groups[labels])
+
+
 @dataclasses.dataclass
 class _Field:
-    """A field for which an option is made: its annotation and help texts."""
+    """A field for which an option is made: its annotation, help texts and classes' labels."""
 
     annotation: Any
     helps: list[str]
     option: str
+    labels: list[str]
 
 
 def _collect(
@@ -135,7 +170,7 @@ def _collect(
                 continue
             annotation = annotations[name]
             option = declaration.metadata.get("option", name)
-            field = found.setdefault(name, _Field(annotation, [], option))
+            field = found.setdefault(name, _Field(annotation, [], option, []))
             # None is taken by the option where one of the kinds takes it.
             wider = field.annotation | annotation
             if wider not in (field.annotation, annotation):
@@ -143,7 +178,15 @@ def _collect(
             field.annotation = wider
             default = f"{label and label + ', '}default {_spelled(declaration.default)}"
             field.helps.append(f"{texts.get(name, '')} [{default}]".strip())
+            field.labels += [label] if label else []
     return found
+
+
+def _option_class(labels: tuple[str, ...] | None) -> type[click.Option]:
+    """Return the class of the options of fields with some labels; None: of no group."""
+    if labels is None:
+        return click.Option
+    return type("FieldOption", (FieldOption,), {"labels": labels})
 
 
 def options(
@@ -194,6 +237,7 @@ def options(
                 default=None,
                 type=None if is_flag else option_type(field.annotation),
                 help=" ".join(field.helps),
+                cls=_option_class(None if prefix else tuple(field.labels)),
             )(run)
         return run
 

@@ -11,6 +11,7 @@ from typing import Any, Final
 import click
 
 from vkbloom.checks import import_extra
+from vkbloom.cli.fields import Command
 
 __all__ = ["FILE_OPTION", "CommandWithFile"]
 
@@ -29,7 +30,7 @@ _TOO_MUCH: Final = "its values are too many, nested too deeply, or contain thems
 _SIZES: Final = ("size", "bloom-size")
 
 
-class CommandWithFile(click.Command):
+class CommandWithFile(Command):
     """A command that reads options from a file; options on the command line override them.
 
     The file's keys are the long options without the leading dashes, written with ``-`` or ``_``.

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 import vkbloom
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.fields import SIZE
+from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
@@ -22,7 +22,7 @@ from vkbloom.cli.terminal import show
 from vkbloom.settings import SHADINGS, Shading
 
 
-@click.command()
+@click.command(cls=Command)
 @click.option(
     "-o",
     "--out",
