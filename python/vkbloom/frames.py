@@ -208,7 +208,8 @@ class Frames(Mapping[str, NDArray[Any]]):
 
         If the format has such attributes, ``Software`` and ``ImageDescription`` (``Description``
         in PNG) contain the version, the adapter and the settings, and ``vkbloom:<key>`` contains
-        each entry of `info`, and the settings and timings as JSON.
+        each entry of `info`, and the settings and timings as JSON. In TIFF and JPEG the
+        ``ImageDescription`` contains all of it.
 
         Parameters
         ----------
@@ -269,14 +270,32 @@ class Frames(Mapping[str, NDArray[Any]]):
         OSError
             There is no such file, or it cannot be opened; it names the file.
         ValueError
-            A file is damaged, or holds no settings: `save` did not write it, or its format (all
-            but OpenEXR and PNG) has no place for them. It names the file.
+            A file is damaged, or holds no settings: `save` did not write it, or its format (of
+            those that `save` writes, all but OpenEXR, PNG, TIFF and JPEG) has no place for them.
+            Or a framebuffer is in two files, of two calls of `save`. It names the file.
         ModuleNotFoundError
             If OpenImageIO is missing: ``pip install vkbloom[images]``.
 
         See Also
         --------
         save : The way there.
+
+        Notes
+        -----
+        Other files in a folder are left out, and so are those of other names that begin alike. Of
+        JPEG, which compresses with loss, the values are those that are left.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> image = np.full((16, 16, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     files = frames.save(f"{folder}/out.png")
+        ...     again = vkbloom.Frames.load(f"{folder}/out.png")
+        >>> again.settings == frames.settings, np.array_equal(again["bloom"], frames["bloom"])
+        (True, True)
         """
         from vkbloom.io import files  # noqa: PLC0415  costs start-up time
 

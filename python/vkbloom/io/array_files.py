@@ -201,6 +201,13 @@ def write(
     read : The way back.
     Frames.save : Every framebuffer, with settings and timings.
 
+    Notes
+    -----
+    Colours are written in the primaries of Rec. 709, which are those of `read`, and not converted
+    to others: there is no ``write`` of Display P3. A photograph of Display P3 that is read and
+    written as PNG or JPEG is a Rec. 709 file; its colours outside of Rec. 709 are clipped. OpenEXR
+    keeps them, as negative components, and an OpenColorIO tool converts them.
+
     Examples
     --------
     >>> vkbloom.write("ramp.png", np.linspace(0, 1, 256 * 64 * 3, dtype=np.float32)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import glob
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["load", "save"]
 
+# Before the JSON of a description.
+_DESCRIBED = ", all of it: "
 # What `_spec` writes beside the entries of `info`.
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place")
 
@@ -110,11 +113,16 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     ModuleNotFoundError
         OpenImageIO is missing.
     """
-    found: list[tuple[int, str, NDArray[Any]]] = []
+    found: dict[str, tuple[int, NDArray[Any], Path]] = {}
     facts: dict[str, Any] = {}
-    for file in _files_of(Path(path)):
-        for index in range(len(image_reading.load(file).parts)):
+    target = Path(path)
+    # Of other files beside them, those that say nothing of `save` are left out.
+    is_one = target.is_file()
+    for file in _files_of(target):
+        for index in range(_parts_of(file)):
             pixels, said = _stored(file, index)
+            if not is_one and not _is_of(target, file, said):
+                continue
             try:
                 facts = {
                     "settings": Settings.from_json(said["settings"]),
@@ -125,13 +133,33 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
                         if name not in _OWN
                     },
                 }
-                array = _as_dtype(pixels, said["dtype"])
-                found.append((int(said["place"]), said["framebuffer"], array))
+                name, array = said["framebuffer"], _as_dtype(pixels, said["dtype"])
+                if name in found:
+                    raise ValueError(f"{name} is in {found[name][2]} as well; remove the older one")
+                found[name] = int(said["place"]), array, file
             except KeyError as error:
                 raise ValueError(f"{file}: not written by Frames.save: no {error}") from error
             except (TypeError, ValueError) as error:
                 raise ValueError(f"{file}: {error}") from error
-    return {name: array for _, name, array in sorted(found, key=lambda one: one[0])}, facts
+    if not found:
+        raise ValueError(f"{target}: not written by Frames.save: no file has its attributes")
+    ordered = sorted(found.items(), key=lambda one: one[1][0])
+    return {name: array for name, (_, array, _) in ordered}, facts
+
+
+def _parts_of(file: Path) -> int:
+    """Return how many framebuffers a file holds."""
+    return len(image_reading.load(file).parts)
+
+
+def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
+    """Return whether `save` gave a framebuffer this file's name for the sake of a target."""
+    if "framebuffer" not in said:
+        return False
+    name = said["framebuffer"]
+    return file.stem == (name if target.is_dir() else f"{target.stem}_{name}") or (
+        file.stem == target.stem
+    )
 
 
 def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
@@ -144,7 +172,7 @@ def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
             attribute.name.removeprefix("vkbloom:"): str(attribute.value)
             for attribute in spec.extra_attribs
             if attribute.name.startswith("vkbloom:")
-        }
+        } or _described(spec.get_string_attribute("ImageDescription"))
         pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
         reason = failure_of(reader)
     if pixels is None or reason:
@@ -152,10 +180,22 @@ def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
     return pixels.reshape(spec.height, spec.width, spec.nchannels), said
 
 
+def _described(text: str) -> dict[str, str]:
+    """Return what a description says, in formats that have no attributes of their own (TIFF)."""
+    with contextlib.suppress(ValueError, AttributeError):
+        return {
+            str(name): str(value)
+            for name, value in json.loads(text.partition(_DESCRIBED)[2]).items()
+        }
+    return {}
+
+
 def _files_of(path: Path) -> list[Path]:
-    """Return the files that `save` makes of a name."""
+    """Return the files that `save` may have made of a name."""
     if path.is_dir():
-        found = sorted(file for file in path.iterdir() if file.is_file())
+        found = sorted(
+            file for file in path.iterdir() if file.is_file() and file.suffix in (".png", ".exr")
+        )
     elif path.exists():
         return [path]
     else:
@@ -191,7 +231,7 @@ def _write_image(
         pixels = pixels[:, :, :3]
     if not safe_writing.holds(oiio, temporary, pixels.shape[2], PIXEL_TYPES[str(pixels.dtype)]):
         return False
-    spec = _spec(oiio, frames, name, pixels)
+    spec = _spec(oiio, frames, name, pixels, file)
     # Otherwise OpenImageIO takes the colours for premultiplied and divides them by alpha.
     spec.attribute("oiio:UnassociatedAlpha", 1)
     if not (
@@ -214,7 +254,7 @@ def _write_exr(
         pixels = np.atleast_3d(frames[name])
         if pixels.dtype == np.uint8:
             pixels = (pixels / np.float32(255)).astype(np.float16)
-        spec = _spec(oiio, frames, name, pixels)
+        spec = _spec(oiio, frames, name, pixels, file)
         # What OpenEXR calls the name of the part.
         spec.attribute("oiio:subimagename", name)
         spec.full_width, spec.full_height = width, height
@@ -236,7 +276,7 @@ def _write_exr(
 
 
 def _spec(
-    oiio: ModuleType, frames: Framebuffers, name: str, pixels: NDArray[Any]
+    oiio: ModuleType, frames: Framebuffers, name: str, pixels: NDArray[Any], file: Path
 ) -> OpenImageIO.ImageSpec:
     """Describe an (H, W, C) array to OpenImageIO, with what the frames came from."""
     height, width, channels = pixels.shape
@@ -246,12 +286,19 @@ def _spec(
     settings = json.dumps(frames.settings.to_dict())
     adapter = frames.info.get("adapter", "an unnamed adapter")
     spec.attribute("Software", f"vkbloom {frames.info.get('version', '')}".rstrip())
-    spec.attribute("ImageDescription", f"vkbloom on {adapter}, settings {settings}")
-    for key, value in frames.info.items():
-        spec.attribute(f"vkbloom:{key}", str(value))
-    spec.attribute("vkbloom:settings", settings)
-    spec.attribute("vkbloom:timings", json.dumps(dict(frames.timings)))
-    spec.attribute("vkbloom:dtype", str(frames[name].dtype))
-    spec.attribute("vkbloom:framebuffer", name)
-    spec.attribute("vkbloom:place", str(list(frames).index(name)))
+    said = {
+        **{key: str(value) for key, value in frames.info.items()},
+        "settings": settings,
+        "timings": json.dumps(dict(frames.timings)),
+        "dtype": str(frames[name].dtype),
+        "framebuffer": name,
+        "place": str(list(frames).index(name)),
+    }
+    for key, value in said.items():
+        spec.attribute(f"vkbloom:{key}", value)
+    description = f"vkbloom on {adapter}, settings {settings}"
+    # TIFF and JPEG have no attributes of other names.
+    if file.suffix.lower() in (".tif", ".tiff", ".jpg", ".jpeg"):
+        description += _DESCRIBED + json.dumps(said)
+    spec.attribute("ImageDescription", description)
     return spec
