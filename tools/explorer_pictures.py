@@ -67,7 +67,7 @@ def photograph_own_page(browser: Browser, folder: Path) -> None:
                 page.locator("[data-field=intensity]").fill("1.5")
                 wait(page, "Pyramid(intensity=1.5")
                 page.get_by_label("wipe A | B").check()
-                page.locator("canvas").hover(position={"x": 330, "y": 215})
+                page.locator("canvas").hover(position={"x": 330.5, "y": 215.5})
                 page.get_by_text("B final[215, 330]").wait_for()
                 save(page, folder / f"explorer_page_{theme}.jpg")
                 page.close()

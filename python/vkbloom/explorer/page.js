@@ -111,6 +111,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   const layout = make("div", { className: "vkb-layout" });
   root.append(layout);
   root.dataset.lmSuppressShortcuts = "true"; // JupyterLab's: letters are for the inputs here
+  // An element of a notebook may else be as narrow as what it holds, which adapts to it.
+  parent.style.width = "100%";
   parent.append(root);
 
   let setup; // the answer to "setup": controls, presets, source
