@@ -63,10 +63,10 @@ format: build/stamp/lint
 	$(VENV)/bin/ruff format .
 	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/threads/*.c
 
-# Tests of the core with ASan, UBSan and LeakSanitizer; threads with ThreadSanitizer.
+# Tests of the core with ASan, UBSan and LeakSanitizer; beside them, threads with ThreadSanitizer.
 sanitize: build/stamp/core build/stamp/test
-	PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh
-	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10
+	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10 & threads=$$!; \
+	    PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh; tests=$$?; wait $$threads && exit $$tests
 
 clean:
 	rm -rf build out docs/api docs/examples $(VENV) python/vkbloom/_core*.so

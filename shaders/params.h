@@ -268,7 +268,9 @@
     CONSTANT(17, FIRST, first) \
     CONSTANT(18, LEVELS, levels) \
     CONSTANT(19, KARIS_AVERAGE, karis_average) \
-    CONSTANT(20, NODE, node)
+    CONSTANT(20, NODE, node) \
+    CONSTANT(21, ALPHA, alpha) \
+    CONSTANT(22, MASKED, masked)
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -291,6 +293,11 @@
     NAME(ENCODING_GAMMA22, 1, gamma22) \
     NAME(ENCODING_SRGB, 2, srgb)
 
+#define ALPHA_NAMES(NAME) \
+    NAME(ALPHA_KEEP, 0, keep) \
+    NAME(ALPHA_MAX, 1, max) \
+    NAME(ALPHA_BLUR, 2, blur)
+
 #define TEXEL_NAMES(NAME) \
     NAME(TEXEL_OWN, 0, own) \
     NAME(TEXEL_X, 1, x)
@@ -299,6 +306,7 @@
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
     CHOICE(encoding, ENCODING_NAMES) \
+    CHOICE(alpha, ALPHA_NAMES) \
     CHOICE(texel, TEXEL_NAMES)
 
 // Modes that the core chooses, named in both languages.

@@ -11,7 +11,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from vkbloom import Renderer, Scene, Settings
+from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
 
 #: What the tests run on; a GPU is tested by hand, with VKBLOOM_TEST_ADAPTER=hardware.
 ADAPTER = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
@@ -92,6 +92,15 @@ def new_renderer() -> Iterator[Callable[[], Renderer]]:
     yield open_one
     for one in opened:
         one.close()
+
+
+@pytest.fixture(scope="session")
+def software(environment: None) -> AdapterInfo:
+    """The software adapter, for tests of it; they are skipped where there is none."""
+    for adapter in adapters():
+        if adapter.type == "cpu":
+            return adapter
+    pytest.skip("there is no software adapter here, such as Mesa's lavapipe")
 
 
 @pytest.fixture(scope="session")

@@ -87,9 +87,16 @@ def assert_close(
     )
 
 
-def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Settings) -> None:
+def assert_matches_reference(
+    frames: Frames,
+    image: NDArray[Any],
+    settings: Settings,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+) -> None:
     """Compare all framebuffers: names in their order, shapes, dtypes, alpha, values."""
-    expected = reference.apply(image, settings)
+    expected = reference.apply(image, settings, mask=mask, emission=emission)
     assert list(frames) == list(expected)
     format = settings.format or FORMATS[image.dtype.name]
     if settings.threshold is not None and not isinstance(settings, _WITH_THRESHOLD_PASS):
@@ -97,14 +104,21 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
         limit = tolerance(_DTYPES[format], expected["glow"], stages_of_8_bits=1)
         assert_close("glow", frames["glow"], expected["glow"], limit)
         height, width, _ = image.shape
-        expected |= reference.passes(frames["glow"], settings, (width, height), format)
-        expected["final"] = reference.composite(image, expected["bloom"], settings)
+        glow = frames["glow"]
+        expected |= reference.passes(glow, settings, (width, height), format, mask=mask)
+        share = 0.0 if emission is not None else 1.0 if mask is None else real(mask)[..., None]
+        expected["final"] = reference.composite(image, expected["bloom"], settings, share=share)
     passes_before_vertical = 2 * getattr(settings, "loops", 1) - 1
     hidden = passes_before_vertical - 1
     if isinstance(settings, Separable):
         hidden += len(settings.layers) - 1
-    # A threshold takes away from a value, but not from what it was rounded by.
-    magnitudes = reference.apply(np.abs(image), settings.replace(threshold=None))
+    magnitudes: dict[str, Any] = dict.fromkeys(expected, 0.0)
+    if "float16" in (image.dtype.name, _DTYPES[format]):
+        # A threshold takes away from a value, but not from what it was rounded by.
+        sizes = None if emission is None else np.abs(emission)
+        magnitudes |= reference.apply(
+            np.abs(image), settings.replace(threshold=None), mask=mask, emission=sizes
+        )
     limits = {}
     for index, (name, array) in enumerate(frames.items()):
         dtype = image.dtype if name == "final" else _DTYPES[format]
@@ -130,7 +144,7 @@ def assert_matches_reference(frames: Frames, image: NDArray[Any], settings: Sett
         limits["final"] = limits["final"] + settings.intensity * of_bloom
     for name, array in frames.items():
         assert_close(name, array, expected[name], limits[name])
-        if name != "final":
+        if name != "final" and settings.alpha != "blur":
             assert (real(array[..., 3]) == 1).all(), f"{name}: alpha is not 1"
-    if image.shape[2] == 4:
+    if image.shape[2] == 4 and settings.alpha == "keep":
         np.testing.assert_array_equal(frames["final"][..., 3], image[..., 3])

@@ -1,32 +1,31 @@
 #!/bin/sh
 # Runs the tests with a core built with the address, undefined-behaviour and leak sanitizers.
 # PYTHON: an interpreter with the test requirements installed. Arguments go to pytest. Without
-# arguments, it runs the tests that use the core.
+# arguments, it runs the tests that reach all of the core, in two processes.
 set -eu
 
 cd "$(dirname "$0")/.."
-# The files left out test only Python, or the core in other processes. Large images take minutes here
-# and reach no other code of the core.
+# A method, format or variant reaches no other code with a larger image, or where its values are
+# compared with the reference: tests of these, of Python alone and of other processes are left out.
 if [ $# = 0 ]; then
-    set -- -k "not 333x and not 1920 and not count_of_a_point"
-    for name in faults frames mutations; do
-        set -- "$@" "--ignore=tests/core/test_$name.py"
+    for name in adapters array_memory batches bundled_driver core_arguments errors eviction graph \
+        interruption lifetime out_of_date pipeline_cache plans readback settings threads; do
+        set -- "$@" "tests/core/test_$name.py"
     done
-    for name in variants hdr_images reference; do
-        set -- "$@" "--ignore=tests/methods/test_$name.py"
+    for name in apply_input dither level_weights presets rg11b10 variants; do
+        set -- "$@" "tests/methods/test_$name.py"
     done
-    for name in assets gltf gltf_textures scene skybox; do
-        set -- "$@" "--ignore=tests/scene/test_$name.py"
+    for name in deferred deferred_passes render textures; do
+        set -- "$@" "tests/scene/test_$name.py"
     done
-    for name in grid_cluster grid_order grid_reductions grid_store grid_views; do
-        set -- "$@" "--ignore=tests/grid/test_$name.py"
+    set -- "$@" tests/grid/test_grid.py
+    for name in apply_input.py::test_largest_side apply_input.py::test_long_odd_side \
+        presets.py::test_a_preset_is_its_reference presets.py::test_hdrps_cubic_filter \
+        rg11b10.py::test_every_method variants.py::test_every_form variants.py::test_final_alone \
+        variants.py::test_large variants.py::test_the_forward_frame; do
+        set -- "$@" --deselect "tests/methods/test_$name"
     done
-    for name in comparison guide laws plugin report; do
-        set -- "$@" "--ignore=tests/plugin/test_$name.py"
-    done
-    for name in bench cli docs explorer io views; do
-        set -- "$@" "--ignore=tests/$name"
-    done
+    set -- "$@" -k "not count_of_a_point and not dry_run" -n 2 --dist loadfile
 fi
 folder=$PWD/build/sanitize
 mkdir -p "$folder"

@@ -191,13 +191,13 @@ uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
     return row->channels ? row->channels : vkb_formats[row->format].channels;
 }
 
-// Whether the image is the input, or written before pass `pass_index`.
+// Whether the image is an input, or written before pass `pass_index`.
 static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
 {
     for (uint32_t i = 0; i < pass_index; ++i)
         if (vkb_pass_writes(&graph->passes[i], image))
             return true;
-    return graph->images[image].input;
+    return graph->images[image].input != VKB_INPUT_NONE;
 }
 
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,

@@ -18,7 +18,17 @@ enum {
 
 #define VKB_NO_IMAGE UINT32_MAX
 
-// An image is either the input, or written by one sequence of consecutive passes. So its content
+// What the host fills an image with, if it does: the image that a source is of, what takes its
+// place as the source of the bloom, and the mask of what glows.
+enum vkb_input_kind {
+    VKB_INPUT_NONE,
+    VKB_INPUT_IMAGE,
+    VKB_INPUT_EMISSION,
+    VKB_INPUT_MASK,
+    VKB_INPUT_COUNT,
+};
+
+// An image is either an input, or written by one sequence of consecutive passes. So its content
 // stays valid until this sequence is out of date.
 struct vkb_image_row {
     char name[VKB_NAME_SIZE];
@@ -26,7 +36,7 @@ struct vkb_image_row {
     uint32_t width, height;
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
-    bool input;         // filled by the host, not by a pass
+    enum vkb_input_kind input;
 };
 
 // What a pass draws; depth test and culling are derived from it. A dispatch draws nothing: its
@@ -45,7 +55,11 @@ static inline bool vkb_is_mesh(enum vkb_geometry geometry)
 }
 
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
-enum vkb_blend { VKB_BLEND_NONE, VKB_BLEND_ADD };
+enum vkb_blend {
+    VKB_BLEND_NONE,
+    VKB_BLEND_ADD,  // the colours; the target keeps its alpha
+    VKB_BLEND_ADD_RGBA,
+};
 
 // Bindings: 0 is the parameter block, then the images read, in order, then the target of a
 // dispatch. A skybox reads the scene's cubemap at binding 1; textured triangles read the textures

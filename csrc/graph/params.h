@@ -107,6 +107,7 @@ extern const struct vkb_constant_row vkb_constant_rows[VKB_CONSTANT_COUNT];
 enum vkb_composite { COMPOSITE_NAMES(VKB_NAME_ENUM) };
 enum vkb_tonemap { TONEMAP_NAMES(VKB_NAME_ENUM) };
 enum vkb_encoding { ENCODING_NAMES(VKB_NAME_ENUM) };
+enum vkb_alpha { ALPHA_NAMES(VKB_NAME_ENUM) };
 enum vkb_texel { TEXEL_NAMES(VKB_NAME_ENUM) };
 enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
 #undef VKB_NAME_ENUM

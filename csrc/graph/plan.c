@@ -73,7 +73,7 @@ static bool is_current(const struct vkb_planner *planner, const struct vkb_plan_
                        uint32_t image, uint32_t end)
 {
     const struct vkb_graph *graph = &step->plan->graph;
-    bool current = graph->images[image].input;
+    bool current = graph->images[image].input != VKB_INPUT_NONE;
 
     for (uint32_t i = 0; i < end; ++i)
         current = current || (planner->current[i] && vkb_pass_writes(&graph->passes[i], image));

@@ -83,6 +83,7 @@ static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
 {
     struct vkb_bloom_source source = {
         .glow = brightness,
+        .mask = VKB_NO_IMAGE,
         .buffers = vkb_bloom_size(settings, size),
         .final = size,
         .format = settings->format ? settings->format : HDR,
@@ -94,7 +95,7 @@ static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
     if (!as_it_is
         && (!vkb_add_target(graph, "extracted", extracted, source.buffers, false, &source.glow,
                             error)
-            || !vkb_add_threshold(settings, brightness, source.glow, graph, error)))
+            || !vkb_add_threshold(settings, brightness, VKB_NO_IMAGE, source.glow, graph, error)))
         return false;
     return vkb_add_bloom(settings, &source, graph, bloom, error);
 }
@@ -118,7 +119,8 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
 {
     struct vkb_mesh_params params = vkb_scene_params(source);
     struct gbuffer gbuffer;
-    uint32_t glow = VKB_NO_IMAGE, bloom = VKB_NO_IMAGE, scene;
+    struct vkb_composite_source composite = {.bloom = VKB_NO_IMAGE, .mask = VKB_NO_IMAGE};
+    uint32_t glow = VKB_NO_IMAGE;
 
     if (settings->values.bloom && source->has_glow) {
         struct vkb_mesh_params lamp = params;
@@ -129,7 +131,8 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
     }
     return add_gbuffer(source, &params, glow, &gbuffer, graph, error)
         && (!settings->values.bloom
-            || add_bloom(settings, source->size, gbuffer.colours[BRIGHTNESS], graph, &bloom, error))
-        && add_lighting(&gbuffer, source->size, graph, &scene, error)
-        && vkb_add_composite(settings, scene, bloom, VKB_FORMAT_RGBA8_UNORM, graph, error);
+            || add_bloom(settings, source->size, gbuffer.colours[BRIGHTNESS], graph,
+                         &composite.bloom, error))
+        && add_lighting(&gbuffer, source->size, graph, &composite.scene, error)
+        && vkb_add_composite(settings, &composite, VKB_FORMAT_RGBA8_UNORM, graph, error);
 }

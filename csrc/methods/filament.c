@@ -28,14 +28,17 @@ static void choose_sizes(struct vkb_levels *levels)
         levels->sizes[levels->count++] = size;
 }
 
-// A 3 x 3 binomial of `from` at the target's pixels; the first one of a frame has the threshold.
+// A 3 x 3 binomial of `from` at the target's pixels; the first one of a frame has the threshold and
+// the mask.
 static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32_t to,
                           struct vkb_error *error)
 {
     struct vkb_pass_row row =
         vkb_prefilter_row(levels, VKB_SHADER_filament_prefilter_frag, from, to);
 
-    if (from != levels->source->glow)
+    if (from == levels->source->glow)
+        vkb_mask_prefilter(levels, &row);
+    else
         row.constants.thresholded = 0;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }

@@ -39,10 +39,11 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
                        struct vkb_graph *graph, struct vkb_error *error)
 {
     const struct vkb_mesh_params params = vkb_scene_params(source);
-    uint32_t scene, bloom = VKB_NO_IMAGE;
+    struct vkb_composite_source composite = {.bloom = VKB_NO_IMAGE, .mask = VKB_NO_IMAGE};
 
     if (settings->values.bloom) {
         struct vkb_bloom_source glow = {
+            .mask = VKB_NO_IMAGE,
             .buffers = buffer_size(settings, source->size),
             .final = source->size,
             .format = settings->format ? settings->format : VKB_FORMAT_RGBA8_UNORM,
@@ -53,9 +54,10 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
         if (!vkb_add_glow(settings, source, &lamp, vkb_end_format(settings, glow.format),
                           glow.buffers, true, vkb_threshold_mode(settings), graph, &glow.glow,
                           error)
-            || !vkb_add_bloom(settings, &glow, graph, &bloom, error))
+            || !vkb_add_bloom(settings, &glow, graph, &composite.bloom, error))
             return false;
     }
-    return add_scene(source, &params, graph, &scene, error)
-        && vkb_add_composite(settings, scene, bloom, graph->images[scene].format, graph, error);
+    return add_scene(source, &params, graph, &composite.scene, error)
+        && vkb_add_composite(settings, &composite, graph->images[composite.scene].format, graph,
+                             error);
 }

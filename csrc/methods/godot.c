@@ -15,6 +15,8 @@ static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, b
 
     row.constants.direction = direction;
     row.constants.first = first;
+    if (first && direction == DIRECTION_VERTICAL)
+        vkb_mask_prefilter(levels, &row);
     row.params.prefilter.exposure = first ? levels->settings->values.exposure : 0.0f;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }

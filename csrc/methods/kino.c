@@ -32,6 +32,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     struct vkb_pass_row prefilter =
         vkb_prefilter_row(&levels, VKB_SHADER_kino_prefilter_frag, source->glow, from);
     prefilter.constants.anti_flicker = settings->values.anti_flicker;
+    vkb_mask_prefilter(&levels, &prefilter);
     if (!vkb_graph_add_pass(graph, &prefilter, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {

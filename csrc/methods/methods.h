@@ -6,11 +6,13 @@
 #include "passes/scene.h"
 #include "passes/threshold.h"
 
-// An image from the host.
+// An image from the host, with an emission of its size and format and a mask of its size, or
+// without.
 struct vkb_image_source {
     enum vkb_format format;
     struct vkb_size size;
     uint32_t channels;  // 3 or 4
+    bool has_emission, has_mask;
 };
 
 // Whether the sizes that all others of a graph follow from are within 1 and max_side: asked before

@@ -31,7 +31,10 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
         struct vkb_pass_row row =
             level ? vkb_down_row(&levels, false, from, levels.downs[level])
                   : vkb_pyramid_row(&levels, VKB_SHADER_pygfx_down_frag, from, levels.downs[0]);
-        row.constants.karis_average = level == 0 && settings->values.karis_average;
+        if (level == 0) {
+            row.constants.karis_average = settings->values.karis_average;
+            vkb_mask_prefilter(&levels, &row);
+        }
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

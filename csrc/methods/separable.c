@@ -89,7 +89,7 @@ static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
     row.constants.threshold_mode = THRESHOLD_NONE;
     row.constants.sampling = SAMPLING_TEXEL;
     row.reads[0] = from;
-    row.read_count = 1;
+    vkb_apply_mask(&row, VKB_NO_IMAGE);
     row.block = VKB_BLOCK_threshold;
     row.params.threshold.target_width = sampling.width;
     row.params.threshold.target_height = sampling.height;
@@ -122,7 +122,9 @@ bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_blo
         // their complete range; what overflows there, the composite clamps.)
         if (format == VKB_FORMAT_RGBA32_FLOAT)
             row.params.blur.limit /= (float)settings->layer_count;
-        row.blend = layer ? VKB_BLEND_ADD : VKB_BLEND_NONE;
+        row.blend = layer == 0          ? VKB_BLEND_NONE
+                  : source->blurs_alpha ? VKB_BLEND_ADD_RGBA
+                                        : VKB_BLEND_ADD;
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

@@ -19,7 +19,8 @@ bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings
 static bool image_fits(const struct vkb_image_source *planned, const struct vkb_image_source *given)
 {
     return planned->format == given->format && planned->channels == given->channels
-        && planned->size.width == given->size.width && planned->size.height == given->size.height;
+        && planned->size.width == given->size.width && planned->size.height == given->size.height
+        && planned->has_emission == given->has_emission && planned->has_mask == given->has_mask;
 }
 
 static bool scene_fits(const struct vkb_scene_source *planned, const struct vkb_scene_source *given)

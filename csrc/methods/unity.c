@@ -45,6 +45,7 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_urp_prefilter_frag, source->glow, levels.downs[0]);
+    vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 1; level < count; ++level)
@@ -107,6 +108,7 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_hdrp_prefilter_frag, source->glow, from);
+    vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 0; level < count; from = levels.downs[level++])

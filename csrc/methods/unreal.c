@@ -57,6 +57,7 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, VKB_SHADER_unreal_prefilter_frag, source->glow, from);
     row.constants.node = settings->values.node;
+    vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])

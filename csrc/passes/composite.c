@@ -16,33 +16,49 @@ static struct vkb_pass_row godots(const struct vkb_settings *settings,
     return row;
 }
 
-bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
-                       enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error)
+// The formula of the composite. What a bloom from another image adds was not in the scene before.
+static int composite_of(const struct vkb_settings *settings,
+                        const struct vkb_composite_source *source)
 {
+    const int composite = settings->choices[VKB_CHOICE_composite];
+
+    return source->bloom == VKB_NO_IMAGE               ? COMPOSITE_OFF
+         : composite == COMPOSITE_MIX && source->apart ? COMPOSITE_ADD
+                                                       : composite;
+}
+
+bool vkb_add_composite(const struct vkb_settings *settings,
+                       const struct vkb_composite_source *source, enum vkb_format format,
+                       struct vkb_graph *graph, struct vkb_error *error)
+{
+    const struct vkb_image_row *scene = &graph->images[source->scene];
     uint32_t final;
     struct vkb_image_row image = {
         .name = "final",
         .format = format,
-        .width = graph->images[scene].width,
-        .height = graph->images[scene].height,
-        .channels = graph->images[scene].channels,
+        .width = scene->width,
+        .height = scene->height,
+        .channels = scene->channels,
         .framebuffer = true,
     };
 
     if (!vkb_graph_add_image(graph, &image, &final, error))
         return false;
     struct vkb_pass_row row = vkb_fullscreen_row("final", VKB_SHADER_composite_frag, final);
-    const bool off = bloom == VKB_NO_IMAGE;
+    const bool off = source->bloom == VKB_NO_IMAGE;
     // Floats have no levels to round to.
     const bool dither = settings->values.dither && format == VKB_FORMAT_RGBA8_UNORM;
-    row.constants.composite = off ? COMPOSITE_OFF : settings->choices[VKB_CHOICE_composite];
+    row.constants.composite = composite_of(settings, source);
     row.constants.tonemap = settings->choices[VKB_CHOICE_tonemap];
     row.constants.encoding = settings->choices[VKB_CHOICE_encoding];
     row.constants.dither = dither;
-    row.reads[0] = scene;
+    row.constants.alpha = off ? ALPHA_KEEP : source->alpha;
+    row.constants.masked = row.constants.composite == COMPOSITE_MIX && source->mask != VKB_NO_IMAGE;
+    row.reads[0] = source->scene;
     // Every binding of the shader must be filled, also one that this variant does not read.
-    row.reads[1] = off ? scene : bloom;
-    row.read_count = 2;
+    row.reads[1] = off ? source->scene : source->bloom;
+    row.reads[2] = row.constants.masked ? source->mask : source->scene;
+    row.read_count = 3;
     row.block = VKB_BLOCK_composite;
     vkb_params_read(row.block, &settings->values, &row.params);
     row.params.composite.limit = vkb_formats[image.format].limit;

@@ -4,10 +4,18 @@
 
 #include "passes/pass.h"
 
-// The last pass: `scene` and `bloom` (VKB_NO_IMAGE: none) to the framebuffer "final", of that
-// format and with the scene's channels.
-bool vkb_add_composite(const struct vkb_settings *settings, uint32_t scene, uint32_t bloom,
-                       enum vkb_format format, struct vkb_graph *graph, struct vkb_error *error);
+// What the last pass reads: the scene, the bloom (VKB_NO_IMAGE: none), and what of the scene the
+// bloom came of: all of it, what the mask (VKB_NO_IMAGE: none) leaves, or nothing.
+struct vkb_composite_source {
+    uint32_t scene, bloom, mask;
+    bool apart;  // the bloom came of another image
+    enum vkb_alpha alpha;
+};
+
+// The last pass: to the framebuffer "final", of that format and with the scene's channels.
+bool vkb_add_composite(const struct vkb_settings *settings,
+                       const struct vkb_composite_source *source, enum vkb_format format,
+                       struct vkb_graph *graph, struct vkb_error *error);
 
 // Whether a row is of that pass and adds a bloom.
 bool vkb_is_composite(const struct vkb_pass_row *pass);

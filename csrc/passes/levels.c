@@ -144,7 +144,13 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_
     row.params.prefilter.target_width = sampling.width;
     row.params.prefilter.target_height = sampling.height;
     row.params.prefilter.limit = sampling.limit;
+    vkb_apply_mask(&row, VKB_NO_IMAGE);
     return row;
+}
+
+void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row)
+{
+    vkb_apply_mask(row, levels->source->mask);
 }
 
 static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *kernel,

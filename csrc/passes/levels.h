@@ -52,6 +52,9 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_sh
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                       uint32_t from, uint32_t to);
 
+// Has a prefilter multiply what it writes by the mask of the source, if there is one.
+void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row);
+
 // The 13 taps of a pyramid's way down, fireflies filtered or not.
 struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
                                  uint32_t from, uint32_t to);

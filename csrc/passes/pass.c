@@ -19,6 +19,14 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragmen
     return row;
 }
 
+void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask)
+{
+    row->constants.masked = mask != VKB_NO_IMAGE;
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row->reads[1] = row->constants.masked ? mask : row->reads[0];
+    row->read_count = 2;
+}
+
 struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target)
 {
     const struct vkb_image_row *row = &graph->images[target];

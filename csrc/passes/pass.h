@@ -13,6 +13,8 @@ struct vkb_size {
 // an image "bloom" of the final size.
 struct vkb_bloom_source {
     uint32_t glow;
+    uint32_t mask;     // of what the threshold lets through; VKB_NO_IMAGE: none
+    bool blurs_alpha;  // alpha is a fourth channel of the bloom
     struct vkb_size buffers, final;
     enum vkb_format format;
 };
@@ -37,5 +39,8 @@ bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
 // A row with the defaults of a fullscreen pass; the caller fills in the rest.
 struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target);
+
+// Gives a pass that reads one image the mask to read after it; VKB_NO_IMAGE: none.
+void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask);
 
 #endif

@@ -19,8 +19,8 @@ static float between_levels(float threshold)
     return (float)((floor(threshold * steps + 0.1) + 0.5) / steps);
 }
 
-bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
-                       struct vkb_graph *graph, struct vkb_error *error)
+bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
+                       uint32_t glow, struct vkb_graph *graph, struct vkb_error *error)
 {
     struct vkb_pass_row row =
         vkb_fullscreen_row(graph->images[glow].name, VKB_SHADER_threshold_frag, glow);
@@ -31,7 +31,7 @@ bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint
     // Never the sampler's filter: it would spread NaN, and a threshold magnifies what it rounds.
     row.constants.sampling = vkb_same_size(graph, image, glow) ? SAMPLING_TEXEL : SAMPLING_FETCH;
     row.reads[0] = image;
-    row.read_count = 1;
+    vkb_apply_mask(&row, vkb_is_published(settings) ? VKB_NO_IMAGE : mask);
     row.block = VKB_BLOCK_threshold;
     // Where there is no threshold its settings stay 0: the pass does not depend on them.
     if (mode != THRESHOLD_NONE)
@@ -46,5 +46,6 @@ bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint
 
 bool vkb_is_threshold(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_threshold_frag && pass->constants.sampling == SAMPLING_TEXEL;
+    return pass->shader == VKB_SHADER_threshold_frag && pass->constants.sampling == SAMPLING_TEXEL
+        && !pass->constants.masked && !pass->constants.alpha;
 }

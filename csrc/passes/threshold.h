@@ -6,11 +6,13 @@
 
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
 
-// A pass that reduces `image` to the size of `glow` and keeps what the threshold lets through.
-bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t glow,
-                       struct vkb_graph *graph, struct vkb_error *error);
+// A pass that reduces `image` to the size of `glow` and keeps what the threshold lets through,
+// times the mask (VKB_NO_IMAGE: none). A published method has its threshold and the mask later.
+bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
+                       uint32_t glow, struct vkb_graph *graph, struct vkb_error *error);
 
-// Whether a row is of that pass, and needs the image's texels at each pixel's own place alone.
+// Whether a row is of that pass, and needs the colours of the image's texels at each pixel's own
+// place alone.
 bool vkb_is_threshold(const struct vkb_pass_row *pass);
 
 // Gives the row of a fused pass, whose block is B, all that the threshold pass has. A block without

@@ -198,8 +198,7 @@ static bool read_format(const struct reader *reader, enum vkb_format *format)
         if (text)
             *format = vkb_format_by_name(PyBytes_AsString(text));
         Py_XDECREF(text);
-        if (!PyErr_Occurred()
-            && (*format == VKB_FORMAT_NONE || *format == VKB_FORMAT_DEPTH32_FLOAT))
+        if (!PyErr_Occurred() && (*format == VKB_FORMAT_NONE || vkb_formats[*format].channels == 1))
             PyErr_Format(PyExc_ValueError, "format: %R is no format of bloom buffers", value);
     }
     Py_DECREF(value);
@@ -401,21 +400,30 @@ enum vkb_format vkb_pixel_format(char code)
                        : VKB_FORMAT_RGBA32_FLOAT;
 }
 
-bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
+static bool hold_image(PyObject *array, struct vkb_held_image *image)
 {
-    Py_buffer *view = &image->view;
+    image->held = PyObject_GetBuffer(array, &image->view, PyBUF_STRIDES | PyBUF_FORMAT) == 0;
+    return image->held;
+}
 
-    if (PyObject_GetBuffer(array, view, PyBUF_STRIDES | PyBUF_FORMAT) < 0)
+static bool has_sides(const Py_buffer *view)
+{
+    return view->shape[0] >= 1 && view->shape[1] >= 1 && view->shape[0] <= INT32_MAX
+        && view->shape[1] <= INT32_MAX;
+}
+
+bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
+{
+    const Py_buffer *view = &image->view;
+
+    if (!hold_image(array, image))
         return false;
-    image->held = true;
     if (!vkb_has_element(view, "Bef")) {
-        PyErr_SetString(PyExc_TypeError, "image: an array of uint8, float16 or float32 is needed");
+        PyErr_Format(PyExc_TypeError, "%s: an array of uint8, float16 or float32 is needed", name);
         return false;
     }
-    if (view->ndim != 3 || view->shape[0] < 1 || view->shape[1] < 1
-        || (view->shape[2] != 3 && view->shape[2] != 4) || view->shape[0] > INT32_MAX
-        || view->shape[1] > INT32_MAX) {
-        PyErr_SetString(PyExc_ValueError, "image: a shape of (H, W, 3) or (H, W, 4) is needed");
+    if (view->ndim != 3 || !has_sides(view) || (view->shape[2] != 3 && view->shape[2] != 4)) {
+        PyErr_Format(PyExc_ValueError, "%s: a shape of (H, W, 3) or (H, W, 4) is needed", name);
         return false;
     }
     image->input = (struct vkb_input){
@@ -427,6 +435,33 @@ bool vkb_read_image(PyObject *array, struct vkb_held_image *image)
         .width = (uint32_t)view->shape[1],
         .height = (uint32_t)view->shape[0],
         .channels = (uint32_t)view->shape[2],
+    };
+    return true;
+}
+
+bool vkb_read_mask(PyObject *array, struct vkb_held_image *image)
+{
+    const Py_buffer *view = &image->view;
+
+    if (!hold_image(array, image))
+        return false;
+    if (!vkb_has_element(view, "f")) {
+        PyErr_SetString(PyExc_TypeError, "mask: an array of float32 is needed");
+        return false;
+    }
+    if (view->ndim != 2 || !has_sides(view)) {
+        PyErr_SetString(PyExc_ValueError, "mask: a shape of (H, W) is needed");
+        return false;
+    }
+    image->input = (struct vkb_input){
+        .memory = view->buf,
+        .row_stride = view->strides[0],
+        .pixel_stride = view->strides[1],
+        .channel_stride = sizeof(float),
+        .format = VKB_FORMAT_R32_FLOAT,
+        .width = (uint32_t)view->shape[1],
+        .height = (uint32_t)view->shape[0],
+        .channels = 1,
     };
     return true;
 }

@@ -93,7 +93,8 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
 static PyMethodDef functions[] = {
     {"adapters", adapters, METH_VARARGS,
      "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
-    {"image_source", vkb_image_source, METH_O, "image_source(array) -> Source"},
+    {"image_source", vkb_image_source, METH_VARARGS,
+     "image_source(image, emission=None, mask=None) -> Source"},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
     {"plan", vkb_any_plan, METH_VARARGS,

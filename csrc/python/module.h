@@ -136,15 +136,18 @@ struct vkb_held_image {
     bool held;
 };
 
-// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides.
-bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
+// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides; `name` is the
+// argument's.
+bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image);
+// An array (H, W) of float32, any strides.
+bool vkb_read_mask(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
 
 struct vkb_source_object {
     PyObject_HEAD
     struct vkb_source source;
     struct vkb_held_scene scene;
-    struct vkb_held_image image;
+    struct vkb_held_image images[VKB_INPUT_COUNT];  // by kind
 };
 
 struct vkb_plan_object {
@@ -159,7 +162,7 @@ struct vkb_plan_object {
 size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 
 // Functions of the module.
-PyObject *vkb_image_source(PyObject *module, PyObject *array);
+PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
 PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);

@@ -20,6 +20,7 @@ static const struct vkb_device any_device = {
             [VKB_FORMAT_RGBA8_UNORM] = ALL_FEATURES,
             [VKB_FORMAT_RGBA16_FLOAT] = ALL_FEATURES,
             [VKB_FORMAT_RGBA32_FLOAT] = ALL_FEATURES,
+            [VKB_FORMAT_R32_FLOAT] = ALL_FEATURES,
             [VKB_FORMAT_DEPTH32_FLOAT] = ALL_FEATURES,
         },
     .dispatch = true,

@@ -178,18 +178,24 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
 static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object *source,
                    struct vkb_pending *pending, struct vkb_error *error)
 {
-    const struct vkb_frame_source data = {
+    struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
-        .input = source->source.kind == VKB_SOURCE_IMAGE ? &source->image.input : NULL,
     };
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (source->images[kind].held)
+            data.inputs[kind] = &source->images[kind].input;
 
     if (!vkb_renderer_enter(renderer, error))
         return false;
     bool done = vkb_require_open(renderer, error)
              && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
                                  pending->count, &pending->submission, error);
-    if (done && data.input)
-        pending->specials = renderer->frame.upload.specials;
+    for (int kind = 0; done && kind < VKB_INPUT_COUNT; ++kind)
+        if (data.inputs[kind]) {
+            pending->specials.nan += renderer->frame.uploads[kind].specials.nan;
+            pending->specials.inf += renderer->frame.uploads[kind].specials.inf;
+        }
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;

@@ -11,23 +11,51 @@ static struct vkb_source_object *new_source(PyObject *module)
     return (struct vkb_source_object *)allocate(type, 0);
 }
 
-PyObject *vkb_image_source(PyObject *module, PyObject *array)
+// Whether what accompanies the image fits it; one that is not there does.
+static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind kind)
 {
-    struct vkb_source_object *self = new_source(module);
+    const struct vkb_input *image = &self->images[VKB_INPUT_IMAGE].input;
+    const struct vkb_input *other = &self->images[kind].input;
 
+    if (!self->images[kind].held
+        || (other->width == image->width && other->height == image->height
+            && (kind == VKB_INPUT_MASK
+                || (other->format == image->format && other->channels == image->channels))))
+        return true;
+    if (kind == VKB_INPUT_MASK)
+        PyErr_SetString(PyExc_ValueError, "mask: it does not have the image's size");
+    else
+        PyErr_SetString(PyExc_ValueError, "emission: it does not have the image's shape and dtype");
+    return false;
+}
+
+PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
+{
+    PyObject *image, *emission = Py_None, *mask = Py_None;
+
+    if (!PyArg_ParseTuple(arguments, "O|OO:image_source", &image, &emission, &mask))
+        return NULL;
+    struct vkb_source_object *self = new_source(module);
     if (!self)
         return NULL;
-    if (!vkb_read_image(array, &self->image)) {
+    if (!vkb_read_image(image, "image", &self->images[VKB_INPUT_IMAGE])
+        || (emission != Py_None
+            && !vkb_read_image(emission, "emission", &self->images[VKB_INPUT_EMISSION]))
+        || (mask != Py_None && !vkb_read_mask(mask, &self->images[VKB_INPUT_MASK]))
+        || !fits_image(self, VKB_INPUT_EMISSION) || !fits_image(self, VKB_INPUT_MASK)) {
         Py_DECREF(self);
         return NULL;
     }
+    const struct vkb_input *input = &self->images[VKB_INPUT_IMAGE].input;
     self->source = (struct vkb_source){
         .kind = VKB_SOURCE_IMAGE,
         .image =
             {
-                .format = self->image.input.format,
-                .size = {self->image.input.width, self->image.input.height},
-                .channels = self->image.input.channels,
+                .format = input->format,
+                .size = {input->width, input->height},
+                .channels = input->channels,
+                .has_emission = emission != Py_None,
+                .has_mask = mask != Py_None,
             },
     };
     return (PyObject *)self;
@@ -78,8 +106,9 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     struct vkb_source_object *self = (struct vkb_source_object *)object;
 
     Py_VISIT(Py_TYPE(object));
-    if (self->image.held)
-        Py_VISIT(self->image.view.obj);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (self->images[kind].held)
+            Py_VISIT(self->images[kind].view.obj);
     for (size_t i = 0; i < self->scene.view_count; ++i)
         Py_VISIT(self->scene.views[i].obj);
     return 0;
@@ -92,7 +121,8 @@ static int clear(PyObject *object)
 
     self->source = (struct vkb_source){0};
     vkb_release_scene(&self->scene);
-    vkb_release_image(&self->image);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        vkb_release_image(&self->images[kind]);
     return 0;
 }
 

@@ -15,7 +15,8 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
     vkb_submissions_destroy(device, &frame->submissions);
     vkb_image_cache_destroy(device, &frame->cache);
-    vkb_upload_destroy(device, &frame->upload);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        vkb_upload_destroy(device, &frame->uploads[kind]);
     vkb_scene_destroy(device, &frame->scene);
     vkb_pipelines_destroy(device, &frame->pipelines);
     vkb_planner_destroy(&frame->planner);
@@ -121,40 +122,63 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
-// Stages the image and finds out whether the device has it already.
-static bool stage_input(struct vkb_run *run, const struct vkb_input *input, struct vkb_error *error)
+// Stages an image and finds out whether the device has it already.
+static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
+                        const struct vkb_input *input, struct vkb_error *error)
 {
+    struct vkb_cached_image *image = run->inputs[kind];
+    struct vkb_upload *upload = &run->frame->uploads[kind];
     bool changed;
 
-    for (uint32_t i = 0; i < run->graph->image_count; ++i)
-        if (run->graph->images[i].input) {
-            if (!resolve(run, i, error))
-                return false;
-            run->input = run->images[i];
-        }
     // An image that its last writing did not reach holds nothing to compare with.
-    if (run->input->image.mapped && !run->input->content.valid)
-        vkb_upload_forget(&run->frame->upload);
-    if (!vkb_upload_stage(run->device, &run->frame->upload, &run->frame->submissions, input,
-                          &run->input->image, &changed, error))
+    if (image->image.mapped && !image->content.valid)
+        vkb_upload_forget(upload);
+    if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, input, &image->image,
+                          &changed, error))
         return false;
-    run->send_input = changed || !run->input->content.valid;
-    return !run->send_input
-        || vkb_content_begin_writing(&run->input->content, &run->frame->cache.clock, NULL, 0,
-                                     error);
+    run->send_input[kind] = changed || !image->content.valid;
+    return !run->send_input[kind]
+        || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
 }
 
-static void record_input(struct vkb_run *run)
+static bool stage_inputs(struct vkb_run *run, const struct vkb_frame_source *source,
+                         struct vkb_error *error)
 {
-    if (!run->input->image.mapped)
-        vkb_upload_record(run->device, run->submission->commands.buffer, &run->frame->upload,
-                          &run->input->image);
-    run->input->content.valid = true;
+    for (uint32_t i = 0; i < run->graph->image_count; ++i) {
+        const enum vkb_input_kind kind = run->graph->images[i].input;
+        if (kind == VKB_INPUT_NONE)
+            continue;
+        if (!resolve(run, i, error))
+            return false;
+        run->inputs[kind] = run->images[i];
+        if (!stage_input(run, kind, source->inputs[kind], error))
+            return false;
+    }
+    return true;
 }
 
+static void record_inputs(struct vkb_run *run)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        struct vkb_cached_image *image = run->inputs[kind];
+        if (!run->send_input[kind])
+            continue;
+        if (!image->image.mapped)
+            vkb_upload_record(run->device, run->submission->commands.buffer,
+                              &run->frame->uploads[kind], &image->image);
+        image->content.valid = true;
+    }
+}
+
+// That of the scene, or of the input that was written last.
 static uint64_t source_version(const struct vkb_run *run)
 {
-    return run->input ? run->input->content.version : run->frame->scene.serial;
+    uint64_t version = 0;
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind] && run->inputs[kind]->content.version > version)
+            version = run->inputs[kind]->content.version;
+    return version ? version : run->frame->scene.serial;
 }
 
 // `next` is the request after it, NULL after the last.
@@ -201,8 +225,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
-    if (run->send_input)
-        record_input(run);
+    record_inputs(run);
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
                             error))
@@ -217,8 +240,7 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
 {
     run->graph = &requests[0].plan->graph;
     return (!source->scene || load_scene(run, source->scene, error))
-        && (!source->input || stage_input(run, source->input, error))
-        && reserve(run, requests, request_count, error)
+        && stage_inputs(run, source, error) && reserve(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }
 

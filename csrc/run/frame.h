@@ -16,7 +16,7 @@ struct vkb_frame {
     struct vkb_submissions submissions;
     struct vkb_pipelines pipelines;
     struct vkb_scene scene;
-    struct vkb_upload upload;
+    struct vkb_upload uploads[VKB_INPUT_COUNT];  // by kind
     struct vkb_image_cache cache;
     struct vkb_planner planner;
     uint64_t submitted;  // submissions so far
@@ -26,7 +26,7 @@ struct vkb_frame {
 // What graphs start from; what they do not use is NULL.
 struct vkb_frame_source {
     const struct vkb_scene_data *scene;
-    const struct vkb_input *input;
+    const struct vkb_input *inputs[VKB_INPUT_COUNT];  // by kind
 };
 
 struct vkb_timing {

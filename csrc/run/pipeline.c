@@ -366,6 +366,17 @@ static const VkPipelineColorBlendAttachmentState blend_states[] = {
             .alphaBlendOp = VK_BLEND_OP_ADD,
             .colorWriteMask = 0xf,
         },
+    [VKB_BLEND_ADD_RGBA] =
+        {
+            .blendEnable = VK_TRUE,
+            .srcColorBlendFactor = VK_BLEND_FACTOR_ONE,
+            .dstColorBlendFactor = VK_BLEND_FACTOR_ONE,
+            .colorBlendOp = VK_BLEND_OP_ADD,
+            .srcAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
+            .dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
+            .alphaBlendOp = VK_BLEND_OP_ADD,
+            .colorWriteMask = 0xf,
+        },
 };
 
 static bool create_compute(const struct vkb_device *device, struct vkb_pipelines *pipelines,

@@ -10,11 +10,11 @@ struct vkb_run {
     struct vkb_frame *frame;
     struct vkb_submission *submission;
     struct vkb_request *request;
-    const struct vkb_graph *graph;     // the request's
-    struct vkb_cached_image **images;  // by the graph's image index
-    struct vkb_content **contents;     // of the cache
-    struct vkb_cached_image *input;    // NULL: none
-    bool send_input;                   // the device does not have it yet
+    const struct vkb_graph *graph;                     // the request's
+    struct vkb_cached_image **images;                  // by the graph's image index
+    struct vkb_content **contents;                     // of the cache
+    struct vkb_cached_image *inputs[VKB_INPUT_COUNT];  // by kind; NULL: none
+    bool send_input[VKB_INPUT_COUNT];                  // the device does not have it yet
 };
 
 // What a planner calls for each group of passes that has to run; `run` is a struct vkb_run.

@@ -40,12 +40,20 @@ static inline void pack_rgb(unsigned char *to, const unsigned char *from, uint32
 static inline void pack_strided(unsigned char *to, const unsigned char *from,
                                 const struct vkb_input *input, const void *one, size_t size)
 {
-    for (uint32_t x = 0; x < input->width; ++x, to += 4 * size, from += input->pixel_stride) {
+    const size_t pixel_size = vkb_pixel_size(input->format);
+
+    for (uint32_t x = 0; x < input->width; ++x, to += pixel_size, from += input->pixel_stride) {
         for (uint32_t channel = 0; channel < input->channels; ++channel)
             memcpy(to + channel * size, from + channel * input->channel_stride, size);
         if (input->channels == 3)
             memcpy(to + 3 * size, one, size);
     }
+}
+
+// Whether the input has all channels of its format, which RGB has not.
+static bool is_complete(const struct vkb_input *input)
+{
+    return input->channels == vkb_formats[input->format].channels;
 }
 
 static bool is_contiguous(const struct vkb_input *input)
@@ -66,7 +74,7 @@ static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t 
     const void *one = channel_one(input->format);
     const bool contiguous = is_contiguous(input);
 
-    if (contiguous && input->channels == 4) {
+    if (contiguous && is_complete(input)) {
         memcpy(to, from, (size_t)input->width * vkb_pixel_size(input->format));
         return;
     }
@@ -95,7 +103,7 @@ static bool row_differs(const struct vkb_upload *upload, const struct vkb_input 
 {
     const size_t size = (size_t)input->width * vkb_pixel_size(input->format);
 
-    if (input->channels == 4 && is_contiguous(input))
+    if (is_complete(input) && is_contiguous(input))
         return memcmp(kept_row(upload, y), input_row(input, y), size) != 0;
     pack_row(upload->packed, input, y);
     return memcmp(kept_row(upload, y), upload->packed, size) != 0;
@@ -128,7 +136,7 @@ static struct vkb_specials count_singles(const uint32_t *bits, size_t count)
 
 static struct vkb_specials count_row(const struct vkb_upload *upload, uint32_t y)
 {
-    const size_t count = (size_t)upload->width * 4;
+    const size_t count = (size_t)upload->width * vkb_formats[upload->format].channels;
     const void *row = kept_row(upload, y);
     struct vkb_specials sum = {0};
 

@@ -36,8 +36,8 @@ void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *uplo
 // What it holds is not compared with the next image.
 void vkb_upload_forget(struct vkb_upload *upload);
 
-// Packs the image to RGBA, alpha 1 where it has none; *changed: it is another one than the last.
-// The submissions may still read the last one: they are waited for before it is written over.
+// Packs the image to its format, alpha 1 where it has none; *changed: it is another one than the
+// last. The submissions may still read the last one: they are waited for before it is written over.
 // `image` is where the device will read it; if that is mapped, it has it now, else
 // vkb_upload_record brings it there.
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,

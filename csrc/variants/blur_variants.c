@@ -20,7 +20,7 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, blur, sizeof row);
-    row.constants = (struct vkb_constants){0};
+    row.constants = (struct vkb_constants){.alpha = blur->constants.alpha};
     memset(&row.params, 0, sizeof row.params);
     vkb_make_dispatch(&row, line_shaders[graph->images[blur->reads[0]].format],
                       vertical ? ROW_INVOCATIONS : ROW_INVOCATIONS * LINE_OUTPUTS,
@@ -88,6 +88,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, VKB_SHADER_enlarge_frag, pass->targets[0]);
     row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
+    row.constants.alpha = pass->constants.alpha;
     row.reads[0] = lines;
     row.read_count = 1;
     row.block = VKB_BLOCK_threshold;
@@ -142,8 +143,7 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
 
     memcpy(&row, chain->composite, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    row.read_count = 1;
-    row.reads[1] = 0;
+    vkb_drop_reads(&row, 1);
     row.fused = true;
     row.block = VKB_BLOCK_fused_bloom;
     VKB_TAKE_COMPOSITE(&row, fused_bloom, chain->composite);

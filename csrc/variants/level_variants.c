@@ -15,7 +15,7 @@ static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uin
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
     row->loads = true;
-    row->constants = (struct vkb_constants){0};
+    row->constants = (struct vkb_constants){.alpha = row->constants.alpha};
 }
 
 // If the threshold pass writes the larger level: adds a fused pass that starts from the image
@@ -82,7 +82,7 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
 
     if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
-    *fits = up && vkb_doubles(up) && !up->constants.add_own
+    *fits = up && vkb_doubles(up) && !up->constants.add_own && !pass->constants.masked
          && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format;
     if (!*fits)
         return true;
@@ -94,6 +94,7 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
+    vkb_drop_reads(&row, 2);
     row.block = VKB_BLOCK_double_final;
     params->coarse = up->params.pyramid.coarse;
     VKB_TAKE_COMPOSITE(&row, double_final, pass);

@@ -44,6 +44,9 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
 // The threshold pass that writes `image` from an image of the same size and format; NULL: none.
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
 
+// The pass reads no more than so many of its images.
+void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
+
 // Makes a dispatch of a pass over all pixels.
 void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
                        uint32_t block_height);

@@ -52,6 +52,12 @@ bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
     return writers == 1;
 }
 
+void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count)
+{
+    while (row->read_count > read_count)
+        row->reads[--row->read_count] = 0;
+}
+
 void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
                        uint32_t block_height)
 {
@@ -88,17 +94,19 @@ static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT
 // A composite whose images have one size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN
+    return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN && !pass->constants.masked
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
         && graph->images[pass->reads[0]].format == graph->images[pass->reads[1]].format;
 }
 
-// A pass that needs the texels at each pixel's own place alone, by a shader that loads them.
-static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader)
+// A pass that needs the texels at each pixel's own place alone, by a shader that loads them, of the
+// first images that it reads.
+static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t read_count)
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * TEXEL_COLUMNS, TEXEL_ROWS);
     row->loads = true;
+    vkb_drop_reads(row, read_count);
 }
 
 bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
@@ -112,9 +120,9 @@ bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
         vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
                           PIXEL_INVOCATIONS);
     else if (blends(graph, pass))
-        load_texels(&row, blend_shaders[format]);
+        load_texels(&row, blend_shaders[format], 2);
     else if (vkb_is_threshold(pass))
-        load_texels(&row, threshold_shaders[format]);
+        load_texels(&row, threshold_shaders[format], 1);
     return vkb_graph_add_pass(graph, &row, error);
 }
 

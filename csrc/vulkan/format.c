@@ -49,6 +49,16 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
             .limit = (float)UFLOAT11_LIMIT,
         },
+    [VKB_FORMAT_R32_FLOAT] =
+        {
+            .name = "r32float",
+            .dtype = "float32",
+            .vk = VK_FORMAT_R32_SFLOAT,
+            .channels = 1,
+            .channel_size = 4,
+            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
+            .limit = FLT_MAX,
+        },
     [VKB_FORMAT_DEPTH32_FLOAT] =
         {
             .name = "depth32float",

@@ -40,7 +40,7 @@ from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings,
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
-    from vkbloom import reference
+    from vkbloom import psf, reference
     from vkbloom.grid import reductions
     from vkbloom.grid.checking import GridReport, check_grid
     from vkbloom.grid.curves import response_curves
@@ -54,6 +54,7 @@ __version__: str
 
 # Imported on first use, because a program that only calls `apply` needs none of them.
 _LATE_MODULES = {
+    "psf": "vkbloom.psf",
     "reductions": "vkbloom.grid.reductions",
     "reference": "vkbloom.reference",
     "scene": "vkbloom.scene",
@@ -106,6 +107,7 @@ __all__ = [
     "gaussian_weights",
     "grid_to_zarr",
     "presets",
+    "psf",
     "read",
     "reductions",
     "reference",

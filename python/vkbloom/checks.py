@@ -20,9 +20,11 @@ __all__ = [
     "FLT_MAX",
     "as_float",
     "check_attachments",
+    "check_emission",
     "check_floats",
     "check_image",
     "check_index",
+    "check_mask",
     "check_number",
     "check_size",
     "check_time",
@@ -143,43 +145,86 @@ def check_index(field: str, value: int, low: int, high: int) -> int:
     return index
 
 
-def check_image(image: object) -> NDArray[Any]:
+def check_image(image: object, name: str = "image") -> NDArray[Any]:
     """Return the image, in this machine's byte order, if the core can take it.
+
+    `name` is the argument's, for the errors.
 
     Anything that NumPy can view is an image: arrays, ``__array__``, the buffer protocol, DLPack on
     the CPU, and an xarray.DataArray with the dimensions y, x and channel in any order. float64
     becomes float32.
     """
-    array = image if isinstance(image, np.ndarray) else _viewed(image)
+    array = image if isinstance(image, np.ndarray) else _viewed(image, name)
     if type(array) is not np.ndarray and np.ma.is_masked(array):
-        raise ValueError("image: some of it is masked; fill it first, such as image.filled(0)")
+        raise ValueError(f"{name}: some of it is masked; fill it first, such as {name}.filled(0)")
     if array.dtype == np.float64:
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
         if array.dtype.name not in ("uint8", "float16", "float32"):
             cure = _DTYPE_CURES.get(array.dtype.name, "")
             raise TypeError(
-                f"image: dtype {array.dtype} is not one of uint8, float16, float32, float64{cure}"
+                f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{cure}"
             )
         array = array.astype(array.dtype.newbyteorder("="), copy=False)
     if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
         raise ValueError(
-            f"image: shape {array.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+            f"{name}: shape {array.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
             + _shape_cure(array.shape)
         )
     return array
 
 
-def _viewed(image: object) -> NDArray[Any]:
+def check_emission(emission: object, image: NDArray[Any]) -> NDArray[Any]:
+    """Return the emission if it fits an image that `check_image` returned."""
+    array = check_image(emission, "emission")
+    if array.shape != image.shape:
+        raise ValueError(f"emission: shape {array.shape} is not the image's, {image.shape}")
+    if array.dtype != image.dtype:
+        raise ValueError(f"emission: dtype {array.dtype} is not the image's, {image.dtype}")
+    return array
+
+
+def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the mask as floats of 0 to 1, (H, W), if it has that height and width."""
+    array = mask if isinstance(mask, np.ndarray) else _viewed(mask, "mask", ("y", "x"))
+    if type(array) is not np.ndarray and np.ma.is_masked(array):
+        raise ValueError("mask: some of it is masked; fill it first, such as mask.filled(0)")
+    if array.dtype.name not in ("uint8", "bool", "float16", "float32", "float64"):
+        cure = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
+        raise TypeError(
+            f"mask: dtype {array.dtype} is not one of uint8, bool, float16, float32, float64{cure}"
+        )
+    if array.shape != size:
+        cure = "; take one channel: mask[..., 0]" * (array.ndim == 3 and array.shape[:2] == size)
+        raise ValueError(f"mask: shape {array.shape} is not the image's, {size}{cure}")
+    values = array.astype(np.float32, copy=False)
+    if array.dtype.name == "uint8":
+        return values / np.float32(255)
+    # Not the other way round, so that NaN fails too.
+    if array.dtype.kind == "f" and not (array.min() >= 0 and array.max() <= 1):
+        raise ValueError(
+            f"mask: {_outside(array)} is out of range, 0 to 1; clip it: mask.clip(0, 1)"
+        )
+    return values
+
+
+def _outside(array: NDArray[Any]) -> float:
+    """Return the first value that is not within 0 to 1."""
+    return float(array[~((array >= 0) & (array <= 1))][0])
+
+
+def _viewed(
+    image: object, name: str, dimensions: tuple[str, ...] = ("y", "x", "channel")
+) -> NDArray[Any]:
     """Return what NumPy sees of an object, or raise TypeError."""
     dims = getattr(image, "dims", None)
     if isinstance(dims, tuple) and hasattr(image, "transpose"):
         # A grid's channels are named after their framebuffer, such as "final_channel".
-        order = [_dimension(dims, name) for name in ("y", "x", "channel")]
+        order = [_dimension(dims, one) for one in dimensions]
         if len(dims) != len(order) or None in order:
             raise ValueError(
-                f"image: dimensions {dims} are not y, x and channel; choose of the others first, "
-                "such as image.isel(intensity=0)"
+                f"{name}: dimensions {dims} are not {', '.join(dimensions)}; choose of the others "
+                f"first, such as {name}.isel(intensity=0)"
             )
         return np.asarray(image.transpose(*order))
     is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
@@ -191,7 +236,7 @@ def _viewed(image: object) -> NDArray[Any]:
         return np.asarray(memoryview(image))  # type: ignore[arg-type]
     except (TypeError, ValueError, RuntimeError, BufferError) as error:
         raise TypeError(
-            f"image: an array is needed, not {type(image).__name__}"
+            f"{name}: an array is needed, not {type(image).__name__}"
             + (f", of which NumPy says: {error}" if is_viewed else "")
         ) from None
 

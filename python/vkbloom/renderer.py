@@ -289,6 +289,8 @@ class Renderer:
         image: NDArray[Any],
         settings: Settings | None = None,
         *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
         attachments: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, NDArray[Any]] | None = None,
     ) -> Frames:
@@ -298,11 +300,19 @@ class Renderer:
         ----------
         image : ndarray, shape (H, W, 3) or (H, W, 4)
             Linear light: uint8 (read as value / 255), float16 or float32; any strides. The levels
-            of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; RGBA
-            keeps its alpha, which the bloom never changes. NaN and infinity count as 0 in the
-            bloom and stay where they are in ``final``.
+            of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; what
+            becomes of an alpha is the field `alpha` of the settings. NaN and infinity count as 0 in
+            the bloom and stay where they are in ``final``.
         settings : Settings, optional
             By default ``Separable()``.
+        mask : ndarray, shape (H, W), optional
+            What may glow, 0 to 1, of the image's size: uint8 (read as value / 255), bool, float16
+            or float32. It is reduced bilinearly like the image, and multiplies what the threshold
+            lets through. Published methods read it at the pixel centres of the first image that
+            they write after their threshold.
+        emission : ndarray, optional
+            An image of the same shape and dtype that takes the image's place as the source of the
+            bloom, as the glow mesh does in a scene; ``final`` still starts from the image.
         attachments, out
             As for `render`.
 
@@ -313,13 +323,14 @@ class Renderer:
             (``blur_vertical``; or ``down_0``, ``down_1``, ... and ..., ``up_0``), ``bloom``, all
             (H, W, 4) in the format of the bloom buffers, and ``final``, which has the image's
             shape and dtype. With ``bloom=False`` there is ``final`` only. ``info`` counts the
-            "nan" and "inf" of the image.
+            "nan" and "inf" of the image and the emission.
 
         Raises
         ------
         ValueError
-            The image has another shape, masked values or more pixels than the adapter allows, an
-            argument is out of range, an array of `out` does not fit, or the renderer is closed.
+            The image has another shape, masked values or more pixels than the adapter allows, the
+            mask or the emission do not fit it, an argument is out of range, an array of `out` does
+            not fit, or the renderer is closed.
         TypeError
             The image has another dtype, or an argument another type.
         OutOfMemoryError, DeviceLostError, ValidationError, Error
@@ -328,10 +339,26 @@ class Renderer:
         Notes
         -----
         The same image again, to the byte, is not sent to the device again, and passes run only
-        when what they read or their settings changed.
+        when what they read or their settings changed. The same holds for mask and emission.
+
+        With the composite "mix" a bloom takes from the scene s only what it came of: with a mask m
+        the result is s + i (b - m s), with an emission s + i b.
+
+        Examples
+        --------
+        Two lamps, of which one may glow.
+
+        >>> image = np.zeros((32, 64, 3), np.float32)
+        >>> image[16, 16] = image[16, 48] = 10
+        >>> mask = np.zeros((32, 64), bool)
+        >>> mask[:, :32] = True
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     glow = renderer.apply(image, vkbloom.Pyramid(threshold=1.0), mask=mask)["glow"]
+        >>> glow[16, 16, 0].item(), glow[16, 48, 0].item()
+        (10.0, 0.0)
         """
         settings = check_settings(settings)
-        source = image_source(image)
+        source = image_source(image, mask, emission)
         return self._run_one(source, settings, check_attachments(attachments), out)
 
     def apply_many(

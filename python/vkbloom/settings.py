@@ -19,6 +19,7 @@ Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 Encoding = Literal["none", "gamma22", "srgb"]
+Alpha = Literal["keep", "max", "blur"]
 Texel = Literal["own", "x"]
 BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"]
 
@@ -90,6 +91,13 @@ class Settings:
         more.
     intensity : float
         The i of the composite, 0 to 65504.
+    alpha : {"keep", "max", "blur"}
+        What becomes of the alpha a of an RGBA image, here premultiplied for "max" and "blur".
+        "keep": nothing. "max": max(a, clamp(max over r, g, b of i b, 0, 1)), whatever the
+        `composite`. "blur": alpha is blurred like a colour, with the weights of the colours, and
+        is ``bloom[..., 3]``; a becomes 1 - (1 - a)(1 - clamp(i b_a, 0, 1)). Where a threshold
+        subtracts instead of scaling (`FilamentBloom`), alpha takes the factor of the brightest
+        channel. Scenes ignore it.
     tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
         The tone curve that is applied to the composite.
     exposure : float
@@ -151,6 +159,7 @@ class Settings:
     knee: float = number_field("knee")
     composite: Composite = choice_field("composite")
     intensity: float = number_field("intensity")
+    alpha: Alpha = choice_field("alpha")
     tonemap: ToneMap = choice_field("tonemap")
     exposure: float = number_field("exposure", unit="stop")
     encoding: Encoding = choice_field("encoding")

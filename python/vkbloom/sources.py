@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from vkbloom import _core
-from vkbloom.checks import check_image, check_size, check_time
+from vkbloom.checks import check_emission, check_image, check_mask, check_size, check_time
 from vkbloom.settings import check_shading
 
 if TYPE_CHECKING:
@@ -17,15 +17,23 @@ if TYPE_CHECKING:
 __all__ = ["image_source", "scene_arguments", "scene_source"]
 
 
-def image_source(image: object) -> _core.Source:
-    """Return an image as the core takes it; the image must not change while it is used.
+def image_source(
+    image: object, mask: object | None = None, emission: object | None = None
+) -> _core.Source:
+    """Return an image as the core takes it; the arrays must not change while it is used.
 
     Raises
     ------
     TypeError, ValueError
-        As `check_image`.
+        As `check_image`, `check_mask` and `check_emission`.
     """
-    return _core.image_source(check_image(image))
+    checked = check_image(image)
+    height, width, _ = checked.shape
+    return _core.image_source(
+        checked,
+        None if emission is None else check_emission(emission, checked),
+        None if mask is None else check_mask(mask, (height, width)),
+    )
 
 
 def scene_source(

@@ -5,10 +5,11 @@
 #include "lib/finite.glsl"
 #include "lib/tonemap.glsl"
 
-vec3 composite(vec3 s, vec3 b)
+// `share` is what of the scene is in the source of the bloom.
+vec3 composite(vec3 s, vec3 b, float share)
 {
     if (COMPOSITE == COMPOSITE_MIX)
-        return s + (b - s) * params.intensity;
+        return s + (b - share * s) * params.intensity;
     if (COMPOSITE == COMPOSITE_SCREEN) {
         // 1 - (1 - s)(1 - b), expanded: differences from 1 lose the precision of dark values.
         s = clamp(s, 0.0, 1.0);
@@ -19,18 +20,35 @@ vec3 composite(vec3 s, vec3 b)
     return s;
 }
 
+// The alpha of the finished picture (the setting `alpha`).
+float blend_alpha(float alpha, vec4 bloom)
+{
+    if (ALPHA == ALPHA_KEEP)
+        return alpha;
+    float light = ALPHA == ALPHA_MAX ? max(bloom.r, max(bloom.g, bloom.b)) : bloom.a;
+    light = clamp(params.intensity * light, 0.0, 1.0);
+    float blended = ALPHA == ALPHA_MAX ? max(alpha, light) : alpha + (1.0 - alpha) * light;
+    return is_finite(vec3(alpha)).r ? storable(vec3(blended)).r : alpha;
+}
+
 // NaN and infinity of the scene stay in their own pixels and channels: some curves would change
 // them, and curves that mix channels would spread them.
-vec4 encoded(vec4 scene, vec3 toned, ivec2 pixel)
+vec4 encoded(vec4 scene, vec4 bloom, vec3 toned, ivec2 pixel)
 {
     vec3 result = apply_encoding(toned, ENCODING);
     if (DITHER != 0)
         result = dithered(result, pixel, params.noise_seed);
-    return vec4(mix(scene.rgb, storable(result), is_finite(scene.rgb)), scene.a);
+    return vec4(mix(scene.rgb, storable(result), is_finite(scene.rgb)),
+                blend_alpha(scene.a, bloom));
 }
 
-vec4 finish(vec4 scene, vec3 bloom, ivec2 pixel)
+vec4 finish(vec4 scene, vec4 bloom, float share, ivec2 pixel)
 {
-    vec3 result = composite(finite_or_zero(scene.rgb), bloom);
-    return encoded(scene, apply_tonemap(result * exp2(params.exposure), TONEMAP), pixel);
+    vec3 result = composite(finite_or_zero(scene.rgb), bloom.rgb, share);
+    return encoded(scene, bloom, apply_tonemap(result * exp2(params.exposure), TONEMAP), pixel);
+}
+
+vec4 finish(vec4 scene, vec4 bloom, ivec2 pixel)
+{
+    return finish(scene, bloom, 1.0, pixel);
 }

@@ -10,3 +10,8 @@ vec3 finite_or_zero(vec3 value)
 {
     return mix(vec3(0.0), value, is_finite(value));
 }
+
+vec4 finite_or_zero(vec4 value)
+{
+    return vec4(finite_or_zero(value.rgb), finite_or_zero(value.aaa).r);
+}

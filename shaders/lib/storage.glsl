@@ -57,6 +57,12 @@ vec3 storable(vec3 value)
     return params.limit == HALF_LIMIT ? nearest_half(kept) : kept;
 }
 
+// A value of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
+vec4 stored(vec4 value)
+{
+    return vec4(storable(value.rgb), ALPHA == ALPHA_BLUR ? storable(value.aaa).r : 1.0);
+}
+
 // The value that an image of that format returns after a store. Fused passes use it, so that their
 // result equals that of the passes that they replace.
 vec3 as_stored(vec3 value, int format)
@@ -68,4 +74,9 @@ vec3 as_stored(vec3 value, int format)
     if (format == STORED_UFLOAT)
         return nearest_ufloat(value);
     return clamp(value, -SINGLE_LIMIT, SINGLE_LIMIT);
+}
+
+vec4 as_stored(vec4 value, int format)
+{
+    return vec4(as_stored(value.rgb, format), as_stored(value.aaa, format).r);
 }

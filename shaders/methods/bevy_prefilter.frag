@@ -11,25 +11,26 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
 #include "lib/thirteen_taps.glsl"
 
 vec4 shade()
 {
-    vec3 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
-    vec3 sum = vec3(0.0);
+    vec4 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
+    vec4 sum = vec4(0.0);
     for (int group = 0; group < 5; ++group) {
-        vec3 part = GROUP_SHARES[group] * means[group];
+        vec4 part = GROUP_SHARES[group] * means[group];
         // Bevy's buffers hold nothing below 0; ours do, and must not divide by 0 for it.
-        float luminance = max(dot(part, vec3(0.2126, 0.7152, 0.0722)), 0.0);
+        float luminance = max(dot(part.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
         sum += part / (1.0 + 0.25 * luminance);
     }
-    sum = max(sum, vec3(1e-4));
+    sum.rgb = max(sum.rgb, vec3(1e-4));
     if (THRESHOLDED != 0) {
         float width = params.threshold * params.knee;
         sum = soft_threshold(sum, params.threshold, width, 4.0 * (width + 1e-5), 1e-5);
     }
-    return vec4(storable(sum), 1.0);
+    return stored(mask_value() * sum);
 }

@@ -10,8 +10,9 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
 // What a soft end of that width takes away (min) or adds (max) at a distance from it (Quilez,
 // "Smooth minimum").
@@ -35,10 +36,10 @@ float highlight(float value)
 
 vec4 shade()
 {
-    vec3 value = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING).rgb;
+    vec4 value = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING);
     if (THRESHOLDED != 0) {
         float brightest = max(value.r, max(value.g, value.b));
-        value = brightest > 0.0 ? value * (highlight(brightest) / brightest) : vec3(0.0);
+        value = brightest > 0.0 ? value * (highlight(brightest) / brightest) : vec4(0.0);
     }
-    return vec4(storable(value), 1.0);
+    return stored(mask_value() * value);
 }

@@ -19,11 +19,11 @@ float weight(int tap)
 }
 
 // From the first tap to the last, as in all variants of a blur, so that they round alike.
-vec3 blur_line(Place place, vec2 centre, vec2 tap_step)
+vec4 blur_line(Place place, vec2 centre, vec2 tap_step)
 {
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
-        sum += weight(tap) * sample_at(source, place, centre + float(tap) * tap_step, SAMPLING).rgb;
+        sum += weight(tap) * sample_at(source, place, centre + float(tap) * tap_step, SAMPLING);
     return sum;
 }
 
@@ -33,10 +33,10 @@ vec4 shade()
     vec2 step_x = vec2(params.step_x, 0.0), step_y = vec2(0.0, params.step_y);
     if (DIRECTION != DIRECTION_BOTH) {
         vec2 tap_step = DIRECTION == DIRECTION_VERTICAL ? step_y : step_x;
-        return vec4(storable(blur_line(place, vec2(0.0), tap_step)), 1.0);
+        return stored(blur_line(place, vec2(0.0), tap_step));
     }
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
         sum += weight(tap) * blur_line(place, float(tap) * step_y, step_x);
-    return vec4(storable(params.gain * sum), 1.0);
+    return stored(params.gain * sum);
 }

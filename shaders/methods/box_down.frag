@@ -14,7 +14,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
-float tap_share(vec3 value)
+float tap_share(vec4 value)
 {
     if (FIREFLY_FILTER == 0)
         return 1.0;
@@ -25,13 +25,13 @@ vec4 shade()
 {
     const vec2 corners[4] = vec2[](vec2(-1, -1), vec2(1, -1), vec2(-1, 1), vec2(1, 1));
     Place place = PLACE_IN(source);
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     float shares = 0.0;
     for (int corner = 0; corner < 4; ++corner) {
-        vec3 value = sample_at(source, place, corners[corner], SAMPLING).rgb;
+        vec4 value = sample_at(source, place, corners[corner], SAMPLING);
         float share = tap_share(value);
         sum += share * value;
         shares += share;
     }
-    return vec4(storable(sum / shares), 1.0);
+    return stored(sum / shares);
 }

@@ -10,23 +10,25 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
+layout(set = 0, binding = 3) uniform sampler2D mask;
 
-#define TARGET_BINDING 3
+#define TARGET_BINDING 4
 #include "lib/fullscreen.glsl"
 
 // The bloom from its image, or from the lines that end in it, as that image would give it back.
-vec3 bloom_light()
+vec4 bloom_light()
 {
     if (BLOOM == BLOOM_OWN)
-        return texelFetch(bloom, PIXEL, 0).rgb;
+        return texelFetch(bloom, PIXEL, 0);
     bool floats = FORMAT == STORED_HALF || FORMAT == STORED_SINGLE;
     int sampling = floats ? SAMPLING_FETCH : SAMPLING_FILTER;
-    vec3 light = sample_bordered(bloom, PIXEL, textureSize(scene, 0), sampling).rgb;
+    vec4 light = sample_bordered(bloom, PIXEL, textureSize(scene, 0), sampling);
     return as_stored(light, FORMAT);
 }
 
 vec4 shade()
 {
-    vec3 light = COMPOSITE == COMPOSITE_OFF ? vec3(0.0) : bloom_light();
-    return finish(texelFetch(scene, PIXEL, 0), light, PIXEL);
+    vec4 light = COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : bloom_light();
+    float share = MASKED != 0 ? texelFetch(mask, PIXEL, 0).r : 1.0;
+    return finish(texelFetch(scene, PIXEL, 0), light, share, PIXEL);
 }

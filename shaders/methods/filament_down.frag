@@ -20,10 +20,10 @@ vec4 shade()
 {
     const float shares[3] = float[](OUTER, 1.0 - 2.0 * OUTER, OUTER);
     Place place = PLACE_IN(source);
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int y = -1; y <= 1; ++y)
         for (int x = -1; x <= 1; ++x)
             sum += shares[x + 1] * shares[y + 1]
-                 * sample_at(source, place, OFFSET * vec2(x, y), SAMPLING).rgb;
-    return vec4(storable(sum), 1.0);
+                 * sample_at(source, place, OFFSET * vec2(x, y), SAMPLING);
+    return stored(sum);
 }

@@ -11,8 +11,9 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
 float brightest(vec3 value)
 {
@@ -31,20 +32,23 @@ vec4 shade()
     vec2 offsets[4] = vec2[](left, vec2(right.x, left.y), vec2(left.x, right.y), right);
     vec4 shares = vec4(left_share.x, right_share.x, left_share.x, right_share.x)
                 * vec4(left_share.yy, right_share.yy);
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     float total = 0.0;
     for (int i = 0; i < 4; ++i) {
-        vec3 value = sample_at(source, place, offsets[i], SAMPLING).rgb;
+        vec4 value = sample_at(source, place, offsets[i], SAMPLING);
         float share = shares[i];
         if (THRESHOLDED != 0)
-            share /= 1.0 + brightest(value);
+            share /= 1.0 + brightest(value.rgb);
         sum += share * value;
         total += share;
     }
     sum /= total;
     if (THRESHOLDED != 0) {
-        sum = max(sum - params.threshold, vec3(0.0));
-        sum /= 1.0 + brightest(sum) / params.highlight;
+        vec3 kept = max(sum.rgb - params.threshold, vec3(0.0));
+        kept /= 1.0 + brightest(kept) / params.highlight;
+        // The threshold subtracts: alpha takes the factor of the brightest channel.
+        float value = brightest(sum.rgb);
+        sum = vec4(kept, value > 0.0 ? sum.a * (brightest(kept) / value) : 0.0);
     }
-    return vec4(storable(sum), 1.0);
+    return stored(mask_value() * sum);
 }

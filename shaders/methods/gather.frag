@@ -19,20 +19,20 @@ layout(set = 0, binding = 7) uniform sampler2D level_6;
 #define TARGET_BINDING 8
 #include "lib/fullscreen.glsl"
 
-vec3 share(sampler2D image, int level)
+vec4 share(sampler2D image, int level)
 {
     if (level >= LEVELS)
-        return vec3(0.0);
+        return vec4(0.0);
     float weight = params.shares[level >> 2][level & 3];
     Place place = PLACE_IN(image);
     if (UPSAMPLE == UPSAMPLE_CUBIC)
         return weight * sample_cubic(image, place);
-    return weight * sample_at(image, place, vec2(0.0), SAMPLING).rgb;
+    return weight * sample_at(image, place, vec2(0.0), SAMPLING);
 }
 
 vec4 shade()
 {
-    vec3 sum = share(level_0, 0) + share(level_1, 1) + share(level_2, 2) + share(level_3, 3)
+    vec4 sum = share(level_0, 0) + share(level_1, 1) + share(level_2, 2) + share(level_3, 3)
              + share(level_4, 4) + share(level_5, 5) + share(level_6, 6);
-    return vec4(storable(sum), 1.0);
+    return stored(sum);
 }

@@ -10,8 +10,9 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
 // Where the sample of a place is read: samples are clamped in pairs.
 int paired(int place, int length)
@@ -21,21 +22,21 @@ int paired(int place, int length)
 }
 
 // In units of the cap, 6 at least; negative luminances count as 0.
-float luminance(vec3 value)
+float luminance(vec4 value)
 {
-    return max(dot(value, vec3(0.299, 0.587, 0.114)), 0.0) / max(params.luminance_cap, 6.0);
+    return max(dot(value.rgb, vec3(0.299, 0.587, 0.114)), 0.0) / max(params.luminance_cap, 6.0);
 }
 
-vec3 read(ivec2 pixel, ivec2 size)
+vec4 read(ivec2 pixel, ivec2 size)
 {
     if (DIRECTION == DIRECTION_VERTICAL)
-        return texelFetch(source, pixel, 0).rgb;
-    vec3 value = sample_at(source, place_in(source, pixel, size), vec2(0.0), SAMPLING).rgb;
+        return texelFetch(source, pixel, 0);
+    vec4 value = sample_at(source, place_in(source, pixel, size), vec2(0.0), SAMPLING);
     return FIRST != 0 ? value / (1.0 + luminance(value)) : value;
 }
 
 // How much of a colour glows.
-float feedback(vec3 value)
+float feedback(vec4 value)
 {
     float brightest = max(value.r, max(value.g, value.b));
     // A scale of 0 is a step.
@@ -43,21 +44,23 @@ float feedback(vec3 value)
     return max(t * t * (3.0 - 2.0 * t), params.glow_bloom);
 }
 
-vec3 end(vec3 sum)
+vec4 end(vec4 sum)
 {
     if (FIRST == 0)
         return params.strength * sum;
-    vec3 value = sum / (1.0 - luminance(sum)) * params.strength * exp2(params.exposure);
+    vec4 value = sum / (1.0 - luminance(sum)) * params.strength;
+    // Neither exposure nor cap is alpha's.
+    value.rgb *= exp2(params.exposure);
     if (THRESHOLDED != 0)
         value *= feedback(value);
-    return min(value, vec3(params.luminance_cap));
+    return mask_value() * vec4(min(value.rgb, vec3(params.luminance_cap)), value.a);
 }
 
 vec4 shade()
 {
     const float weights[5] = float[](0.2024, 0.1790, 0.1240, 0.0672, 0.0285);
     ivec2 size = ivec2(params.target_width, params.target_height);
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int tap = -4; tap <= 4; ++tap) {
         ivec2 pixel = PIXEL;
         if (DIRECTION == DIRECTION_HORIZONTAL)
@@ -66,5 +69,5 @@ vec4 shade()
             pixel.y = paired(pixel.y + tap, size.y);
         sum += weights[abs(tap)] * read(pixel, size);
     }
-    return vec4(storable(DIRECTION == DIRECTION_HORIZONTAL ? sum : end(sum)), 1.0);
+    return stored(DIRECTION == DIRECTION_HORIZONTAL ? sum : end(sum));
 }

@@ -11,8 +11,9 @@ UNIFORM_BLOCK(GODOT_FINAL_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
+layout(set = 0, binding = 3) uniform sampler2D mask;
 
-#define TARGET_BINDING 3
+#define TARGET_BINDING 4
 #include "lib/fullscreen.glsl"
 
 vec3 soft_light(vec3 s, vec3 light)
@@ -24,14 +25,14 @@ vec3 soft_light(vec3 s, vec3 light)
     return mix(s + clamp(light, 0.0, 1.0) * (full - s), s, greaterThan(s, vec3(1.0)));
 }
 
-vec3 blend(vec3 s, vec3 bloom_light)
+vec3 blend(vec3 s, vec3 bloom_light, float share)
 {
     vec3 light = params.intensity * bloom_light;
     if (COMPOSITE == COMPOSITE_SOFT_LIGHT)
         return soft_light(apply_tonemap(s, TONEMAP), apply_tonemap(light, TONEMAP));
     vec3 sum = s + light;
     if (COMPOSITE == COMPOSITE_MIX)
-        sum = s + (bloom_light - s) * params.intensity;
+        sum = s + (bloom_light - share * s) * params.intensity;
     if (COMPOSITE == COMPOSITE_REPLACE)
         sum = light;
     if (COMPOSITE == COMPOSITE_SCREEN) {
@@ -45,5 +46,7 @@ vec4 shade()
 {
     vec4 pixel = texelFetch(scene, PIXEL, 0);
     vec3 exposed = finite_or_zero(pixel.rgb) * exp2(params.exposure);
-    return encoded(pixel, blend(exposed, texelFetch(bloom, PIXEL, 0).rgb), PIXEL);
+    vec4 light = texelFetch(bloom, PIXEL, 0);
+    float share = MASKED != 0 ? texelFetch(mask, PIXEL, 0).r : 1.0;
+    return encoded(pixel, light, blend(exposed, light.rgb, share), PIXEL);
 }

@@ -31,10 +31,10 @@ vec4 shade()
                                      0.109375, 0.03125, 0.00390625);
     ivec2 size = ivec2(params.target_width, params.target_height);
     ivec2 along = DIRECTION == DIRECTION_HORIZONTAL ? ivec2(1, 0) : ivec2(0, 1);
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int tap = 0; tap < 9; ++tap) {
         Place place = place_of(PIXEL + (tap - 4) * along, size);
-        sum += weights[tap] * sample_at(source, place, vec2(0.0), SAMPLING).rgb;
+        sum += weights[tap] * sample_at(source, place, vec2(0.0), SAMPLING);
     }
-    return vec4(storable(sum), 1.0);
+    return stored(sum);
 }

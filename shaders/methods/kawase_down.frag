@@ -17,10 +17,10 @@ vec4 shade()
 {
     Place place = PLACE_IN(source);
     vec2 diagonal = vec2(0.5, -0.5) * params.offset;
-    vec3 sum = 4.0 * sample_at(source, place, vec2(0.0), SAMPLING).rgb;
-    sum += sample_at(source, place, diagonal.xx, SAMPLING).rgb;
-    sum += sample_at(source, place, diagonal.xy, SAMPLING).rgb;
-    sum += sample_at(source, place, diagonal.yx, SAMPLING).rgb;
-    sum += sample_at(source, place, diagonal.yy, SAMPLING).rgb;
-    return vec4(storable(sum / 8.0), 1.0);
+    vec4 sum = 4.0 * sample_at(source, place, vec2(0.0), SAMPLING);
+    sum += sample_at(source, place, diagonal.xx, SAMPLING);
+    sum += sample_at(source, place, diagonal.xy, SAMPLING);
+    sum += sample_at(source, place, diagonal.yx, SAMPLING);
+    sum += sample_at(source, place, diagonal.yy, SAMPLING);
+    return stored(sum / 8.0);
 }

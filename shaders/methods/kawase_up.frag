@@ -18,13 +18,13 @@ vec4 shade()
     Place place = PLACE_IN(smaller);
     vec2 axial = vec2(params.offset, 0.0);
     vec2 diagonal = vec2(0.5, -0.5) * params.offset;
-    vec3 sum = sample_at(smaller, place, axial.xy, SAMPLING).rgb;
-    sum += sample_at(smaller, place, -axial.xy, SAMPLING).rgb;
-    sum += sample_at(smaller, place, axial.yx, SAMPLING).rgb;
-    sum += sample_at(smaller, place, -axial.yx, SAMPLING).rgb;
-    vec3 diagonals = sample_at(smaller, place, diagonal.xx, SAMPLING).rgb;
-    diagonals += sample_at(smaller, place, diagonal.xy, SAMPLING).rgb;
-    diagonals += sample_at(smaller, place, diagonal.yx, SAMPLING).rgb;
-    diagonals += sample_at(smaller, place, diagonal.yy, SAMPLING).rgb;
-    return vec4(storable((sum + 2.0 * diagonals) / 12.0), 1.0);
+    vec4 sum = sample_at(smaller, place, axial.xy, SAMPLING);
+    sum += sample_at(smaller, place, -axial.xy, SAMPLING);
+    sum += sample_at(smaller, place, axial.yx, SAMPLING);
+    sum += sample_at(smaller, place, -axial.yx, SAMPLING);
+    vec4 diagonals = sample_at(smaller, place, diagonal.xx, SAMPLING);
+    diagonals += sample_at(smaller, place, diagonal.xy, SAMPLING);
+    diagonals += sample_at(smaller, place, diagonal.yx, SAMPLING);
+    diagonals += sample_at(smaller, place, diagonal.yy, SAMPLING);
+    return stored((sum + 2.0 * diagonals) / 12.0);
 }

@@ -11,23 +11,25 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
-vec3 tap(float x, float y)
+vec4 tap(float x, float y)
 {
-    return min(sample_at(source, PLACE_IN(source), vec2(x, y), SAMPLING).rgb, vec3(65000.0));
+    vec4 value = sample_at(source, PLACE_IN(source), vec2(x, y), SAMPLING);
+    return vec4(min(value.rgb, vec3(65000.0)), value.a);
 }
 
 // By choice alone: a sum of the three would round.
-vec3 middle(vec3 a, vec3 b, vec3 c)
+vec4 middle(vec4 a, vec4 b, vec4 c)
 {
     return max(min(a, b), min(max(a, b), c));
 }
 
 vec4 shade()
 {
-    vec3 kept = tap(0.0, 0.0);
+    vec4 kept = tap(0.0, 0.0);
     if (ANTI_FLICKER != 0) {
         kept = middle(kept, tap(-1.0, 0.0), tap(1.0, 0.0));
         kept = middle(kept, tap(0.0, -1.0), tap(0.0, 1.0));
@@ -36,5 +38,5 @@ vec4 shade()
         float width = params.threshold * params.knee + 1e-5;
         kept = soft_threshold(kept, params.threshold, width, 4.0 * width, 1e-5);
     }
-    return vec4(storable(kept), 1.0);
+    return stored(mask_value() * kept);
 }

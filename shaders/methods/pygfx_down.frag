@@ -10,21 +10,22 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
 #include "lib/thirteen_taps.glsl"
 
 vec4 shade()
 {
-    vec3 means[5] = group_means(PLACE_IN(source), vec2(1.0));
-    vec3 sum = vec3(0.0);
+    vec4 means[5] = group_means(PLACE_IN(source), vec2(1.0));
+    vec4 sum = vec4(0.0);
     float shares = 0.0;
     for (int group = 0; group < 5; ++group) {
-        float luminance = max(dot(means[group], vec3(0.2126, 0.7152, 0.0722)), 0.0);
+        float luminance = max(dot(means[group].rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
         float share = KARIS_AVERAGE != 0 ? 1.0 / (1.0 + luminance) : GROUP_SHARES[group];
         sum += share * means[group];
         shares += share;
     }
-    return vec4(storable(max(sum / shares, vec3(0.0))), 1.0);
+    return stored(mask_value() * max(sum / shares, vec4(0.0)));
 }

@@ -15,27 +15,27 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #include "lib/thirteen_taps.glsl"
 
 // What a group counts: less the brighter it is where fireflies are filtered (Karis 2013).
-float group_share(vec3 mean, float share)
+float group_share(vec4 mean, float share)
 {
     if (FIREFLY_FILTER == 0)
         return share;
-    return share / (1.0 + max(dot(mean, vec3(0.2126, 0.7152, 0.0722)), 0.0));
+    return share / (1.0 + max(dot(mean.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0));
 }
 
 // The 13 taps from a level of exactly twice the size, where they lie between texels: the sum of two
 // separable kernels, as in all variants of such a pass (variants/halve.comp).
-vec3 halved()
+vec4 halved()
 {
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int row = 0; row < 6; ++row) {
-        vec3 texels[6];
+        vec4 texels[6];
         for (int i = 0; i < 6; ++i)
-            texels[i] = fetch_clamped(source, 2 * PIXEL + ivec2(i, row) - 2).rgb;
-        vec3 inner = texels[2] + texels[3];
-        vec3 four = inner + texels[1] + texels[4];
-        vec3 six = four + inner + texels[0] + texels[5];
+            texels[i] = fetch_clamped(source, 2 * PIXEL + ivec2(i, row) - 2);
+        vec4 inner = texels[2] + texels[3];
+        vec4 four = inner + texels[1] + texels[4];
+        vec4 six = four + inner + texels[0] + texels[5];
         sum += six / (row == 2 || row == 3 ? 64.0 : 128.0)
-             + (row == 0 || row == 5 ? vec3(0.0) : four / 32.0);
+             + (row == 0 || row == 5 ? vec4(0.0) : four / 32.0);
     }
     return sum;
 }
@@ -43,14 +43,14 @@ vec3 halved()
 vec4 shade()
 {
     if (SAMPLING == SAMPLING_TEXEL)
-        return vec4(storable(halved()), 1.0);
-    vec3 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
-    vec3 sum = vec3(0.0);
+        return stored(halved());
+    vec4 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
+    vec4 sum = vec4(0.0);
     float shares = 0.0;
     for (int group = 0; group < 5; ++group) {
         float share = group_share(means[group], GROUP_SHARES[group]);
         sum += share * means[group];
         shares += share;
     }
-    return vec4(storable(sum / shares), 1.0);
+    return stored(sum / shares);
 }

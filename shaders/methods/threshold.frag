@@ -6,7 +6,7 @@
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
-#define TEXEL(value) vec4(finite_or_zero((value).rgb), 1.0)
+#define TEXEL(value) finite_or_zero(value)
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
@@ -14,16 +14,17 @@ UNIFORM_BLOCK(THRESHOLD_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D image;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
 vec4 shade()
 {
     Place place = PLACE_IN(image);
     // Rounding in the filter must not lift pixels of a flat area over the threshold.
     bool within = THRESHOLD_MODE == THRESHOLD_HARD && SAMPLING == SAMPLING_FETCH;
-    vec3 reduced = within ? fetch_within(image, place).rgb
-                          : sample_at(image, place, vec2(0.0), SAMPLING).rgb;
-    vec3 kept = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
-    return vec4(storable(kept), 1.0);
+    vec4 reduced = within ? fetch_within(image, place)
+                          : sample_at(image, place, vec2(0.0), SAMPLING);
+    vec4 kept = apply_threshold(reduced, THRESHOLD_MODE, params.threshold, params.knee);
+    return stored(mask_value() * kept);
 }

@@ -11,15 +11,17 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
 
 vec4 shade()
 {
-    vec3 kept = min(sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING).rgb, vec3(params.clamp_max));
+    vec4 kept = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING);
+    kept.rgb = min(kept.rgb, vec3(params.clamp_max));
     if (THRESHOLDED != 0) {
         float width = params.threshold * params.knee;
         kept = soft_threshold(kept, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
     }
-    return vec4(storable(max(kept, vec3(0.0))), 1.0);
+    return stored(mask_value() * max(kept, vec4(0.0)));
 }

@@ -22,6 +22,6 @@ vec4 shade()
     vec3 n = texelFetch(normal, pixel, 0).xyz;
     vec3 lit = base;
     if (any(notEqual(n, vec3(0.0))))
-        lit = phong(base, LAMP_IN_HALF, normalize(n), texelFetch(position, pixel, 0).xyz);
+        lit = phong(base, normalize(n), texelFetch(position, pixel, 0).xyz);
     return vec4(storable(lit + texelFetch(brightness, pixel, 0).rgb), 1.0);
 }

@@ -12,6 +12,6 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    vec3 lit = phong(surface_colour(), LAMP, normalize(view_normal), view_position);
+    vec3 lit = phong(surface_colour(), normalize(view_normal), view_position);
     colour = vec4(storable(lit), 1.0);
 }

@@ -17,5 +17,5 @@ layout(set = 0, binding = 3) uniform writeonly image2D target;
 
 vec4 shade(ivec2 pixel)
 {
-    return finish(imageLoad(scene, pixel), imageLoad(bloom, pixel).rgb, pixel);
+    return finish(imageLoad(scene, pixel), imageLoad(bloom, pixel), pixel);
 }

@@ -13,9 +13,9 @@ layout(set = 0, binding = 3) uniform writeonly image2D target;
 
 #include "variants/double.glsl"
 
-vec4 shade(ivec2 pixel, vec3 sum)
+vec4 shade(ivec2 pixel, vec4 sum)
 {
     if (ADD_OWN != 0)
-        sum += params.own * imageLoad(own, pixel).rgb;
-    return vec4(storable(sum), 1.0);
+        sum += params.own * imageLoad(own, pixel);
+    return stored(sum);
 }

@@ -2,13 +2,13 @@
 // texel once. A shader that includes this has `smaller`, `target`, and what a pixel makes of its sum.
 #include "lib/doubling.glsl"
 
-vec4 shade(ivec2 pixel, vec3 sum);
+vec4 shade(ivec2 pixel, vec4 sum);
 
 // Texels of the smaller level, columns and rows; a pixel of an odd place starts one texel later.
 const int LOADED = DOUBLE_COLUMNS / 2 + 4;
 const int KEPT = 5;
 
-void store(ivec2 pixel, vec3 sum, ivec2 size)
+void store(ivec2 pixel, vec4 sum, ivec2 size)
 {
     if (all(lessThan(pixel, size)))
         imageStore(target, pixel, shade(pixel, params.coarse * sum));
@@ -19,18 +19,18 @@ void main()
     ivec2 last = imageSize(smaller) - 1, size = imageSize(target);
     ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(DOUBLE_COLUMNS, DOUBLE_ROWS);
     int end = min(first.y + DOUBLE_ROWS, size.y) / 2;
-    vec3 rows[KEPT][DOUBLE_COLUMNS];
+    vec4 rows[KEPT][DOUBLE_COLUMNS];
 
     if (any(greaterThanEqual(first, size)))
         return;
     for (int row = 0; row < KEPT; ++row)
         for (int i = 0; i < DOUBLE_COLUMNS; ++i)
-            rows[row][i] = vec3(0.0);
+            rows[row][i] = vec4(0.0);
     for (int y = first.y / 2 - 2; y < end + 2; ++y) {
-        vec3 texels[LOADED];
+        vec4 texels[LOADED];
         for (int i = 0; i < LOADED; ++i) {
             ivec2 texel = ivec2(first.x / 2 + i - 2, y);
-            texels[i] = imageLoad(smaller, clamp(texel, ivec2(0), last)).rgb;
+            texels[i] = imageLoad(smaller, clamp(texel, ivec2(0), last));
         }
         for (int row = 1; row < KEPT; ++row)
             for (int i = 0; i < DOUBLE_COLUMNS; ++i)

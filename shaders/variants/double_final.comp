@@ -14,7 +14,7 @@ layout(set = 0, binding = 3) uniform writeonly image2D target;
 
 #include "variants/double.glsl"
 
-vec4 shade(ivec2 pixel, vec3 sum)
+vec4 shade(ivec2 pixel, vec4 sum)
 {
     return finish(imageLoad(scene, pixel), as_stored(sum, FORMAT), pixel);
 }

@@ -16,5 +16,5 @@ layout(set = 0, binding = 1) uniform sampler2D lines;
 vec4 shade()
 {
     ivec2 size = ivec2(params.target_width, params.target_height);
-    return vec4(storable(sample_bordered(lines, PIXEL, size, SAMPLING).rgb), 1.0);
+    return stored(sample_bordered(lines, PIXEL, size, SAMPLING));
 }

@@ -16,12 +16,12 @@ layout(set = 0, binding = 2) uniform writeonly image2D target;
 
 const int LOADED = 2 * HALVE_COLUMNS + 4;
 
-vec3 load(ivec2 texel)
+vec4 load(ivec2 texel)
 {
-    vec3 value = imageLoad(source, texel).rgb;
+    vec4 value = imageLoad(source, texel);
     if (FROM_IMAGE == 0)
         return value;
-    vec3 kept =
+    vec4 kept =
         apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
     return as_stored(kept, FORMAT);
 }
@@ -32,36 +32,36 @@ void main()
     ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(HALVE_COLUMNS, HALVE_ROWS);
     int end = min(first.y + HALVE_ROWS, size.y);
     // Of the output row that a pair of source rows ends, and of the one that it is the middle of.
-    vec3 ending[HALVE_COLUMNS], middle[HALVE_COLUMNS], starting[HALVE_COLUMNS];
+    vec4 ending[HALVE_COLUMNS], middle[HALVE_COLUMNS], starting[HALVE_COLUMNS];
 
     if (any(greaterThanEqual(first, size)))
         return;
     for (int i = 0; i < HALVE_COLUMNS; ++i)
-        ending[i] = middle[i] = vec3(0.0);
+        ending[i] = middle[i] = vec4(0.0);
     for (int y = first.y - 1; y <= end; ++y) {
         for (int i = 0; i < HALVE_COLUMNS; ++i)
-            starting[i] = vec3(0.0);
+            starting[i] = vec4(0.0);
         for (int half_row = 0; half_row < 2; ++half_row) {
             int row = clamp(2 * y + half_row, 0, last.y);
-            vec3 texels[LOADED];
+            vec4 texels[LOADED];
             for (int i = 0; i < LOADED; ++i) {
                 int column = clamp(2 * first.x + i - 2, 0, last.x);
                 texels[i] = load(ivec2(column, row));
             }
             for (int i = 0; i < HALVE_COLUMNS; ++i) {
-                vec3 inner = texels[2 * i + 2] + texels[2 * i + 3];
-                vec3 four = inner + texels[2 * i + 1] + texels[2 * i + 4];
-                vec3 six = four + inner + texels[2 * i] + texels[2 * i + 5];
+                vec4 inner = texels[2 * i + 2] + texels[2 * i + 3];
+                vec4 four = inner + texels[2 * i + 1] + texels[2 * i + 4];
+                vec4 six = four + inner + texels[2 * i] + texels[2 * i + 5];
                 // Shares of 1/2 * 1/4 * 1/4 and 1/2 * 1/8 * 1/8 (the two middle rows twice that).
-                ending[i] += six / 128.0 + (half_row == 0 ? four / 32.0 : vec3(0.0));
+                ending[i] += six / 128.0 + (half_row == 0 ? four / 32.0 : vec4(0.0));
                 middle[i] += six / 64.0 + four / 32.0;
-                starting[i] += six / 128.0 + (half_row == 1 ? four / 32.0 : vec3(0.0));
+                starting[i] += six / 128.0 + (half_row == 1 ? four / 32.0 : vec4(0.0));
             }
         }
         for (int i = 0; i < HALVE_COLUMNS; ++i) {
             ivec2 pixel = ivec2(first.x + i, y - 1);
             if (y > first.y && pixel.x < size.x)
-                imageStore(target, pixel, vec4(storable(ending[i]), 1.0));
+                imageStore(target, pixel, stored(ending[i]));
             ending[i] = middle[i];
             middle[i] = starting[i];
         }

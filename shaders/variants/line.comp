@@ -18,15 +18,15 @@ ivec2 along()
     return DIRECTION == DIRECTION_VERTICAL ? ivec2(0, 1) : ivec2(1, 0);
 }
 
-vec3 load(ivec2 pixel, int texels)
+vec4 load(ivec2 pixel, int texels)
 {
     ivec2 texel = pixel + (params.origin + texels) * along();
-    return imageLoad(source, clamp(texel, ivec2(0), imageSize(source) - 1)).rgb;
+    return imageLoad(source, clamp(texel, ivec2(0), imageSize(source) - 1));
 }
 
-void add_short(ivec2 first, inout vec3 sums[LINE_OUTPUTS])
+void add_short(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
 {
-    vec3 texels[LOADED];
+    vec4 texels[LOADED];
 
     for (int i = 0; i < LOADED; ++i)
         texels[i] = load(first, i - RADIUS);
@@ -36,9 +36,9 @@ void add_short(ivec2 first, inout vec3 sums[LINE_OUTPUTS])
 }
 
 // As many taps at a time as there are outputs, for loops of a length that is known.
-void add_long(ivec2 first, inout vec3 sums[LINE_OUTPUTS])
+void add_long(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
 {
-    vec3 texels[2 * LINE_OUTPUTS - 1];
+    vec4 texels[2 * LINE_OUTPUTS - 1];
 
     for (int i = 0; i < LINE_OUTPUTS - 1; ++i)
         texels[LINE_OUTPUTS + i] = load(first, i - params.radius);
@@ -56,12 +56,12 @@ void add_long(ivec2 first, inout vec3 sums[LINE_OUTPUTS])
 void main()
 {
     ivec2 first = ivec2(gl_GlobalInvocationID.xy) * (along() * (LINE_OUTPUTS - 1) + 1);
-    vec3 sums[LINE_OUTPUTS];
+    vec4 sums[LINE_OUTPUTS];
 
     if (any(greaterThanEqual(first, imageSize(target))))
         return;
     for (int i = 0; i < LINE_OUTPUTS; ++i)
-        sums[i] = vec3(0.0);
+        sums[i] = vec4(0.0);
     if (RADIUS > 0)
         add_short(first, sums);
     else
@@ -69,6 +69,6 @@ void main()
     for (int i = 0; i < LINE_OUTPUTS; ++i) {
         ivec2 pixel = first + i * along();
         if (all(lessThan(pixel, imageSize(target))))
-            imageStore(target, pixel, vec4(storable(sums[i]), 1.0));
+            imageStore(target, pixel, stored(sums[i]));
     }
 }

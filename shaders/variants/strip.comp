@@ -50,7 +50,7 @@ void main()
             ivec2 pixel = ivec2(first.x + i, y - STRIP_RADIUS);
             if (pixel.x <= last.x)
                 imageStore(target, pixel,
-                           finish(imageLoad(image, pixel), bloom[i], pixel));
+                           finish(imageLoad(image, pixel), vec4(bloom[i], 1.0), pixel));
         }
     }
 }

@@ -17,7 +17,7 @@ layout(set = 0, binding = 2) uniform writeonly image2D target;
 
 vec4 shade(ivec2 pixel)
 {
-    vec3 colour = finite_or_zero(imageLoad(image, pixel).rgb);
-    vec3 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
-    return vec4(storable(kept), 1.0);
+    vec4 colour = finite_or_zero(imageLoad(image, pixel));
+    vec4 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
+    return stored(kept);
 }

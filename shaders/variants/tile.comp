@@ -86,6 +86,6 @@ void main()
         ivec2 pixel = first + ivec2(column, row);
         if (pixel.y <= last.y)
             imageStore(target, pixel,
-                       finish(texelFetch(image, pixel, 0), sum_horizontally(row, column), pixel));
+                       finish(texelFetch(image, pixel, 0), vec4(sum_horizontally(row, column), 1.0), pixel));
     }
 }

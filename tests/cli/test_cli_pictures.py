@@ -21,7 +21,7 @@ IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
 
 
 def run(*words: object) -> Result:
-    return CliRunner().invoke(program, ["apply", *map(str, words), "--adapter", "software"])
+    return CliRunner().invoke(program, ["apply", *map(str, words)])
 
 
 def names(folder: Path) -> list[str]:

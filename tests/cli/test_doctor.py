@@ -43,12 +43,10 @@ def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
 @pytest.fixture(scope="module")
 def lavapipe() -> Path:
     """Return the manifest of lavapipe."""
-    (manifest,) = (
-        Path(finding.found.partition(":")[0])
-        for finding in drivers.examine(None)
-        if finding.topic.startswith("driver lvp")
-    )
-    return manifest
+    for finding in drivers.examine(None):
+        if finding.topic.startswith("driver lvp"):
+            return Path(finding.found.partition(":")[0])
+    pytest.skip("no manifest of lavapipe is here")
 
 
 @pytest.fixture
@@ -63,6 +61,8 @@ def without_variables(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_this_machine_can_render() -> None:
     status, answer, findings = examined()
     assert status == 0
+    chosen = by_topic(findings, "chosen adapter").found
+    assert f"VKBLOOM_ADAPTER is {os.environ['VKBLOOM_ADAPTER']!r}" in chosen
     assert answer["can_render"] is True
     assert answer["version"] == vkbloom.__version__
     for topic in ("vkbloom", "Vulkan loader", "adapters", "chosen adapter", "test render"):
@@ -70,11 +70,16 @@ def test_this_machine_can_render() -> None:
     for adapter in vkbloom.adapters():
         assert adapter.name in by_topic(findings, "adapters").found
     with vkbloom.Renderer() as renderer:
-        assert by_topic(findings, "chosen adapter").found.startswith(renderer.info.summary)
+        assert chosen.startswith(renderer.info.summary)
 
 
 def test_what_is_not_ok_has_advice_or_explains_itself() -> None:
-    _, _, findings = examined(VKBLOOM_ADAPTER="nonsense", VKBLOOM_CACHE_DIR="/dev/null/cache")
+    status, _, findings = examined(VKBLOOM_ADAPTER="nonsense", VKBLOOM_CACHE_DIR="/dev/null/cache")
+    assert status == 0
+    chosen = by_topic(findings, "chosen adapter")
+    assert chosen.status == "problem"
+    assert "VKBLOOM_ADAPTER is 'nonsense'" in chosen.found
+    assert by_topic(findings, "test render").status == "ok"
     assert {finding.status for finding in findings} == {"ok", "note", "problem"}
     for finding in findings:
         assert finding.found
@@ -179,20 +184,6 @@ def test_no_loader(without_loader: dict[str, str]) -> None:
     assert loader.found.startswith("not found: ")
     assert "apt install libvulkan1" in loader.advice
     assert "loader (libvulkan.so.1) is missing" in by_topic(findings, "adapters").found
-
-
-def test_an_adapter_that_is_not_there() -> None:
-    status, _, findings = examined(VKBLOOM_ADAPTER="nonsense")
-    assert status == 0
-    chosen = by_topic(findings, "chosen adapter")
-    assert chosen.status == "problem"
-    assert "VKBLOOM_ADAPTER is 'nonsense'" in chosen.found
-    assert by_topic(findings, "test render").status == "ok"
-
-
-def test_a_chosen_adapter_tells_its_reason() -> None:
-    _, _, findings = examined(VKBLOOM_ADAPTER="software")
-    assert "VKBLOOM_ADAPTER is 'software'" in by_topic(findings, "chosen adapter").found
 
 
 @linux_only
@@ -425,9 +416,8 @@ def test_a_question_that_fails_is_answered() -> None:
 
 
 @pytest.fixture(scope="module")
-def frames() -> vkbloom.Frames:
-    with vkbloom.Renderer("software") as renderer:
-        return trial.render(renderer)
+def frames(renderer: vkbloom.Renderer) -> vkbloom.Frames:
+    return trial.render(renderer)
 
 
 def test_a_right_render_has_no_differences(frames: vkbloom.Frames) -> None:
@@ -468,7 +458,7 @@ def test_nan_is_found(frames: vkbloom.Frames) -> None:
 def test_the_cache_of_a_render_is_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
     assert installation.cache([]) == Finding("pipeline cache", "ok", f"{tmp_path}; no file yet")
-    with vkbloom.Renderer("software") as renderer:
+    with vkbloom.Renderer() as renderer:
         trial.render(renderer)
     (file,) = tmp_path.iterdir()
     uuid = file.stem.removeprefix("pipelines-")

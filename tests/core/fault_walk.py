@@ -51,6 +51,18 @@ def method(settings: vkbloom.Settings) -> Work:
     return lambda renderer: renderer.apply(picture(*SIZE), settings)
 
 
+def accompanied(renderer: Renderer) -> Arrays:
+    """Another mask, then another emission, to an image that stays."""
+    image, emission = picture(*SIZE), picture(*SIZE, seed=1)
+    mask = picture(*SIZE, 1, seed=2)[..., 0]
+    settings = vkbloom.Separable(layers=((1, 1), (2, 1)), composite="mix", alpha="blur")
+    frames = renderer.apply(image, settings, mask=mask)
+    masked = renderer.apply(image, settings, mask=mask[::-1])
+    both = renderer.apply(image, settings, mask=mask[::-1], emission=emission)
+    results = {"first": frames, "masked": masked, "both": both}
+    return {f"{key} {name}": one[name] for key, one in results.items() for name in one}
+
+
 def batch(renderer: Renderer) -> Arrays:
     settings = [vkbloom.Separable(exposure=step / 4, loops=1 + step // 5) for step in range(8)]
     frames = renderer.apply_many(picture(*SIZE), settings)
@@ -123,6 +135,7 @@ UFO = Scene.ufo()
 WORK: dict[str, Work] = {
     "render forward": lambda renderer: renderer.render(UFO, size=SIZE),
     "render deferred": lambda renderer: renderer.render(textured(), size=SIZE, shading="deferred"),
+    "mask and emission": accompanied,
     "batch": batch,
     "grid": grid,
     "grid in memory": grid_in_memory,

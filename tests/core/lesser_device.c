@@ -1,5 +1,6 @@
 // A Vulkan layer for tests: the device below it with less than it has. VKBLOOM_LESSER names what is
 // taken, separated by commas. test_lesser_devices.py builds and uses it.
+#include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -24,11 +25,14 @@
     FUNCTION(vkGetBufferMemoryRequirements) \
     FUNCTION(vkGetImageMemoryRequirements) \
     FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
-    FUNCTION(vkAllocateMemory)
+    FUNCTION(vkAllocateMemory) \
+    FUNCTION(vkWaitForFences)
 
 // What is below. Of the first instance and its first device, and good for all: these functions go
-// by their handles.
+// by their handles. Messages go to the instance that was created last.
 static struct {
+    VkInstance instance;
+    PFN_vkSubmitDebugUtilsMessageEXT message;
     PFN_vkGetInstanceProcAddr instance_proc;
     PFN_vkGetDeviceProcAddr device_proc;
 #define MEMBER(name) PFN_##name name;
@@ -297,6 +301,23 @@ static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAl
     return below.vkAllocateMemory(handle, &changed, callbacks, memory);
 }
 
+// Without "patience", the user presses Ctrl-C during the wait, after the validation layer has
+// objected.
+static VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice handle, uint32_t count, const VkFence *fences,
+                                           VkBool32 all, uint64_t timeout)
+{
+    if (!lacks("patience"))
+        return below.vkWaitForFences(handle, count, fences, all, timeout);
+    below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
+                  VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
+                  &(VkDebugUtilsMessengerCallbackDataEXT){
+                      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
+                      .pMessage = "an objection",
+                  });
+    raise(SIGINT);
+    return VK_TIMEOUT;
+}
+
 static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,
                                                       const VkAllocationCallbacks *callbacks,
                                                       VkInstance *created)
@@ -316,6 +337,11 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo
         INSTANCE_FUNCTIONS(FETCH)
     }
 #undef FETCH
+    if (result == VK_SUCCESS) {
+        below.instance = *created;
+        below.message = (PFN_vkSubmitDebugUtilsMessageEXT)below.instance_proc(
+            *created, "vkSubmitDebugUtilsMessageEXT");
+    }
     return result;
 }
 
@@ -373,6 +399,7 @@ static const struct entry {
     ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
     ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
     ENTRY(vkAllocateMemory, allocate, true),
+    ENTRY(vkWaitForFences, wait, true),
 };
 
 static PFN_vkVoidFunction find(const char *name, bool of_device)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import signal
 import subprocess
@@ -54,15 +55,22 @@ def alarm() -> Iterator[Callable[[float], None]]:
 
 @pytest.fixture(scope="module")
 def large() -> NDArray[np.float32]:
-    """An image that LONG takes a second or so for, so that there is a wait to leave."""
+    """A square image that LONG takes more than half a second for, so that there is a wait to leave.
+
+    Of 1 MiB at least, which the device writes into the array itself.
+    """
     with Renderer() as renderer:
         renderer.apply(picture(8, 8), LONG)
-        for side in (256, 512, 1024, 2048, 4096):
+        side = 256
+        while side <= 4096:
             image = picture(side, side)
             begin = time.perf_counter()
             renderer.apply(image, LONG, attachments="final")
-            if time.perf_counter() - begin > 0.5:
+            seconds = time.perf_counter() - begin
+            if seconds > 0.5:
                 return image
+            # No larger than it must be: all of these tests wait for it several times.
+            side = int(side * min(2.0, max(1.1, math.sqrt(0.6 / seconds))))
     pytest.skip("this device is done before a wait can be interrupted")
 
 
@@ -110,9 +118,9 @@ def test_a_long_frame_is_interrupted(
 def test_an_interrupted_frame_keeps_its_arrays(
     new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], large: NDArray[np.float32]
 ) -> None:
-    # Large enough for the device to write into the array itself, after nobody else has it.
+    # The device writes into the array itself, after nobody else has it.
     renderer = new_renderer()
-    image = large  # 1 MiB at least
+    image = large
     expected = renderer.apply(image, LONG, attachments="final")["final"]
     renderer.apply(image[:8, :8], LONG)
     alarm(0.1)
@@ -435,8 +443,12 @@ if child == 0:
             else:
                 raise AssertionError("the child used its parent's device")
         assert not renderer.closed
-        with vkbloom.Renderer(validation=True) as own:
-            np.testing.assert_array_equal(own.apply(image)["final"], right)
+        try:
+            with vkbloom.Renderer(validation=True) as own:
+                np.testing.assert_array_equal(own.apply(image)["final"], right)
+        except vkbloom.Error as error:
+            # Drivers of GPUs may open no device after a fork.
+            assert renderer.info.type != "cpu" and '"spawn"' in str(error), error
         if sys.argv[1] == "close":
             renderer.close()
             assert renderer.closed

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from vkbloom import Renderer
+from tests.core.builds import ROOT, compiler, require_header
+from vkbloom import AdapterInfo
 
-ROOT = Path(__file__).resolve().parents[2]
 SOURCE = Path(__file__).with_name("lesser_device.c")
 
 # Where the validation layer is, which must be found first to lie above the one of these tests.
@@ -28,7 +27,6 @@ EXPLICIT_LAYERS = tuple(
 )
 
 pytestmark = [
-    pytest.mark.skipif(os.name == "nt", reason="the layer is built as on Unix"),
     pytest.mark.skipif(
         "VKBLOOM_SANITIZED" in os.environ, reason="another process, whose core is not sanitized"
     ),
@@ -49,12 +47,12 @@ def too_large(most: int) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the layer; return the folder of its manifest."""
+    require_header("vulkan/vk_layer.h")
     folder = tmp_path_factory.mktemp("layer")
     library = folder / "lesser_device.so"
-    compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     subprocess.run(
         [
-            *(*compiler.split(), "-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"),
+            *(*compiler(), "-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"),
             *("-fvisibility=hidden", str(SOURCE), "-o", str(library)),
         ],
         check=True,
@@ -73,10 +71,9 @@ def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def name() -> str:
+def name(software: AdapterInfo) -> str:
     """A name that finds the software adapter also where it is no longer one."""
-    with Renderer("software") as renderer:
-        return renderer.info.name
+    return software.name
 
 
 WORK = ("-m", "tests.core.lesser_work")
@@ -178,6 +175,50 @@ def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> No
     assert render["status"] == "ok"
     assert "the device does not time its passes" in render["found"]
     assert findings["validation layer"]["status"] == "ok"
+
+
+# Prints what is raised where Ctrl-C and a message of the validation layer come in the same wait.
+INTERRUPTED = """
+import os
+import numpy as np
+import vkbloom
+
+exposures = iter(range(9))
+
+def frame():
+    renderer.apply(np.zeros((8, 8, 3), np.float32), vkbloom.Separable(exposure=next(exposures)))
+
+def attempt(call, lesser):
+    os.environ["VKBLOOM_LESSER"] = lesser
+    try:
+        call()
+    except BaseException as error:
+        print(type(error).__name__, error)
+    else:
+        print("nothing")
+
+renderer = vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True)
+attempt(frame, "")
+attempt(frame, "patience")
+attempt(frame, "")
+attempt(frame, "")
+attempt(frame, "patience")
+attempt(renderer.close, "patience")
+attempt(renderer.close, "")
+print(renderer.closed)
+"""
+
+
+def test_an_interruption_is_raised_before_what_validation_says(layer: Path, name: str) -> None:
+    """Once the ValidationError replaced the exception of the signal's handler: a SystemError."""
+    done = run(layer, name, "", ("-c", INTERRUPTED))
+    assert done.returncode == 0, done.stderr
+    lines = [line.split(" (")[0].strip() for line in done.stdout.splitlines()]
+    objection = "ValidationError an objection"
+    assert lines == [
+        *("nothing", "KeyboardInterrupt", objection, "nothing"),
+        *("KeyboardInterrupt", "KeyboardInterrupt", objection, "True"),
+    ]
 
 
 def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:

@@ -134,12 +134,12 @@ Measured = dict[str, dict[str, float]]  # what tools/renderer_memory.py prints
 
 @pytest.fixture(scope="module")
 def grown() -> Measured:
-    """What 200 renderers and 4,000 frames leave behind."""
+    """What 100 renderers and 200 frames leave behind."""
     if os.environ.get("VKBLOOM_SANITIZED"):
         pytest.skip("a sanitizer's own heap is not what is measured")
     tool = Path(__file__).resolve().parents[2] / "tools" / "renderer_memory.py"
     done = subprocess.run(
-        [sys.executable, str(tool), "200"], capture_output=True, text=True, check=True
+        [sys.executable, str(tool), "100"], capture_output=True, text=True, check=True
     )
     measured: Measured = json.loads(done.stdout)
     return measured

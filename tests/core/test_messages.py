@@ -4,34 +4,22 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.core.builds import ROOT, compiler, volk_folder
+from vkbloom import AdapterInfo
 
 
-@pytest.mark.skipif(os.name == "nt", reason="built as on Unix")
 @pytest.mark.skipif("VKBLOOM_SANITIZED" in os.environ, reason="has a core of its own, unsanitized")
-def test_each_device_gets_its_own(tmp_path: Path) -> None:
+def test_each_device_gets_its_own(tmp_path: Path, software: AdapterInfo) -> None:
     """In the core without Python, where a test can misuse Vulkan (messages.c)."""
     program = tmp_path / "messages"
-    volk = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import setuptools; setuptools.setup = lambda **_: None\n"
-            "import setup; print(setup.volk_folder())",
-        ],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.strip()
+    volk = volk_folder()
     subprocess.run(
         [
-            *os.environ.get("CC", "cc").split(),
+            *compiler(),
             *("-std=c11", "-Wall", "-Wextra", "-Werror", "-DVK_NO_PROTOTYPES"),
             *("-Icsrc", "-I.", f"-I{volk}", *map(str, ROOT.glob("csrc/vulkan/*.c"))),
             *("tests/core/messages.c", "-o", str(program), "-lm", "-ldl", "-lpthread"),

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.core.builds import compiler, core_with_faults, succeed
 
 # Its levels are not exactly twice as large as the next, for which the shaders have variants.
 IMAGE = """
@@ -107,26 +105,10 @@ setup.write_spirv()
 """
 
 
-def succeed(tree: Path, *command: str | Path) -> None:
-    # Not optimized: the compiler takes most of the time.
-    environment = {**os.environ, "CFLAGS": "-O0"}
-    done = subprocess.run(
-        command, cwd=tree, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A tree with everything built, without a mutation."""
-    tree = tmp_path_factory.mktemp("whole") / "tree"
-    for folder in ("csrc", "shaders", "python"):
-        ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__", "*.egg-info")
-        shutil.copytree(ROOT / folder, tree / folder, ignore=ignored)
-    for name in ("setup.py", "pyproject.toml", "README.md"):
-        shutil.copy(ROOT / name, tree / name)
-    succeed(tree, sys.executable, "setup.py", "--quiet", "build_ext", "--inplace")
-    return tree
+    """A tree with everything built, without a mutation; its faults are not asked for."""
+    return core_with_faults(tmp_path_factory.getbasetemp())
 
 
 def build(mutation: Mutation, whole: Path, tree: Path) -> Path:
@@ -140,9 +122,8 @@ def build(mutation: Mutation, whole: Path, tree: Path) -> Path:
     (core,) = (tree / "python").rglob("_core*.so")
     (spirv,) = (tree / "build").rglob("spirv.o")
     objects = sorted((tree / "build").rglob("*.o"))
-    compiler = os.environ.get("CC", "cc").split()
-    succeed(tree, *compiler, "-fPIC", "-c", "build/spirv/spirv.c", "-o", spirv)
-    succeed(tree, *compiler, "-shared", *objects, "-o", core, "-lm", "-ldl")
+    succeed(tree, *compiler(), "-fPIC", "-c", "build/spirv/spirv.c", "-o", spirv)
+    succeed(tree, *compiler(), "-shared", *objects, "-o", core, "-lm", "-ldl")
     return tree / "python"
 
 

@@ -64,7 +64,8 @@ def test_a_plan_of_an_image_is_what_runs(
 
 @pytest.mark.parametrize("shading", ["forward", "deferred"])
 def test_a_plan_of_a_scene_is_what_runs(scene: Scene, shading: Any) -> None:
-    for method in METHODS.values():
+    # Each method in one of both; the passes of a scene do not follow from it.
+    for method in list(METHODS.values())[shading == "deferred" :: 2]:
         # A renderer that has rendered nothing.
         with Renderer() as renderer:
             plan = renderer.plan(scene, method, SIZE, shading=shading)

@@ -25,6 +25,7 @@ DEFAULTS = {
     "threshold": None,
     "knee": 0.0,
     "composite": "add",
+    "alpha": "keep",
     "intensity": 1.0,
     "tonemap": "none",
     "exposure": 0.0,
@@ -194,7 +195,7 @@ def test_a_whole_number_is_needed(name: str) -> None:
         make(**{name: low + 0.5})
 
 
-@pytest.mark.parametrize("name", ["composite", "tonemap", "encoding", "texel", "format"])
+@pytest.mark.parametrize("name", ["composite", "alpha", "tonemap", "encoding", "texel", "format"])
 @pytest.mark.parametrize(
     "value",
     ["None", "ADD", "", 0, ["add"], b"add", np.array("add"), np.array(["add"]), np.zeros(2)],
@@ -205,7 +206,7 @@ def test_a_name_is_one_of_a_list(name: str, value: object) -> None:
     assert repr(value) in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["composite", "tonemap", "encoding", "texel"])
+@pytest.mark.parametrize("name", ["composite", "alpha", "tonemap", "encoding", "texel"])
 def test_a_choice_cannot_be_none(name: str) -> None:
     with pytest.raises((TypeError, ValueError), match=rf"^{name}: "):
         make(**{name: None})

@@ -15,7 +15,7 @@ import pytest
 
 import pytest_vkbloom
 import vkbloom
-from vkbloom import reductions, reference, testing
+from vkbloom import psf, reductions, reference, testing
 
 # Exceptions are documented in the core.
 WITHOUT_EXAMPLE = {
@@ -46,17 +46,20 @@ def examples_in(module: ModuleType) -> list[doctest.DocTest]:
 
 
 @pytest.mark.parametrize("name", list(modules()))
-def test_examples_of_a_module(name: str) -> None:
+def test_examples_of_a_module(name: str, request: pytest.FixtureRequest) -> None:
     module = importlib.import_module(name)
     report: list[str] = []
     runner = doctest.DocTestRunner(optionflags=FLAGS, verbose=False)
-    for test in examples_in(module):
+    tests = examples_in(module)
+    if any('"software"' in one.source for test in tests for one in test.examples):
+        request.getfixturevalue("software")  # skips where there is none
+    for test in tests:
         runner.run(test, out=report.append)
     assert runner.failures == 0, "".join(report)
 
 
 def public() -> Iterator[Any]:
-    for owner in (vkbloom, testing, reference, reductions):
+    for owner in (vkbloom, testing, reference, reductions, psf):
         for name in owner.__all__:
             member = getattr(owner, name)
             is_documented = inspect.isclass(member) or inspect.isfunction(member)

@@ -384,9 +384,8 @@ class TestWrite:
         assert [*tmp_path.iterdir()] == []
 
 
-def test_a_photo_through_the_renderer(tmp_path: Path) -> None:
+def test_a_photo_through_the_renderer(renderer: vkbloom.Renderer, tmp_path: Path) -> None:
     store_png(tmp_path / "a.png", levels(21, 33, 3))
-    with vkbloom.Renderer("software") as renderer:
-        final = renderer.apply(vkbloom.read(tmp_path / "a.png"), vkbloom.BevyBloom())["final"]
+    final = renderer.apply(vkbloom.read(tmp_path / "a.png"), vkbloom.BevyBloom())["final"]
     made = vkbloom.read(vkbloom.write(tmp_path / "b.png", final))
     assert np.abs(encode_srgb(made) - encode_srgb(np.clip(final, 0, 1))).max() <= 0.502 / 255

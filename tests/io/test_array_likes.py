@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,12 +14,6 @@ import vkbloom
 from vkbloom.checks import check_image
 
 IMAGE = np.random.default_rng(2).random((5, 7, 3), dtype=np.float32)
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[vkbloom.Renderer]:
-    with vkbloom.Renderer("software") as made:
-        yield made
 
 
 class Viewed:

@@ -33,7 +33,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address s
 )
 def test_a_short_run(target: str, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, str(RUN), target, "--plain", "--seconds", "2"],
+        [sys.executable, str(RUN), target, "--plain", "--seconds", "1"],
         cwd=tmp_path,
         capture_output=True,
         text=True,

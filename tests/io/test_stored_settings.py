@@ -53,11 +53,12 @@ class TestSettings:
 class TestFrames:
     @pytest.mark.parametrize("name", ["a.exr", "a.png", "a.tif", "folder"])
     @pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
-    def test_come_back(self, tmp_path: Path, name: str, dtype: str) -> None:
+    def test_come_back(
+        self, renderer: vkbloom.Renderer, tmp_path: Path, name: str, dtype: str
+    ) -> None:
         pytest.importorskip("OpenImageIO")
         image = (IMAGE * 255).astype(dtype) if dtype == "uint8" else IMAGE.astype(dtype)
-        with vkbloom.Renderer("software") as renderer:
-            frames = renderer.apply(image, vkbloom.Pyramid(levels=2, threshold=0.3))
+        frames = renderer.apply(image, vkbloom.Pyramid(levels=2, threshold=0.3))
         frames.save(tmp_path / name)
         again = vkbloom.Frames.load(tmp_path / name)
         assert list(again) == list(frames)
@@ -69,10 +70,11 @@ class TestFrames:
         assert again.info == frames.info
 
     @pytest.mark.parametrize("name", ["a.exr", "a.png", "a.tif", "folder"])
-    def test_a_scene_with_depth(self, tmp_path: Path, name: str) -> None:
+    def test_a_scene_with_depth(
+        self, renderer: vkbloom.Renderer, tmp_path: Path, name: str
+    ) -> None:
         pytest.importorskip("OpenImageIO")
-        with vkbloom.Renderer("software") as renderer:
-            frames = renderer.render(vkbloom.Scene.ufo(), size=(16, 9))
+        frames = renderer.render(vkbloom.Scene.ufo(), size=(16, 9))
         frames.save(tmp_path / name)
         again = vkbloom.Frames.load(tmp_path / name)
         assert {key: (a.dtype, a.shape) for key, a in again.items()} == {

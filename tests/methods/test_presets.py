@@ -30,7 +30,7 @@ from vkbloom import (
 Array = NDArray[Any]
 
 # (width, height): odd, even, tall, wide, smaller than the chains are long.
-SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (333, 217)]
+SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (211, 157)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 PUBLISHED = sorted(set(presets) - {"tutorial", "outline", "deferred"})
 
@@ -395,8 +395,10 @@ def test_an_anamorphic_bloom_is_stretched(
     assert (across / down if stretched == "x" else down / across) > 1.5
 
 
-@pytest.mark.parametrize("size", [(800, 450), (800, 449), (799, 450)])
-@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize(
+    ("size", "smooth"),
+    [((800, 450), True), ((800, 450), False), ((800, 449), True), ((799, 450), True)],
+)
 def test_hdrps_cubic_filter_is_for_larger_frames(
     renderer: Renderer, size: tuple[int, int], smooth: bool
 ) -> None:

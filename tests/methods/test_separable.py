@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from skimage.metrics import structural_similarity
 
 from tests.screens import noise, screen
 from tests.tolerance import colours
@@ -169,12 +168,8 @@ def test_the_saucers_glow(renderer: Renderer, scene: Scene, blur_scale: float, t
 
 
 def similarity(one: NDArray[np.float64], other: NDArray[np.float64], highest: float) -> float:
-    # scikit-image has no types.
-    return float(
-        structural_similarity(  # type: ignore[no-untyped-call]
-            one, other, data_range=highest, channel_axis=2
-        )
-    )
+    metrics = pytest.importorskip("skimage.metrics", reason="scikit-image is not installed")
+    return float(metrics.structural_similarity(one, other, data_range=highest, channel_axis=2))
 
 
 @pytest.mark.parametrize("blur_scale", [1.0, 1.37])

@@ -16,6 +16,12 @@ from vkbloom.testing import FrameRegression
 SIZE = (96, 54)
 
 
+@pytest.fixture(autouse=True)
+def drawn_by_lavapipe(renderer: Renderer) -> None:
+    if "llvmpipe" not in renderer.info.name:
+        pytest.skip("lavapipe drew the references: edges and depths of another device differ")
+
+
 @pytest.mark.parametrize("preset", ["tutorial", "outline"])
 def test_forward(
     renderer: Renderer, scene: Scene, frame_regression: FrameRegression, preset: str

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from vkbloom import AdapterInfo
+
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "testing.md"
 
 
@@ -19,7 +21,9 @@ def blocks() -> dict[str, str]:
     return dict(found)
 
 
-def test_guide(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_guide(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, software: AdapterInfo
+) -> None:
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     code = blocks()
     for name, text in code.items():

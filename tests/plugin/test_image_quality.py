@@ -7,10 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from vkbloom import AdapterInfo
+
 SUITE = Path(__file__).resolve().parents[2] / "examples" / "image_quality"
 
 
-def test_a_wrong_weight(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_weight(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, software: AdapterInfo
+) -> None:
     """The tests themselves, unchanged, are collected by this repository's own configuration."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     for name in ("conftest.py", "engine.py", "test_engine.py"):

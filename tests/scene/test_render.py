@@ -13,7 +13,6 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
-from skimage.metrics import structural_similarity
 
 import vkbloom
 from tests.screens import noise, screen
@@ -55,9 +54,8 @@ def test_the_originals_frames(renderer: Renderer, shared_data: Path, name: str) 
     image = rgb(frames[name])
     assert image.shape == expected.shape
     assert expected.max() > 200
-    similarity = structural_similarity(  # type: ignore[no-untyped-call]  # it has no types
-        image, expected, data_range=255, channel_axis=2
-    )
+    metrics = pytest.importorskip("skimage.metrics", reason="scikit-image is not installed")
+    similarity = metrics.structural_similarity(image, expected, data_range=255, channel_axis=2)
     assert similarity >= 0.999
     apart = np.abs(image.astype(int) - expected).max(axis=2)
     assert (apart <= 2).mean() >= 0.995
@@ -189,8 +187,11 @@ def test_a_small_frame_sees_the_skys_mip_levels(
     camera = Camera(position=(0.0, 0.0, 1e4), rotation=(0.0, 0.0, 0.0), fov=90.0)
     sky = dataclasses.replace(scene, skybox=Cubemap(tuple(levels)), camera=camera)
     seen = renderer.render(sky, Separable(bloom=False), (side, side), shading="deferred")["albedo"]
-    # Linear between levels; devices approximate which, lavapipe to 0.04 here.
-    np.testing.assert_allclose(rgb(seen), level, atol=0.1)
+    # Linear between levels; devices approximate which, lavapipe to 0.04 here. The last column and
+    # row of an odd side share their quads with fragments beyond the face, which have other
+    # derivatives.
+    inner = rgb(seen)[: side // 2 * 2, : side // 2 * 2]
+    np.testing.assert_allclose(inner, level, atol=0.1)
 
 
 def test_no_sky_is_black(renderer: Renderer, scene: Scene) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from .image import Storage
 from .pyramid import downsample, groups
 from .sampling import Array
-from .threshold import luminance, soften
+from .threshold import luminance, masked, soften
 from .upsampling import combine, flat_gain, tent
 
 __all__ = ["gain", "passes"]
@@ -46,7 +46,11 @@ class BevySettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: BevySettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: BevySettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -59,12 +63,14 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels.
+        1, 3 or, with alpha, 4 channels.
     settings : vkbloom.BevyBloom
     size : (int, int)
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies down_0 after the threshold.
 
     Returns
     -------
@@ -79,7 +85,7 @@ def passes(
         return tent(image, size, *scale)
 
     level = (max(1, math.floor(width * limit / height + 0.5)), limit)
-    framebuffers = {"down_0": store(_prefilter(glow, level, settings))}
+    framebuffers = {"down_0": store(masked(_prefilter(glow, level, settings), mask))}
     downs = [framebuffers["down_0"]]
     for k in range(1, _level_count(settings)):
         level = (max(1, level[0] // 2), max(1, level[1] // 2))
@@ -109,7 +115,9 @@ def _prefilter(image: Array, size: tuple[int, int], settings: BevySettings) -> A
         part = share * mean
         grey = part if part.shape[2] == 1 else luminance(part)
         total += part / (1 + np.maximum(grey, 0.0) / 4)
-    return _threshold(np.maximum(total, 1e-4), settings)
+    # Alpha has no floor.
+    total[..., :3] = np.maximum(total[..., :3], 1e-4)
+    return _threshold(total, settings)
 
 
 def _threshold(rgb: Array, settings: BevySettings) -> Array:

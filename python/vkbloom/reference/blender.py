@@ -14,6 +14,7 @@ import numpy as np
 from .image import Storage
 from .pyramid import downsample
 from .sampling import Array, sample
+from .threshold import brightest, masked
 from .upsampling import combine, linear, tent_of_target
 
 __all__ = ["gain", "passes"]
@@ -42,7 +43,11 @@ class BlenderSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: BlenderSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: BlenderSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -60,6 +65,8 @@ def passes(
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies down_0 after the threshold.
 
     Returns
     -------
@@ -68,7 +75,7 @@ def passes(
     """
     height, width, _ = glow.shape
     count = max(1, math.floor(math.log2(max(1.0, min(width, height) * settings.size))))
-    downs = [store(_highlights(glow, settings))]
+    downs = [store(masked(_highlights(glow, settings), mask))]
     for k in range(1, count):
         width, height = max(1, width // 2), max(1, height // 2)
         shrink = _weighted_taps if k == 1 else _plain_taps
@@ -100,7 +107,7 @@ def _highlights(rgb: Array, settings: BlenderSettings) -> Array:
         return rgb
     low = settings.threshold
     high = math.inf if settings.maximum is None else low + settings.maximum
-    value = rgb.max(axis=-1, keepdims=True)
+    value = brightest(rgb)
     # So narrow that nothing of the soft parts lies below 0 or beyond the other end.
     at_low = min(settings.smoothness, low, high - low)
     at_high = min(settings.smoothness, high, high - low)
@@ -133,7 +140,7 @@ def _weighted_taps(image: Array, size: tuple[int, int]) -> Array:
         total, shares = np.zeros_like(result), np.zeros((size[1], size[0], 1))
         for x, y in places:
             tap = sample(image, size, [(float(x), 1.0)], [(float(y), 1.0)])
-            share = 1 / (1 + np.maximum(tap.max(axis=-1, keepdims=True), 0))
+            share = 1 / (1 + np.maximum(brightest(tap), 0))
             total += share * tap
             shares += share
         result += group_share * total / shares

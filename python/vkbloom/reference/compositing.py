@@ -23,6 +23,8 @@ class CompositeSettings(Protocol):
     @property
     def bloom(self) -> bool: ...
     @property
+    def alpha(self) -> str: ...
+    @property
     def composite(self) -> str: ...
     @property
     def intensity(self) -> float: ...
@@ -49,6 +51,8 @@ def composite(
     bloom: NDArray[Any] | None,
     settings: CompositeSettings,
     dtype: DTypeLike | None = None,
+    *,
+    share: float | Array = 1.0,
 ) -> Array:
     """Return the final image: composite, exposure, tone map, encoding, dither, in this order.
 
@@ -56,7 +60,11 @@ def composite(
     and "screen" 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies
     by 2^e. `vkbloom.GodotBloom` has composites of its own, with the exposure before. Dither rounds
     uint8 to floor(255 c + n) / 255 with c clamped to 0..1 and n a noise of 0..1, and leaves other
-    types alone. All of it works on rgb; alpha is the scene's.
+    types alone. All of it works on rgb. ``settings.alpha`` is what becomes of the scene's alpha a:
+    "keep" a; "max" max(a, clamp(max over rgb of i b, 0, 1)); "blur", with the bloom's alpha b_a,
+    1 - (1 - a)(1 - clamp(i b_a, 0, 1)).
+
+    Where the bloom came of a share of the scene only, "mix" is s + i (b - share s).
 
     A component of the scene that is NaN or infinite stays so. To the tone maps that mix the
     channels it counts as 0.
@@ -70,6 +78,8 @@ def composite(
     settings : vkbloom.Settings
     dtype : dtype, optional
         Of the final image; the scene's by default. The result is clamped to what it holds.
+    share : float or ndarray, shape (H, W, 1)
+        Of the scene in the bloom's source: the mask, or 0 where an emission took its place.
 
     Returns
     -------
@@ -99,7 +109,7 @@ def composite(
     check_settings(settings)
     image = as_float(scene, "scene", (3, 4))
     stored = np.asarray(scene).dtype if dtype is None else np.dtype(dtype)
-    original = image[..., :3]
+    original, alpha = image[..., :3], image[..., 3:]
     rgb = np.where(np.isfinite(original), original, 0.0)
     scale, curve = 2.0**settings.exposure, TONE_MAPS[settings.tonemap]
     if not settings.bloom:
@@ -107,7 +117,8 @@ def composite(
     elif bloom is None:
         raise TypeError("bloom must be an array where settings.bloom is True, not None")
     else:
-        glow = as_float(bloom, "bloom", (3, 4))[..., :3]
+        light = as_float(bloom, "bloom", (3, 4))
+        glow = light[..., :3]
         if glow.shape != rgb.shape:
             raise ValueError(
                 f"bloom must have the scene's height and width {image.shape[:2]}, "
@@ -115,30 +126,50 @@ def composite(
             )
         if settings.method == "godot":
             # Its glow was exposed before the threshold.
-            rgb = _godots(rgb * scale, glow, settings, curve)
+            rgb = _godots(rgb * scale, glow, settings, curve, share)
         else:
-            rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity) * scale)
+            rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
+        alpha = _blend_alpha(alpha, light, settings)
     rgb = ENCODINGS[settings.encoding](rgb)
-    rgb = storage(format_of(np.empty(0, stored), None))(rgb)
+    store = storage(format_of(np.empty(0, stored), None))
+    rgb = store(rgb)
     if settings.dither and stored == np.uint8:
         rgb = np.floor(255 * rgb + _noise(rgb.shape[:2], settings.dither_seed)) / 255
-    rgb = np.where(np.isfinite(original), rgb, original)
-    return np.concatenate([rgb, image[..., 3:]], axis=-1)
+    result = np.concatenate([rgb, store(alpha)], axis=-1)
+    kept: Array = np.where(np.isfinite(image), result, image)
+    return kept
 
 
-def _blend(scene: Array, bloom: Array, mode: str, intensity: float) -> Array:
+def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Array:
+    """Return the alpha of the final image, (H, W, 1), or (H, W, 0) where the scene has none."""
+    if settings.alpha == "max":
+        brightest = settings.intensity * bloom[..., :3].max(axis=-1, keepdims=True)
+        larger: Array = np.maximum(alpha, np.clip(brightest, 0, 1))
+        return larger
+    if settings.alpha == "blur":
+        if bloom.shape[2] == 3:
+            raise ValueError('bloom must have 4 channels where settings.alpha is "blur", not 3')
+        return 1 - (1 - alpha) * (1 - np.clip(settings.intensity * bloom[..., 3:], 0, 1))
+    return alpha
+
+
+def _blend(scene: Array, bloom: Array, mode: str, intensity: float, share: float | Array) -> Array:
     """Return scene and bloom as one image."""
     if mode == "add":
         return scene + intensity * bloom
     if mode == "mix":
-        return scene + (bloom - scene) * intensity
+        return scene + (bloom - share * scene) * intensity
     if mode == "screen":
         return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(intensity * bloom, 0, 1))
     raise ValueError(f'composite must be "add", "mix" or "screen", not {mode!r}')
 
 
 def _godots(
-    scene: Array, bloom: Array, settings: CompositeSettings, curve: Callable[[Array], Array]
+    scene: Array,
+    bloom: Array,
+    settings: CompositeSettings,
+    curve: Callable[[Array], Array],
+    share: float | Array,
 ) -> Array:
     """Return scene and bloom past the tone map, as Godot blends them.
 
@@ -157,7 +188,7 @@ def _godots(
         return curve(scene + glow - scene * glow / white)
     if settings.composite == "replace":
         return curve(glow)
-    return curve(_blend(scene, bloom, settings.composite, settings.intensity))
+    return curve(_blend(scene, bloom, settings.composite, settings.intensity, share))
 
 
 def _noise(size: tuple[int, int], seed: int) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from .image import Storage
 from .pyramid import downsample
 from .sampling import Array, sample
+from .threshold import brightest, masked
 from .upsampling import combine, linear, tent_of_target
 
 __all__ = ["gain", "passes"]
@@ -34,7 +35,11 @@ class FilamentSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: FilamentSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: FilamentSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -53,6 +58,8 @@ def passes(
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies what the threshold lets through.
 
     Returns
     -------
@@ -69,9 +76,10 @@ def passes(
     image, threshold = glow, settings.threshold
     while first[0] * 2 < width or first[1] * 2 < height:
         width, height = max(1, width // 2), max(1, height // 2)
-        image = store(_reduce(image, (width, height), threshold, settings.highlight))
-        threshold = None
-    downs = [store(_reduce(image, first, threshold, settings.highlight))]
+        image = _reduce(image, (width, height), threshold, settings.highlight)
+        image = store(masked(image, mask))
+        threshold = mask = None
+    downs = [store(masked(_reduce(image, first, threshold, settings.highlight), mask))]
     longer = math.floor(max(top * width_of_frame / height_of_frame, top))
     count = min(settings.levels, math.floor(math.log2(longer)) + 1)
     for k in range(1, count):
@@ -118,15 +126,18 @@ def _reduce(
             tap = columns.swapaxes(0, 1)
             share = row_share * column_share.swapaxes(0, 1)
             if threshold is not None:
-                share = share / (1 + np.maximum(tap.max(axis=-1, keepdims=True), 0))
+                share = share / (1 + np.maximum(brightest(tap), 0))
             total += share * tap
             shares += share
     mean: Array = total / shares
     if threshold is None:
         return mean
-    kept = np.maximum(mean - threshold, 0)
-    compressed: Array = kept / (1 + kept.max(axis=-1, keepdims=True) / highlight)
-    return compressed
+    kept = np.maximum(mean[..., :3] - threshold, 0)
+    compressed = kept / (1 + brightest(kept) / highlight)
+    # The threshold subtracts: alpha takes the factor of the brightest channel.
+    value = brightest(mean)
+    factor = np.where(value > 0, brightest(compressed) / np.where(value > 0, value, 1), 0)
+    return np.concatenate([compressed, factor * mean[..., 3:]], axis=-1)
 
 
 def _pairs(image: Array, count: int) -> list[tuple[Array, Array]]:

@@ -24,9 +24,9 @@ from . import (
     urp,
 )
 from .compositing import CompositeSettings, check_settings, composite
-from .image import Storage, as_float, finite, format_of, storage
+from .image import as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
-from .threshold import apply_threshold
+from .threshold import apply_threshold, masked
 
 __all__ = ["apply", "blur", "gain", "passes"]
 
@@ -49,8 +49,9 @@ class Settings(CompositeSettings, Protocol):
 
 
 class _Method(NamedTuple):
-    # (glow, settings, size of the bloom, storing) -> framebuffers after the glow
-    passes: Callable[[Array, Any, tuple[int, int], Storage], dict[str, Array]]
+    # (glow, settings, size of the bloom, storing) -> framebuffers after the glow; of a published
+    # method also with a mask at the end.
+    passes: Callable[..., dict[str, Array]]
     gain: Callable[..., float]
     # Reduces and thresholds the frame in its own way, which its passes begin with.
     published: bool = False
@@ -74,12 +75,24 @@ _METHODS = {
 }
 
 
-def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
+def apply(
+    image: NDArray[Any],
+    settings: Settings,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+) -> dict[str, Array]:
     """Return what `vkbloom.Renderer.apply` returns, computed in float64.
 
     The image is reduced to the size of the bloom buffers by bilinear sampling at their pixel
     centres, thresholded, blurred and composited. Components that are NaN or infinite count as
     0 in the bloom and stay as they are in "final".
+
+    An emission takes the image's place up to the composite. A mask is reduced like the image and
+    multiplies what the threshold lets through; published methods, which apply their threshold
+    while they downsample, read it at the pixel centres of the image that this pass writes. With
+    ``settings.alpha`` "blur" alpha is a fourth channel of all this: the weights follow from rgb,
+    and bounds of colours (such as a clamp against overflow) are not alpha's.
 
     Bloom buffers of the format "rgba8unorm" are clamped to 0..1 wherever they are stored, those
     of "rgba16float" to +-65504; nothing is rounded to a format's steps, but in "rg11b10ufloat".
@@ -92,21 +105,26 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
         buffers follows from it unless ``settings.format`` names one; that of float64 is
         "rgba32float".
     settings : vkbloom.Settings
+    mask : ndarray, shape (H, W), optional
+        uint8 (read as value / 255), bool or floats of 0 to 1.
+    emission : ndarray, optional
+        Of the image's shape and dtype.
 
     Returns
     -------
     dict of str to ndarray of float64
         In the order of the data flow: "glow", then the blur's (`passes`), then "final". Real
         units: 0..1 for what a device stores as unorm. Bloom buffers have 4 channels, with
-        alpha 1; "final" has the image's channels and its alpha. With ``settings.bloom`` off,
-        "final" alone.
+        alpha 1 but for ``settings.alpha`` "blur"; "final" has the image's channels. With
+        ``settings.bloom`` off, "final" alone.
 
     Raises
     ------
     TypeError
         An image of another dtype, or `settings` that are none.
     ValueError
-        An image of another shape.
+        An image of another shape; a mask of another size or with other values; an emission of
+        another shape or dtype; ``settings.alpha`` "max" or "blur" without an alpha.
 
     See Also
     --------
@@ -129,17 +147,28 @@ def apply(image: NDArray[Any], settings: Settings) -> dict[str, Array]:
     method = _method(settings)
     scene = as_float(image, "image", (3, 4))
     dtype = np.asarray(image).dtype
+    height, width, channels = scene.shape
+    format = format_of(image, settings.format)
+    if settings.alpha != "keep" and (channels == 3 or format == "rg11b10ufloat"):
+        raise ValueError(f'alpha must be "keep" without a fourth channel, not {settings.alpha!r}')
+    source = scene if emission is None else _emission(image, emission)
+    weights = None if mask is None else as_mask(mask, (width, height))
     if not settings.bloom:
         return {"final": composite(scene, None, settings, dtype)}
-    height, width, _ = scene.shape
-    store = storage(format_of(image, settings.format))
-    reduced = sample(finite(scene[..., :3]), _bloom_size(settings, (width, height)))
-    threshold = None if method.published else settings.threshold
-    kept = apply_threshold(reduced, threshold, settings.knee)
-    glow = store.end(kept) if method.published else store(kept)
-    blurred = method.passes(glow, settings, (width, height), store)
-    framebuffers = {name: _with_alpha(rgb) for name, rgb in {"glow": glow, **blurred}.items()}
-    framebuffers["final"] = composite(scene, framebuffers["bloom"], settings, dtype)
+    store = storage(format)
+    channels = 4 if settings.alpha == "blur" else 3
+    reduced = sample(finite(source[..., :channels]), _bloom_size(settings, (width, height)))
+    if method.published:
+        glow = store.end(reduced)
+        blurred = method.passes(glow, settings, (width, height), store, weights)
+    else:
+        glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), weights))
+        blurred = method.passes(glow, settings, (width, height), store)
+    framebuffers = {name: _with_alpha(part) for name, part in {"glow": glow, **blurred}.items()}
+    # What of the scene the bloom came of.
+    share = 0.0 if emission is not None else 1.0 if weights is None else weights
+    bloom = framebuffers["bloom"]
+    framebuffers["final"] = composite(scene, bloom, settings, dtype, share=share)
     return framebuffers
 
 
@@ -148,6 +177,8 @@ def passes(
     settings: Settings,
     size: tuple[int, int] | None = None,
     format: str | None = None,
+    *,
+    mask: NDArray[Any] | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers that the blur makes of a glow: no threshold, no composite.
 
@@ -155,8 +186,9 @@ def passes(
     ----------
     glow : ndarray, shape (H, W, C)
         What the bloom buffers begin with, at their size: uint8 (read as value / 255), float16,
-        float32 or float64. A fourth channel of four is alpha and comes out as 1; otherwise
-        each channel is blurred by itself. NaN and infinity count as 0.
+        float32 or float64. A fourth channel of four is alpha and comes out as 1, but for
+        ``settings.alpha`` "blur"; otherwise each channel is blurred by itself. NaN and infinity
+        count as 0.
     settings : vkbloom.Settings
         Those of the blur are used, and `format`.
     size : (int, int), optional
@@ -165,6 +197,9 @@ def passes(
     format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"}, optional
         Of the bloom buffers; by default that of the settings, and where that is None, the one
         of the glow's dtype.
+    mask : ndarray, shape (height, width), optional
+        Multiplies what passes the threshold of a published method, as in `apply`. The glow of
+        other methods has come past threshold and mask.
 
     Returns
     -------
@@ -197,10 +232,15 @@ def passes(
     if size is not None and min(size) < 1:
         raise ValueError(f"size must be (width, height) of at least 1, not {size}")
     store = storage(format_of(glow, settings.format if format is None else format))
-    has_alpha = channels == 4
+    has_alpha = channels == 4 and settings.alpha != "blur"
     colours = values[..., :3] if has_alpha else values
     colours = store.end(colours) if method.published else store(colours)
-    framebuffers = method.passes(colours, settings, size or (width, height), store)
+    size = size or (width, height)
+    if method.published:
+        weights = None if mask is None else as_mask(mask, size)
+        framebuffers = method.passes(colours, settings, size, store, weights)
+    else:
+        framebuffers = method.passes(colours, settings, size, store)
     if not has_alpha:
         return framebuffers
     return {name: _with_alpha(rgb) for name, rgb in framebuffers.items()}
@@ -293,6 +333,19 @@ def _bloom_size(settings: Settings, frame: tuple[int, int]) -> tuple[int, int]:
     return width, height
 
 
-def _with_alpha(rgb: Array) -> Array:
-    """Return rgb with a fourth channel of 1."""
-    return np.concatenate([rgb, np.ones((*rgb.shape[:2], 1))], axis=-1)
+def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
+    """Return an emission in real units."""
+    values = as_float(emission, "emission", (3, 4))
+    kinds = [(part.shape, part.dtype) for part in map(np.asarray, (image, emission))]
+    if kinds[0] != kinds[1]:
+        raise ValueError(
+            f"emission must have the image's shape and dtype {kinds[0]}, not {kinds[1]}"
+        )
+    return values
+
+
+def _with_alpha(image: Array) -> Array:
+    """Return rgb with a fourth channel of 1, four channels as they are."""
+    if image.shape[2] == 4:
+        return image
+    return np.concatenate([image, np.ones((*image.shape[:2], 1))], axis=-1)

@@ -13,6 +13,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
+from .threshold import brightest, masked
 from .upsampling import cubic, linear
 
 __all__ = ["gain", "passes"]
@@ -45,7 +46,11 @@ class GodotSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: GodotSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: GodotSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -60,12 +65,14 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels.
+        1, 3 or, with alpha, 4 channels.
     settings : vkbloom.GodotBloom
     size : (int, int)
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies down_0 after the threshold.
 
     Returns
     -------
@@ -80,7 +87,9 @@ def passes(
     for level, weight in enumerate(_weights(settings)):
         level_size = (max(1, width // 2 >> level), max(1, height // 2 >> level))
         samples = sample(image, level_size)
-        image = store(_first(samples, settings) if level == 0 else _later(samples, settings))
+        first = level == 0
+        image = masked(_first(samples, settings), mask) if first else _later(samples, settings)
+        image = store(image)
         framebuffers[f"down_{level}"] = image
         total += weight * enlarge(image, size)
     framebuffers["bloom"] = store.end(total)
@@ -111,18 +120,21 @@ def _later(samples: Array, settings: GodotSettings) -> Array:
 def _first(samples: Array, settings: GodotSettings) -> Array:
     blurred = _blur(samples / (1 + _luminance(samples, settings)))
     blurred = blurred / (1 - _luminance(blurred, settings))
-    blurred = blurred * settings.strength * 2.0**settings.exposure
+    blurred = blurred * settings.strength
+    # Neither exposure nor cap is alpha's.
+    blurred[..., :3] *= 2.0**settings.exposure
     if settings.threshold is not None:
-        brightest = blurred.max(axis=-1, keepdims=True)
         # A step where the scale is 0, which smoothstep leaves undefined.
-        t = np.clip((brightest - settings.threshold) / max(settings.threshold_scale, 1e-6), 0, 1)
+        t = np.clip(
+            (brightest(blurred) - settings.threshold) / max(settings.threshold_scale, 1e-6), 0, 1
+        )
         blurred = blurred * np.maximum(t * t * (3 - 2 * t), settings.glow_bloom)
-    capped: Array = np.minimum(blurred, settings.luminance_cap)
-    return capped
+    blurred[..., :3] = np.minimum(blurred[..., :3], settings.luminance_cap)
+    return blurred
 
 
 def _luminance(rgb: Array, settings: GodotSettings) -> Array:
-    grey = rgb if rgb.shape[2] == 1 else (rgb * _LUMINANCE).sum(axis=-1, keepdims=True)
+    grey = rgb if rgb.shape[2] == 1 else (rgb[..., :3] * _LUMINANCE).sum(axis=-1, keepdims=True)
     share: Array = np.maximum(grey, 0) / max(settings.luminance_cap, 6)
     return share
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, read_rows, sample
+from .threshold import masked
 from .upsampling import combine, cubic, spline_taps
 
 __all__ = ["gain", "passes"]
@@ -38,7 +39,11 @@ class HdrpSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: HdrpSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: HdrpSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -58,12 +63,14 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels.
+        1, 3 or, with alpha, 4 channels.
     settings : vkbloom.HdrpBloom
     size : (int, int)
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies the prefiltered image.
 
     Returns
     -------
@@ -78,7 +85,7 @@ def passes(
         (max(1, round(across / 2 ** (k + 1))), max(1, round(down / 2 ** (k + 1))))
         for k in range(count)
     ]
-    reduced = store(_prefilter(glow, sizes[0]))
+    reduced = store(masked(_prefilter(glow, sizes[0]), mask))
     downs = [_along_both(reduced, sizes[0], _blur_rows, store)]
     for level in sizes[1:]:
         downs.append(_along_both(downs[-1], level, _shrink_rows, store))
@@ -108,7 +115,7 @@ def _prefilter(image: Array, size: tuple[int, int]) -> Array:
     total, shares = np.zeros((size[1], size[0], image.shape[2])), np.zeros((size[1], size[0], 1))
     for x, y in _PREFILTER_TAPS:
         tap = sample(image, size, [(x, 1.0)], [(y, 1.0)])
-        grey = tap if tap.shape[2] == 1 else (tap * _LUMINANCE).sum(axis=-1, keepdims=True)
+        grey = tap if tap.shape[2] == 1 else (tap[..., :3] * _LUMINANCE).sum(axis=-1, keepdims=True)
         share = 1 / (1 + np.maximum(grey, 0))
         total += share * tap
         shares += share

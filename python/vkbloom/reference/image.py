@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .sampling import Array
 
-__all__ = ["Storage", "as_float", "finite", "format_of", "storage"]
+__all__ = ["Storage", "as_float", "as_mask", "finite", "format_of", "storage"]
 
 _FORMATS = {
     "uint8": "rgba8unorm",
@@ -58,6 +58,34 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
         raise ValueError(f"{name} must have {wanted} channels, not {array.shape[2]}")
     real = array.astype(np.float64)
     return real / 255 if array.dtype == np.uint8 else real
+
+
+def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
+    """Return a mask as values of 0 to 1.
+
+    Parameters
+    ----------
+    mask : ndarray, shape (H, W)
+        uint8 (read as value / 255), bool, or any floats.
+    size : (int, int)
+        The width and height that it must have.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, 1)
+
+    Raises
+    ------
+    ValueError
+        Another size, or a value that is not within 0 to 1.
+    """
+    array = np.asarray(mask)
+    if array.shape != size[::-1]:
+        raise ValueError(f"mask must have the image's shape {size[::-1]}, not {array.shape}")
+    values = array.astype(np.float64) / (255 if array.dtype == np.uint8 else 1)
+    if not ((values >= 0) & (values <= 1)).all():
+        raise ValueError("mask must have values of 0 to 1")
+    return values[..., np.newaxis]
 
 
 def finite(image: Array) -> Array:

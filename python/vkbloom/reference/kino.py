@@ -13,7 +13,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
-from .threshold import soften
+from .threshold import brightest, masked, soften
 from .upsampling import combine, tent
 
 __all__ = ["gain", "passes"]
@@ -33,7 +33,11 @@ class KinoSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: KinoSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: KinoSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -49,6 +53,8 @@ def passes(
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies bright after the threshold.
 
     Returns
     -------
@@ -57,7 +63,7 @@ def passes(
     """
     height, width, _ = glow.shape
     count, step = _count_and_step(settings, height)
-    framebuffers = {"bright": store(_prefilter(glow, settings))}
+    framebuffers = {"bright": store(masked(_prefilter(glow, settings), mask))}
     image, downs = framebuffers["bright"], []
     for k in range(count):
         width, height = max(1, width // 2), max(1, height // 2)
@@ -84,7 +90,8 @@ def _count_and_step(settings: KinoSettings, height: int) -> tuple[int, float]:
 
 
 def _prefilter(image: Array, settings: KinoSettings) -> Array:
-    padded = np.pad(np.minimum(image, 65000), ((1, 1), (1, 1), (0, 0)), mode="edge")
+    kept = np.concatenate([np.minimum(image[..., :3], 65000), image[..., 3:]], axis=-1)
+    padded = np.pad(kept, ((1, 1), (1, 1), (0, 0)), mode="edge")
     kept = padded[1:-1, 1:-1]
     if settings.anti_flicker:
         kept = np.median([kept, padded[1:-1, :-2], padded[1:-1, 2:]], axis=0)
@@ -107,7 +114,7 @@ def _box(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:
             tap = sample(image, size, [(x, 1.0)], [(y, 1.0)])
             share = np.ones_like(shares)
             if firefly_filter:
-                share /= 1 + np.maximum(tap.max(axis=-1, keepdims=True), 0.0)
+                share /= 1 + np.maximum(brightest(tap), 0.0)
             total += share * tap
             shares += share
     return total / shares

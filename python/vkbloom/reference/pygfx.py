@@ -13,7 +13,7 @@ import numpy as np
 from .image import Storage
 from .pyramid import downsample, groups
 from .sampling import Array
-from .threshold import luminance
+from .threshold import luminance, masked
 from .upsampling import combine, linear, tent
 
 __all__ = ["gain", "passes"]
@@ -31,7 +31,11 @@ class PygfxSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: PygfxSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: PygfxSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -43,12 +47,14 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels.
+        1, 3 or, with alpha, 4 channels.
     settings : vkbloom.PygfxBloom
     size : (int, int)
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies down_0.
 
     Returns
     -------
@@ -61,7 +67,8 @@ def passes(
         width, height = max(1, width // 2), max(1, height // 2)
         averaged = settings.karis_average and k == 0
         image = (_averaged if averaged else _plain)(image, (width, height))
-        image = store(np.maximum(image, 0))
+        image = np.maximum(image, 0)
+        image = store(masked(image, mask) if k == 0 else image)
         downs.append(image)
     ones = [1.0] * len(downs)
     return {

@@ -59,7 +59,8 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels (grey or rgb) for the firefly filter, any number without it.
+        1, 3 or 4 channels (grey, rgb or with alpha) for the firefly filter, any number without
+        it.
     settings : vkbloom.Pyramid
     size : (int, int)
         Width and height of the bloom, in pixels.
@@ -74,7 +75,7 @@ def passes(
     Raises
     ------
     ValueError
-        Firefly filter of an image with neither 1 nor 3 channels.
+        Firefly filter of an image with another number of channels.
     """
     height, width, _ = glow.shape
     sizes = level_sizes((width, height), settings.levels)
@@ -135,7 +136,7 @@ def downsample(
     With `firefly_filter` the share of each group is multiplied by 1 / (1 + luminance of the
     group's mean), and the shares are divided by their sum. A negative luminance counts as 0.
     """
-    if firefly_filter and image.shape[2] not in (1, 3):
+    if firefly_filter and image.shape[2] not in (1, 3, 4):
         raise ValueError(
             f"firefly_filter needs an image of 1, 3 or 4 channels, not {image.shape[2]}"
         )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .sampling import Array
+from .sampling import Array, sample
 
-__all__ = ["apply_threshold", "luminance", "soften"]
+__all__ = ["apply_threshold", "brightest", "luminance", "masked", "soften"]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -17,14 +17,35 @@ def luminance(rgb: Array) -> Array:
 
     Parameters
     ----------
-    rgb : ndarray of float64, shape (..., 3)
+    rgb : ndarray of float64, shape (..., 3) or (..., 4)
+        Alpha does not count.
 
     Returns
     -------
     ndarray of float64, shape (..., 1)
     """
-    weighted: Array = (rgb * _LUMINANCE).sum(axis=-1, keepdims=True)
+    weighted: Array = (rgb[..., :3] * _LUMINANCE).sum(axis=-1, keepdims=True)
     return weighted
+
+
+def brightest(image: Array) -> Array:
+    """Return the largest of the colours' channels, (..., 1); a fourth channel is alpha."""
+    largest: Array = image[..., :3].max(axis=-1, keepdims=True)
+    return largest
+
+
+def masked(image: Array, mask: Array | None) -> Array:
+    """Return what passed a threshold times the mask, read bilinearly at the image's pixel centres.
+
+    Parameters
+    ----------
+    image : ndarray of float64, shape (h, w, C)
+    mask : ndarray of float64, shape (H, W, 1), or None
+    """
+    if mask is None:
+        return image
+    height, width, _ = image.shape
+    return image * sample(mask, (width, height))
 
 
 def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
@@ -39,7 +60,8 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
 
     Parameters
     ----------
-    rgb : ndarray of float64, shape (..., 3)
+    rgb : ndarray of float64, shape (..., 3) or (..., 4)
+        Alpha is scaled like the colour.
     threshold : float or None
         In the image's units; None keeps everything.
     knee : float
@@ -47,7 +69,7 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
 
     Returns
     -------
-    ndarray of float64, shape (..., 3)
+    ndarray of float64, of the same shape
     """
     if threshold is None:
         return rgb
@@ -74,7 +96,7 @@ def soften(rgb: Array, threshold: float, half_width: float, divisor: float, leas
     -------
     ndarray of float64, shape (..., C)
     """
-    brightness = rgb.max(axis=-1, keepdims=True)
+    brightness = brightest(rgb)
     soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2 / divisor
     scale: Array = np.maximum(soft, brightness - threshold) / np.maximum(brightness, least)
     return rgb * scale

@@ -13,6 +13,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
+from .threshold import masked
 
 __all__ = ["gain", "passes"]
 
@@ -36,7 +37,11 @@ class UnrealSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: UnrealSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: UnrealSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -49,12 +54,14 @@ def passes(
     Parameters
     ----------
     glow : ndarray of float64, shape (H, W, C)
-        1 or 3 channels.
+        1, 3 or, with alpha, 4 channels.
     settings : vkbloom.UnrealBloom
     size : (int, int)
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies bright after the threshold.
 
     Returns
     -------
@@ -63,7 +70,7 @@ def passes(
     """
     height, width, _ = glow.shape
     half = _halved((width, height), settings)
-    image = store(_prefilter(sample(glow, half), settings))
+    image = store(masked(_prefilter(sample(glow, half), settings), mask))
     framebuffers = {"bright": image}
     total = np.zeros_like(image)
     for k, factor in enumerate(_factors(settings.radius)):
@@ -113,6 +120,6 @@ def _prefilter(rgb: Array, settings: UnrealSettings) -> Array:
     if settings.threshold is None:
         return rgb
     weights = _NODES_LUMINANCE if settings.node else _LUMINANCE
-    grey = rgb if rgb.shape[2] == 1 else (rgb * weights).sum(axis=-1, keepdims=True)
+    grey = rgb if rgb.shape[2] == 1 else (rgb[..., :3] * weights).sum(axis=-1, keepdims=True)
     t = np.clip((grey - settings.threshold) / settings.smooth_width, 0, 1)
     return rgb * (t * t * (3 - 2 * t))

@@ -14,7 +14,7 @@ import numpy as np
 
 from .image import Storage
 from .sampling import Array, sample
-from .threshold import soften
+from .threshold import masked, soften
 from .upsampling import combine, flat_gain, linear
 
 __all__ = ["gain", "passes"]
@@ -39,7 +39,11 @@ class UrpSettings(Protocol):
 
 
 def passes(
-    glow: Array, settings: UrpSettings, size: tuple[int, int], store: Storage
+    glow: Array,
+    settings: UrpSettings,
+    size: tuple[int, int],
+    store: Storage,
+    mask: Array | None = None,
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
@@ -56,6 +60,8 @@ def passes(
         Width and height of the bloom.
     store : Storage
         What storing in a bloom buffer does to the values.
+    mask : ndarray of float64, shape (h, w, 1), optional
+        Multiplies down_0 after the threshold.
 
     Returns
     -------
@@ -64,7 +70,7 @@ def passes(
     """
     height, width, _ = glow.shape
     width, height = max(1, width // 2), max(1, height // 2)
-    downs = [store(_prefilter(sample(glow, (width, height)), settings))]
+    downs = [store(masked(_prefilter(sample(glow, (width, height)), settings), mask))]
     for _ in range(1, _level_count(settings, (width, height))):
         width, height = max(1, width // 2), max(1, height // 2)
         across = store(sample(downs[-1], (width, height), x_taps=_taps(2.0)))
@@ -95,11 +101,13 @@ def _shares(settings: UrpSettings, count: int) -> tuple[list[float], list[float]
 
 
 def _prefilter(rgb: Array, settings: UrpSettings) -> Array:
-    kept = np.minimum(rgb, settings.clamp_max)
+    # The clamp is not alpha's.
+    kept = np.concatenate([np.minimum(rgb[..., :3], settings.clamp_max), rgb[..., 3:]], axis=-1)
     if settings.threshold is not None:
         half_width = settings.threshold * settings.knee
         kept = soften(kept, settings.threshold, half_width, 4 * half_width + 1e-4, 1e-4)
-    return np.maximum(kept, 0)
+    positive: Array = np.maximum(kept, 0)
+    return positive
 
 
 def _taps(step: float) -> list[tuple[float, float]]:

@@ -1,0 +1,289 @@
+"""Diffraction of apertures of any shape, in colour."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vkbloom.checks import check_floats, check_index, check_number
+from vkbloom.psf.base import Array, check_above
+from vkbloom.psf.sampled import SampledPSF
+from vkbloom.psf.values import ArrayValue
+
+__all__ = ["aperture", "iris"]
+
+# Samples of the diffraction pattern for each period of the finest detail that it can have.
+_PADDING = 4
+_SPECTRUM = tuple(range(390, 731, 10))
+# XYZ to linear sRGB (IEC 61966-2-1).
+_SRGB = np.array(
+    [
+        [3.2406, -1.5372, -0.4986],
+        [-0.9689, 1.8758, 0.0415],
+        [0.0557, -0.2040, 1.0570],
+    ]
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class iris:
+    """The mask of a camera's iris, for `aperture`: what lets light through.
+
+    Parameters
+    ----------
+    blades : int
+        Number of straight blades, 3 to 64.
+    rotation : float
+        In degrees, counter-clockwise; at 0 a corner is on the right.
+    roundness : float
+        0: straight edges, 1: a circle.
+    dust : int
+        Number of opaque specks, 0 to 10000.
+    scratches : int
+        Number of thin opaque lines, 0 to 10000.
+    seed : int
+        Of the places of dust and scratches.
+    size : int
+        Side of the mask in samples, 8 to 4096. The aperture's circle touches all sides.
+
+    See Also
+    --------
+    aperture : Takes the mask.
+
+    Notes
+    -----
+    NumPy sees an array of float32, shape (size, size), 1 where light passes and 0 elsewhere, with
+    edges of 4 x 4 samples. The edge of a polygon is at the distance
+    cos(pi / n) / cos(angle to the middle of the edge) of the radius, and `roundness` mixes it with
+    the circle's, 1.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> mask = np.asarray(psf.iris(blades=6, size=64))
+    >>> mask.shape, round(float(mask.sum()) / 32**2, 2)  # 3 sqrt(3) / 2
+    ((64, 64), 2.6)
+    """
+
+    blades: int = 6
+    rotation: float = 0.0
+    roundness: float = 0.0
+    dust: int = 0
+    scratches: int = 0
+    seed: int = 0
+    size: int = 512
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("blades", 3, 64),
+            ("dust", 0, 10000),
+            ("scratches", 0, 10000),
+            ("seed", 0, 2**32 - 1),
+            ("size", 8, 4096),
+        ):
+            object.__setattr__(self, name, check_index(name, getattr(self, name), low, high))
+        for name, low, high in (("rotation", -360, 360), ("roundness", 0, 1)):
+            object.__setattr__(self, name, check_number(name, getattr(self, name), low, high))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of the mask: (size, size)."""
+        return self.size, self.size
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(_mask(self), dtype=dtype, copy=copy)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the parameters by name."""
+        return dataclasses.asdict(self)
+
+
+@functools.lru_cache(maxsize=4)
+def _mask(made: iris) -> NDArray[np.float32]:
+    fine = 4 * made.size
+    places = (np.arange(fine) + 0.5) * 2 / fine - 1
+    # Rows count downwards.
+    x, y = places, -places[:, np.newaxis]
+    step = 2 * math.pi / made.blades
+    angle = np.mod(np.arctan2(y, x) - math.radians(made.rotation), step) - step / 2
+    edge = math.cos(step / 2) / np.cos(angle)
+    open_ = np.hypot(x, y) <= edge + made.roundness * (1 - edge)
+    generator = np.random.default_rng(made.seed)
+    for _ in range(made.dust):
+        (centre_x, centre_y), radius = generator.uniform(-1, 1, 2), generator.uniform(0.002, 0.02)
+        rows, columns = (_near(centre, radius, fine) for centre in (-centre_y, centre_x))
+        open_[rows, columns] &= np.hypot(x[columns] - centre_x, y[rows] - centre_y) > radius
+    for _ in range(made.scratches):
+        (centre_x, centre_y), turn = generator.uniform(-1, 1, 2), generator.uniform(0, math.pi)
+        length, width = generator.uniform(0.1, 0.8), generator.uniform(0.001, 0.003)
+        along = (x - centre_x) * math.cos(turn) + (y - centre_y) * math.sin(turn)
+        across = (y - centre_y) * math.cos(turn) - (x - centre_x) * math.sin(turn)
+        open_ &= (np.abs(along) > length / 2) | (np.abs(across) > width)
+    blocks = open_.reshape(made.size, 4, made.size, 4)
+    mask: NDArray[np.float32] = blocks.mean(axis=(1, 3), dtype=np.float32)
+    mask.flags.writeable = False
+    return mask
+
+
+def _near(centre: float, radius: float, count: int) -> slice:
+    """Return the samples of -1..1 that are within a distance of a place."""
+    first, last = ((place + 1) * count / 2 for place in (centre - radius, centre + radius))
+    return slice(max(0, math.floor(first)), min(count, math.ceil(last)))
+
+
+@dataclasses.dataclass(frozen=True)
+class aperture(SampledPSF):
+    """Diffraction of an aperture of any shape, in white light or some wavelengths, in pixels.
+
+    Parameters
+    ----------
+    mask : iris, or array-like, shape (n, n)
+        What lets light through, 0 to 1, over the square around the aperture.
+    f_number : float
+        Focal length by the side of the mask, above 0.
+    pixel_pitch : float
+        Distance of the pixels on the sensor in um, above 0.
+    wavelengths : sequence of float or None
+        In nm, 380 to 780; one alone is grey. None: 390 to 730 in steps of 10.
+
+    See Also
+    --------
+    iris : Makes masks.
+    airy : The circle at one wavelength, as a formula.
+
+    Notes
+    -----
+    With A the mask's Fourier transform, P(u) = ``|A(u)|^2`` and the wavelength w, the intensity at
+    the place r is P(r / (w f_number)) / w^2, here integrated over each pixel. The wavelengths are
+    summed with the CIE 1931 colour matching functions and equal energy, converted to linear sRGB,
+    and each channel divided by its sum, so that white light stays white. Saturated spectral colours
+    lie outside of sRGB: single values can be below 0. The pattern of n samples ends n / 2 periods
+    from the centre.
+
+    Source of the colour matching functions: the fits of Wyman, Sloan, Shirley, "Simple Analytic
+    Approximations to the CIE XYZ Color Matching Functions", JCGT 2(2), 2013.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> star = psf.aperture(psf.iris(blades=6, size=64), f_number=22)
+    >>> star.energy().round(6)
+    array([1., 1., 1.])
+    """
+
+    mask: Any
+    f_number: float = 8.0
+    pixel_pitch: float = 4.0
+    wavelengths: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mask", _check_mask(self.mask))
+        for name in ("f_number", "pixel_pitch"):
+            object.__setattr__(self, name, check_above(name, getattr(self, name)))
+        if self.wavelengths is not None:
+            lengths = check_floats("wavelengths", self.wavelengths)
+            for length in lengths:
+                check_number("wavelengths", length, 380, 780)
+            if not lengths or not (_colours(lengths).sum(axis=0) > 0).all():
+                raise ValueError(
+                    f"wavelengths: {self.wavelengths!r} have no red, green and blue of sRGB in "
+                    "their sum; give one, or add others"
+                )
+            object.__setattr__(self, "wavelengths", lengths)
+
+    def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
+        return _pattern(self)
+
+
+def _check_mask(mask: Any) -> iris | ArrayValue:
+    if isinstance(mask, iris):
+        return mask
+    if isinstance(mask, dict) and "blades" in mask:
+        return iris(**mask)
+    held = ArrayValue(mask)
+    array = held.array
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
+        raise ValueError(f"mask: shape {array.shape} is not (n, n)")
+    if not ((array >= 0) & (array <= 1)).all() or not array.any():
+        raise ValueError("mask: its values are not 0 to 1, some of them above 0")
+    return held
+
+
+@functools.lru_cache(maxsize=4)
+def _pattern(psf: aperture) -> Array:
+    """Return the sum over the wavelengths."""
+    mask = np.asarray(psf.mask, np.float64)
+    count = len(mask)
+    lengths = _SPECTRUM if psf.wavelengths is None else psf.wavelengths
+    sums = _sums(mask)
+    middle = _PADDING * count / 2 + 0.5
+    scales = [length * psf.f_number / (1000 * psf.pixel_pitch) for length in lengths]
+    reach = max(1, math.ceil(max(scales) * count / 2))
+    edges: Array = np.arange(-reach, reach + 2, dtype=np.float64) - 0.5
+    # The pattern of a real mask is point-symmetric: the upper half is enough.
+    total = np.zeros((reach + 1, 2 * reach + 1, 3))
+    for scale, colour in zip(scales, _colours(lengths), strict=True):
+        places: Array = np.asarray(middle + edges * _PADDING / scale)
+        rows = np.ascontiguousarray(_between(sums, places[: reach + 2]).T)
+        energy = _between(rows, places).T
+        total += energy[..., np.newaxis] * colour
+    whole = np.concatenate([total, total[-2::-1, ::-1]])
+    whole /= whole.sum(axis=(0, 1))
+    whole.flags.writeable = False
+    return whole
+
+
+def _sums(mask: Array) -> Array:
+    """Return the integral of the diffraction pattern over the rectangles from its first corner.
+
+    Its finest detail is known, so that the integrals over the cells of the Fourier transform are
+    exact: the product with a sinc in the domain of the autocorrelation.
+    """
+    side = _PADDING * len(mask)
+    correlation = np.fft.irfft2(np.abs(np.fft.rfft2(mask, (side, side))) ** 2, (side, side))
+    lags = np.sinc(np.fft.fftfreq(side))
+    cells = np.fft.fftshift(np.fft.fft2(correlation * lags * lags[:, np.newaxis]).real)
+    return np.pad(cells.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+
+
+def _between(sums: Array, places: Array) -> Array:
+    """Return the differences of the sums at places along the first axis.
+
+    Between two cells the sums are cubic, and outside of them constant.
+    """
+    at = np.clip(places, 0, len(sums) - 1)
+    lower = np.minimum(at.astype(np.intp), len(sums) - 2)
+    t = at - lower
+    # Catmull and Rom's spline.
+    weights = (
+        ((2 - t) * t - 1) * t / 2,
+        ((3 * t - 5) * t * t + 2) / 2,
+        ((4 - 3 * t) * t + 1) * t / 2,
+        (t - 1) * t * t / 2,
+    )
+    found = np.zeros((len(places), sums.shape[1]))
+    for offset, weight in zip(range(-1, 3), weights, strict=True):
+        rows = np.clip(lower + offset, 0, len(sums) - 1)
+        found += weight[:, np.newaxis] * sums[rows]
+    return np.diff(found, axis=0)
+
+
+def _colours(lengths: tuple[float, ...] | tuple[int, ...]) -> Array:
+    """Return the linear sRGB of each wavelength, (N, 3); one alone is shown in grey."""
+    if len(lengths) == 1:
+        return np.ones((1, 3))
+    nm = np.array(lengths, np.float64)
+
+    def lobe(middle: float, below: float, above: float) -> Array:
+        return np.exp(-(((nm - middle) / np.where(nm < middle, below, above)) ** 2) / 2)
+
+    x = 1.056 * lobe(599.8, 37.9, 31.0) + 0.362 * lobe(442.0, 16.0, 26.7)
+    x -= 0.065 * lobe(501.1, 20.4, 26.2)
+    y = 0.821 * lobe(568.8, 46.9, 40.5) + 0.286 * lobe(530.9, 16.3, 31.1)
+    z = 1.217 * lobe(437.0, 11.8, 36.0) + 0.681 * lobe(459.0, 26.0, 13.8)
+    return np.asarray(np.stack([x, y, z], axis=-1) @ _SRGB.T)

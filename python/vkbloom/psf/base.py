@@ -1,0 +1,301 @@
+"""What all point-spread functions have."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vkbloom.checks import as_float, check_size
+from vkbloom.psf.values import ArrayValue
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["FRAME_DEGREES", "PSF", "Array", "centred", "check_above", "check_radii"]
+
+Array = NDArray[np.float64]
+
+#: Degrees that the longer side of a frame spans where `pixels_per_degree` is None.
+FRAME_DEGREES = 50.0
+
+
+class PSF(abc.ABC):
+    """Base class of the point-spread functions of `vkbloom.psf`.
+
+    A point-spread function says how the light of one point is distributed over a picture. The ones
+    that are defined in degrees (`unit` "degree") are densities per steradian, and need
+    `pixels_per_degree` to become pixels; the others are defined in pixels. Two of them are equal,
+    and have the same hash, if they have the same class and the same parameters.
+
+    Attributes
+    ----------
+    unit : {"degree", "pixel"}
+
+    See Also
+    --------
+    vkbloom.Convolution : Bloom by a point-spread function.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> spread = psf.gaussian(sigma=2)
+    >>> spread.array((9, 9)).shape
+    (9, 9, 3)
+    >>> psf.PSF.from_json(spread.to_json()) == spread
+    True
+    """
+
+    unit: ClassVar[Literal["degree", "pixel"]]
+
+    @abc.abstractmethod
+    def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
+        """Return the energy that falls on each pixel.
+
+        Parameters
+        ----------
+        size : (int, int)
+            Width and height in pixels.
+        pixels_per_degree : float, optional
+            Default: the longer side spans 50 degrees. Not used where `unit` is "pixel".
+
+        Returns
+        -------
+        ndarray of float64, shape (height, width, 3)
+            Linear RGB. The point is at [height // 2, width // 2]. The values are integrals over
+            the pixels, not samples at their centres.
+        """
+
+    @abc.abstractmethod
+    def energy(self) -> Array:
+        """Return the sum of all that the function distributes.
+
+        Returns
+        -------
+        ndarray of float64, shape (3,)
+            Linear RGB: of degrees the integral over the hemisphere, of pixels the sum over all of
+            the plane.
+        """
+
+    @abc.abstractmethod
+    def encircled_energy(self, radii: ArrayLike) -> Array:
+        """Return the energy inside circles around the point.
+
+        Parameters
+        ----------
+        radii : array-like of float, shape (N,)
+            In degrees or pixels, at least 0.
+
+        Returns
+        -------
+        ndarray of float64, shape (N, 3)
+            Linear RGB; `energy` where the circle is large enough.
+        """
+
+    @abc.abstractmethod
+    def mtf(self, frequencies: ArrayLike) -> Array:
+        """Return the modulation transfer function along the horizontal.
+
+        Parameters
+        ----------
+        frequencies : array-like of float, shape (N,)
+            In cycles per degree, or per pixel, at least 0.
+
+        Returns
+        -------
+        ndarray of float64, shape (N, 3)
+            Absolute value of the Fourier transform, divided by `energy`: 1 at 0.
+        """
+
+    def kernel(
+        self,
+        frame: tuple[int, int],
+        size: tuple[int, int] | None = None,
+        pixels_per_degree: float | None = None,
+    ) -> Array:
+        """Return the kernel that a frame is convolved with.
+
+        Parameters
+        ----------
+        frame : (int, int)
+            Width and height of the frame in pixels.
+        size : (int, int), optional
+            Width and height of the kernel. Default: twice the frame's, less one, so that every
+            pixel reaches every other one.
+        pixels_per_degree : float, optional
+            Default: the frame's longer side spans 50 degrees.
+
+        Returns
+        -------
+        ndarray of float64, shape (height, width, 3)
+        """
+        width, height = frame
+        scale = pixels_per_degree or max(frame) / FRAME_DEGREES
+        return self.array(size or (2 * width - 1, 2 * height - 1), scale)
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        size: tuple[int, int] = (512, 512),
+        pixels_per_degree: float | None = None,
+    ) -> Path:
+        """Write `array` to an image file.
+
+        Parameters
+        ----------
+        path : str or path-like
+            An OpenEXR file, which renderers load as kernel, or another file of floats.
+        size, pixels_per_degree
+            As of `array`.
+
+        Returns
+        -------
+        Path
+            The file, of float32 RGB.
+
+        Raises
+        ------
+        ValueError, OSError, ModuleNotFoundError
+            As of `vkbloom.write`.
+        """
+        from vkbloom.io import array_files  # noqa: PLC0415  costs start-up time
+
+        return array_files.write(path, self.array(size, pixels_per_degree).astype(np.float32))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the parameters by name, and the function's name as ``psf``.
+
+        Returns
+        -------
+        dict
+            Plain values that JSON can hold.
+        """
+        fields = dataclasses.fields(cast("Any", self))
+        values = {field.name: _plain(getattr(self, field.name)) for field in fields}
+        return {"psf": type(self).__name__, **values}
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """Make a function of what `to_dict` gave.
+
+        Parameters
+        ----------
+        fields : mapping of str to object
+            Missing ones are the defaults.
+
+        Returns
+        -------
+        PSF
+
+        Raises
+        ------
+        ValueError
+            There is no such function or parameter, or a value is out of range.
+        TypeError
+            `fields` is no mapping, or a value has the wrong type.
+        """
+        if not isinstance(fields, Mapping):
+            raise TypeError(f"psf: a mapping is needed, not {type(fields).__name__}")
+        kinds = {kind.__name__: kind for kind in _leaves(PSF)}
+        name = fields.get("psf")
+        if not isinstance(name, str) or name not in kinds:
+            raise ValueError(f"psf: {name!r} is not one of {', '.join(sorted(kinds))}")
+        values = {key: value for key, value in fields.items() if key != "psf"}
+        known = [field.name for field in dataclasses.fields(cast("Any", kinds[name]))]
+        unknown = [key for key in values if key not in known]
+        if unknown:
+            raise ValueError(
+                f"psf: {name} has no {', '.join(map(repr, unknown))}; it has {', '.join(known)}"
+            )
+        return cast("Self", cast("Any", kinds[name])(**values))
+
+    def to_json(self) -> str:
+        """Return `to_dict` as JSON text."""
+        import json  # noqa: PLC0415  costs start-up time
+
+        return json.dumps(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Make a function of JSON text that `to_json` gave.
+
+        Parameters
+        ----------
+        text : str
+
+        Returns
+        -------
+        PSF
+
+        Raises
+        ------
+        ValueError, TypeError
+            The text is no JSON object, or as for `from_dict`.
+        """
+        import json  # noqa: PLC0415  costs start-up time
+
+        return cls.from_dict(json.loads(text))
+
+    def _repr_png_(self) -> bytes:
+        """Return a picture of six decades below the peak, 256 x 256, in a logarithmic scale."""
+        from vkbloom.views import pictures  # noqa: PLC0415  costs start-up time
+
+        values = self.array((256, 256))
+        scaled = 1 + np.log10(np.maximum(values / values.max(), 1e-6)) / 6
+        return pictures.png(np.round(255 * scaled).astype(np.uint8))
+
+
+def check_above(name: str, value: float, low: float = 0.0) -> float:
+    """Return a finite number above `low`, or raise TypeError or ValueError."""
+    number = as_float(name, value)
+    if not low < number < math.inf:
+        raise ValueError(f"{name}: {value!r} is out of range, above {low:g}")
+    return number
+
+
+def check_radii(name: str, values: ArrayLike) -> Array:
+    """Return the values as a float64 array (N,), or raise ValueError."""
+    numbers = np.asarray(values, np.float64)
+    if numbers.ndim != 1 or not (numbers >= 0).all():
+        raise ValueError(f"{name}: {values!r} is not a sequence of numbers of at least 0")
+    return numbers
+
+
+def centred(array: Array, size: tuple[int, int]) -> Array:
+    """Return the array cropped, or extended by zeros, around its centre [h // 2, w // 2]."""
+    width, height = check_size("size", size)
+    result = np.zeros((height, width, *array.shape[2:]))
+    places: list[tuple[slice, slice]] = []
+    for length, wanted in zip(array.shape[:2], (height, width), strict=True):
+        first = max(0, length // 2 - wanted // 2)
+        start = max(0, wanted // 2 - length // 2)
+        count = min(length - first, wanted - start)
+        places.append((slice(first, first + count), slice(start, start + count)))
+    (rows, to_rows), (columns, to_columns) = places
+    result[to_rows, to_columns] = array[rows, columns]
+    return result
+
+
+def _leaves(kind: type[Any]) -> list[type[Any]]:
+    """Return the classes below `kind` that have parameters."""
+    found: list[type[Any]] = []
+    for below in kind.__subclasses__():
+        found += [below] if dataclasses.is_dataclass(below) else _leaves(below)
+    return found
+
+
+def _plain(value: Any) -> Any:
+    """Return a parameter as JSON can hold it."""
+    if isinstance(value, ArrayValue):
+        return value.to_plain()
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(item) for item in value]
+    return value

@@ -1,0 +1,204 @@
+"""Point-spread functions of lenses, and the Gaussian."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vkbloom.checks import check_index, check_number, check_size
+from vkbloom.psf.base import PSF, Array, check_above, check_radii
+from vkbloom.psf.bessel import bessel
+from vkbloom.psf.radial import RadialPSF, integrate_pixels
+
+__all__ = ["airy", "gaussian", "harvey_shack"]
+
+
+@dataclasses.dataclass(frozen=True)
+class gaussian(PSF):
+    """A Gaussian, defined in pixels.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation in pixels, above 0.
+
+    See Also
+    --------
+    airy : What diffraction makes of a point.
+
+    Notes
+    -----
+    exp(-r^2 / (2 sigma^2)) / (2 pi sigma^2), integrated over the pixels. Its encircled energy is
+    1 - exp(-r^2 / (2 sigma^2)), its MTF exp(-2 (pi sigma f)^2).
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> psf.gaussian(1).array((5, 5))[2, :, 0].round(4)
+    array([0.0232, 0.0926, 0.1466, 0.0926, 0.0232])
+    """
+
+    unit = "pixel"
+
+    sigma: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sigma", check_above("sigma", self.sigma))
+
+    def array(  # noqa: D102  as of PSF
+        self, size: tuple[int, int], pixels_per_degree: float | None = None
+    ) -> Array:
+        columns, rows = (self._shares(side) for side in check_size("size", size))
+        return _rgb(np.outer(rows, columns))
+
+    def _shares(self, side: int) -> Array:
+        """Return the integral over each pixel of a line."""
+        edges = np.arange(side + 1) - side // 2 - 0.5
+        # By the complement, whose small values are exact.
+        tails = np.array([math.erfc(abs(edge) / (self.sigma * math.sqrt(2))) / 2 for edge in edges])
+        shares = np.abs(np.diff(tails))
+        shares[side // 2] = 1 - tails[side // 2] - tails[side // 2 + 1]
+        return shares
+
+    def energy(self) -> Array:  # noqa: D102  as of PSF
+        return np.ones(3)
+
+    def encircled_energy(self, radii: ArrayLike) -> Array:  # noqa: D102  as of PSF
+        return _rgb(-np.expm1(-0.5 * (check_radii("radii", radii) / self.sigma) ** 2))
+
+    def mtf(self, frequencies: ArrayLike) -> Array:  # noqa: D102  as of PSF
+        cycles = check_radii("frequencies", frequencies)
+        return _rgb(np.exp(-2 * (math.pi * self.sigma * cycles) ** 2))
+
+
+@dataclasses.dataclass(frozen=True)
+class airy(PSF):
+    """Diffraction of a circular aperture at one wavelength, defined in pixels.
+
+    Parameters
+    ----------
+    f_number : float
+        Focal length by the aperture's diameter, above 0.
+    wavelength : float
+        In nm, above 0.
+    pixel_pitch : float
+        Distance of the pixels on the sensor in um, above 0.
+
+    See Also
+    --------
+    aperture : Diffraction of any aperture, in colour.
+
+    Notes
+    -----
+    The intensity (2 J1(x) / x)^2, x = pi r / (wavelength f_number), divided by its integral. Its
+    encircled energy is 1 - J0(x)^2 - J1(x)^2; its MTF, with v = f wavelength f_number, is
+    2 / pi (arccos v - v sqrt(1 - v^2)) up to v = 1 and 0 above.
+
+    Source: Born and Wolf, "Principles of Optics", 8.5.2.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> rings = psf.airy(f_number=8, wavelength=550, pixel_pitch=4)
+    >>> rings.encircled_energy([1.22 * 0.55 * 8 / 4])[0, 0].round(3)  # the first dark ring
+    np.float64(0.838)
+    """
+
+    unit = "pixel"
+
+    f_number: float = 8.0
+    wavelength: float = 550.0
+    pixel_pitch: float = 4.0
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = check_above(field.name, getattr(self, field.name))
+            object.__setattr__(self, field.name, value)
+
+    @property
+    def _scale(self) -> float:
+        """Wavelength times f-number in pixels."""
+        return self.wavelength * self.f_number / (1000 * self.pixel_pitch)
+
+    def array(  # noqa: D102  as of PSF
+        self, size: tuple[int, int], pixels_per_degree: float | None = None
+    ) -> Array:
+        peak = math.pi / (4 * self._scale**2)
+
+        def per_pixel(distance: Array) -> Array:
+            # At 0 the limit of 2 J1(x) / x is 1.
+            x = np.maximum(np.pi * distance / self._scale, 1e-9)
+            return np.asarray(peak * (2 * bessel(1, x) / x) ** 2)[np.newaxis]
+
+        return _rgb(integrate_pixels(per_pixel, size, self._scale)[..., 0])
+
+    def energy(self) -> Array:  # noqa: D102  as of PSF
+        return np.ones(3)
+
+    def encircled_energy(self, radii: ArrayLike) -> Array:  # noqa: D102  as of PSF
+        x = np.pi * check_radii("radii", radii) / self._scale
+        return _rgb(1 - bessel(0, x) ** 2 - bessel(1, x) ** 2)
+
+    def mtf(self, frequencies: ArrayLike) -> Array:  # noqa: D102  as of PSF
+        v = np.minimum(check_radii("frequencies", frequencies) * self._scale, 1)
+        return _rgb(2 / np.pi * (np.arccos(v) - v * np.sqrt(1 - v**2)))
+
+
+@dataclasses.dataclass(frozen=True)
+class harvey_shack(RadialPSF):
+    """Veiling glare of a camera lens: the light that its surfaces scatter.
+
+    Parameters
+    ----------
+    s : float
+        Slope of the scatter, -10 to 0.
+    b : float
+        Scatter of one surface 0.01 rad from the specular direction, per steradian, above 0.
+    l : float
+        Roll-off angle in rad, above 0.
+    surfaces : int
+        Number of surfaces, 1 to 1000.
+
+    See Also
+    --------
+    airy : Diffraction, the other limit of a lens.
+
+    Notes
+    -----
+    N b0 (1 + (sin theta / l)^2)^(s / 2) cos theta with b0 = b (100 l)^s. It describes the
+    scattered share alone, 2.5 % with the defaults: a picture is mixed with it, by that share.
+
+    Source: Ritt, "Laser Safety Calculations for Imaging Sensors" and "Estimation of Lens Stray
+    Light with Regard to the Incapacitation of Imaging Sensors", Sensors 20(21), 6308, 2020.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> psf.harvey_shack().energy().round(3)
+    array([0.025, 0.025, 0.025])
+    """
+
+    s: float = -1.86
+    b: float = 0.36
+    l: float = 0.00204  # noqa: E741  as its source has it
+    surfaces: int = 14
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "s", check_number("s", self.s, -10, 0))
+        object.__setattr__(self, "b", check_above("b", self.b))
+        object.__setattr__(self, "l", check_above("l", self.l))
+        object.__setattr__(self, "surfaces", check_index("surfaces", self.surfaces, 1, 1000))
+
+    def density(self, theta: ArrayLike) -> Array:  # noqa: D102  as of RadialPSF
+        angle = np.radians(np.asarray(theta, np.float64))
+        peak = self.surfaces * self.b * (100 * self.l) ** self.s
+        scatter = peak * (1 + (np.sin(angle) / self.l) ** 2) ** (self.s / 2)
+        # cos(pi / 2) is not quite 0 in floats.
+        return _rgb(scatter * np.maximum(np.cos(angle), 0))
+
+
+def _rgb(values: Array) -> Array:
+    return np.repeat(values[..., np.newaxis], 3, axis=-1)

@@ -1,0 +1,82 @@
+"""The point spread of this package's own settings as a point-spread function."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vkbloom.checks import check_size
+from vkbloom.psf.base import Array
+from vkbloom.psf.sampled import SampledPSF
+from vkbloom.settings import Settings
+
+__all__ = ["measured"]
+
+
+@dataclasses.dataclass(frozen=True)
+class measured(SampledPSF):
+    """What settings make of one pixel of 1, by `vkbloom.reference`; defined in pixels.
+
+    Parameters
+    ----------
+    settings : Settings
+        Linear ones: without a threshold. Those that depend on the place give the spread of a pixel
+        in the middle.
+    size : (int, int)
+        Width and height of the image that the pixel is in the middle of.
+
+    Raises
+    ------
+    TypeError
+        `settings` are none.
+    ValueError
+        They have a threshold, or `size` is not a pair of at least 1.
+
+    See Also
+    --------
+    vkbloom.testing.point_spread : Measures any bloom.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> spread = psf.measured(vkbloom.Pyramid(levels=3), size=(64, 64))
+    >>> spread.energy().round(3)
+    array([1., 1., 1.])
+    """
+
+    settings: Settings
+    size: tuple[int, int] = (256, 256)
+
+    def __post_init__(self) -> None:
+        settings: Any = self.settings
+        if isinstance(settings, Mapping):
+            settings = Settings.from_dict(settings)
+        if not isinstance(settings, Settings):
+            raise TypeError(f"settings: {settings!r} is not a Settings")
+        if settings.threshold is not None:
+            raise ValueError(
+                f"threshold: {settings.threshold!r} is not None; a bloom with a threshold is not "
+                "linear and has no point spread"
+            )
+        object.__setattr__(self, "settings", settings)
+        object.__setattr__(self, "size", check_size("size", self.size))
+
+    def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
+        return _spread(self)
+
+
+@functools.lru_cache(maxsize=4)
+def _spread(psf: measured) -> Array:
+    from vkbloom import reference  # noqa: PLC0415  costs start-up time
+
+    width, height = psf.size
+    # A glow of doubles: nothing is clamped.
+    point = np.zeros((height, width, 3))
+    point[height // 2, width // 2] = 1
+    spread = reference.blur(point, psf.settings, format="rgba32float")
+    spread.flags.writeable = False
+    return spread

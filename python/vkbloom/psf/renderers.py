@@ -1,0 +1,191 @@
+"""Point-spread functions of renderers, and of this package's own settings."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vkbloom.checks import check_floats, check_index, check_number
+from vkbloom.psf.base import Array, centred
+from vkbloom.psf.resampling import box_resample
+from vkbloom.psf.sampled import SampledPSF, check_values, rgb
+
+if TYPE_CHECKING:
+    from vkbloom.psf.values import ArrayValue
+
+__all__ = ["fog_glow", "unreal"]
+
+
+@dataclasses.dataclass(frozen=True)
+class fog_glow(SampledPSF):
+    """The kernel of Blender's Fog Glow before version 4.4, defined in pixels.
+
+    Parameters
+    ----------
+    size : int
+        Side of the square kernel in pixels, 2 to 4096; Blender's are powers of 2, 64 to 512.
+
+    See Also
+    --------
+    spencer : What Blender has since version 4.4.
+
+    Notes
+    -----
+    With s the size, u = 2 x / s - 1, v likewise and r = (u^2 + v^2) s / 4:
+    exp(-9 r^(1/8)) (1/2 + cos(pi u) / 2) (1/2 + cos(pi v) / 2), at the centres of the pixels as
+    Blender has it. Its sum is not 1; Blender divides by it.
+
+    Source: Blender 4.3, source/blender/compositor/operations/COM_GlareFogGlowOperation.cc.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> kernel = psf.fog_glow(64)
+    >>> kernel.array((64, 64))[32, 32]
+    array([1., 1., 1.])
+    """
+
+    size: int = 256
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", check_index("size", self.size, 2, 4096))
+
+    def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
+        u = 2 * np.arange(self.size) / self.size - 1
+        # So that an odd side has its point at the centre, too.
+        u = u - u[self.size // 2]
+        radius = (u**2 + u[:, np.newaxis] ** 2) * self.size / 4
+        window = (1 + np.cos(np.pi * u)) / 2
+        values = np.exp(-9 * radius**0.125) * window * window[:, np.newaxis]
+        return np.repeat(values[..., np.newaxis], 3, axis=2)
+
+
+@dataclasses.dataclass(frozen=True)
+class unreal(SampledPSF):
+    """A kernel image as Unreal Engine's convolution bloom uses it, defined in pixels.
+
+    Parameters
+    ----------
+    image : array-like, shape (h, w) or (h, w, 3)
+        The kernel, finite and at least 0; it is copied, as float32.
+    center : (float, float) or None
+        Place of the point in the image as shares of its width and height. None: the brightest
+        texel.
+    size : float
+        Longer side of the kernel as a share of the frame's longer side, above 0 to 4.
+    prefilter : (float, float, float)
+        min, max and mult: a luminance (Rec. 709) L above min becomes
+        min(mult (L - min) + min, max) before the convolution. Off where max < min.
+    scatter : float
+        Share of the light that leaves its pixel, as a factor of what the image says, 0 to 1000.
+
+    See Also
+    --------
+    samples : An array as it is.
+
+    Notes
+    -----
+    M is the largest value just outside of the 3 x 3 texels around the point, C the sum over these
+    of max(K - M, 0), S the sum of K' = min(K, M), T = C + S. A pixel keeps sat((T - s S) / T) of
+    its light, and K' / S distributes sat(s S / T) of it; each channel is multiplied by T by the
+    largest T. K' is resized by the areas that texels and pixels share.
+
+    Source: Unreal Engine 5, Engine/Shaders/Private/Bloom/ and
+    Engine/Source/Runtime/Renderer/Private/PostProcess/PostProcessFFTBloom.cpp.
+
+    Examples
+    --------
+    >>> from vkbloom import psf
+    >>> image = np.zeros((9, 9), np.float32)
+    >>> image[4, 4], image[4, :] = 1, 0.125
+    >>> psf.unreal(image).energy()
+    array([1., 1., 1.])
+    """
+
+    image: Any
+    center: tuple[float, float] | None = None
+    size: float = 1.0
+    prefilter: tuple[float, float, float] = (7.0, 15000.0, 15.0)
+    scatter: float = 1.0
+
+    def __post_init__(self) -> None:
+        image = check_values("image", self.image)
+        if (image.array < 0).any() or not image.array.any():
+            raise ValueError("image: its values are not at least 0, some of them above 0")
+        object.__setattr__(self, "image", image)
+        if self.center is not None:
+            center = check_floats("center", self.center)
+            if len(center) != 2 or not all(0 <= share <= 1 for share in center):
+                raise ValueError(f"center: {self.center!r} is not a pair of numbers, 0 to 1")
+            object.__setattr__(self, "center", center)
+        object.__setattr__(self, "size", check_number("size", self.size, 0.001, 4))
+        prefilter = check_floats("prefilter", self.prefilter)
+        if len(prefilter) != 3 or min(prefilter) < 0:
+            raise ValueError(f"prefilter: {self.prefilter!r} is not min, max, mult of at least 0")
+        object.__setattr__(self, "prefilter", prefilter)
+        object.__setattr__(self, "scatter", check_number("scatter", self.scatter, 0, 1000))
+
+    def own_array(self) -> Array:
+        """Return the array in the size of the kernel image, around its point."""
+        height, width = self.image.array.shape[:2]
+        return self._for_frame(max(width, height) / self.size)
+
+    def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
+        """Return the energy per pixel for a frame of that size."""
+        return self.kernel(size, size)
+
+    def kernel(  # noqa: D102  as of PSF
+        self,
+        frame: tuple[int, int],
+        size: tuple[int, int] | None = None,
+        pixels_per_degree: float | None = None,
+    ) -> Array:
+        width, height = frame
+        return centred(self._for_frame(max(frame)), size or (2 * width - 1, 2 * height - 1))
+
+    def _for_frame(self, longer_side: float) -> Array:
+        return _scattered(self, longer_side)
+
+
+@functools.lru_cache(maxsize=2)
+def _scattered(psf: unreal, longer_side: float) -> Array:
+    """Return the kernel of a frame with that longer side."""
+    image = rgb(psf.image)
+    row, column = _place(psf.image, psf.center)
+    centre = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
+    around = image[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3].copy()
+    top, left = row - max(row - 2, 0), column - max(column - 2, 0)
+    around[max(top - 1, 0) : top + 2, max(left - 1, 0) : left + 2] = 0
+    most = around.max(axis=(0, 1))
+    kept = np.maximum(image[centre] - most, 0).sum(axis=(0, 1))
+    spread = np.minimum(image, most)
+    spread_sum = spread.sum(axis=(0, 1))
+    total = kept + spread_sum
+    if not (total > 0).any():
+        raise ValueError("image: it is black but for one texel's surroundings")
+    share = np.clip(psf.scatter * spread_sum / np.maximum(total, 1e-30), 0, 1)
+    tint = total / total.max()
+    pixels = longer_side * psf.size / max(image.shape[:2])
+    spread = spread * np.divide(tint * share, spread_sum, where=spread_sum > 0, out=np.zeros(3))
+    kernel = box_resample(spread, (row, column), (pixels, pixels))
+    kernel[kernel.shape[0] // 2, kernel.shape[1] // 2] += tint * (1 - share)
+    kernel.flags.writeable = False
+    return kernel
+
+
+def _place(image: ArrayValue, center: tuple[float, float] | None) -> tuple[int, int]:
+    """Return row and column of the point."""
+    array = image.array
+    height, width = array.shape[:2]
+    if center is not None:
+        return (
+            min(height - 1, math.floor(center[1] * height)),
+            min(width - 1, math.floor(center[0] * width)),
+        )
+    brightness = array if array.ndim == 2 else array @ np.array([0.2126, 0.7152, 0.0722])
+    row, column = np.unravel_index(int(np.argmax(brightness)), (height, width))
+    return int(row), int(column)

@@ -1,0 +1,64 @@
+"""Energy per pixel for pixels of another size."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vkbloom.psf.base import Array
+
+__all__ = ["box_resample", "integrals"]
+
+
+def box_resample(kernel: Array, point: tuple[int, int], scale: tuple[float, float]) -> Array:
+    """Return a kernel whose pixels are other ones: each gets what its area covers of the old ones.
+
+    Parameters
+    ----------
+    kernel : ndarray of float64, shape (h, w, C)
+        Energy per pixel.
+    point : (int, int)
+        Row and column of its point.
+    scale : (float, float)
+        Height and width of an old pixel in new ones, above 0.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, C)
+        With the same sums; H and W are odd, and the point is in the middle.
+    """
+    rows, columns = (_edges(*axis) for axis in zip(kernel.shape[:2], point, scale, strict=True))
+    return np.ascontiguousarray(integrals(integrals(kernel, rows, 0), columns, 1))
+
+
+def integrals(values: Array, edges: Array, axis: int) -> Array:
+    """Return the integrals between places along an axis, of values that are constant per pixel.
+
+    Parameters
+    ----------
+    values : ndarray of float64
+    edges : ndarray of float64, shape (N,)
+        Ascending; pixel n lies between n and n + 1, and outside there is nothing.
+    axis : int
+
+    Returns
+    -------
+    ndarray of float64
+        N - 1 values along the axis.
+    """
+    lines = np.moveaxis(values, axis, 0)
+    sums = np.concatenate([np.zeros((1, *lines.shape[1:])), lines.cumsum(axis=0)])
+    at = np.clip(edges, 0, len(lines))
+    lower = np.minimum(at.astype(np.intp), len(lines) - 1)
+    part: Array = np.asarray(at - lower).reshape(-1, *[1] * (lines.ndim - 1))
+    between: Array = np.diff(sums[lower] + part * lines[lower], axis=0)
+    return np.asarray(np.moveaxis(between, 0, axis), np.float64)
+
+
+def _edges(count: int, point: int, scale: float) -> Array:
+    """Return the edges of the new pixels in old ones."""
+    reach = max(point + 0.5, count - point - 0.5) * scale
+    # Rounding must not add a pixel of nothing.
+    pixels = max(0, math.ceil(reach - 0.5 - 1e-9))
+    return np.asarray((np.arange(-pixels, pixels + 2) - 0.5) / scale + point + 0.5)

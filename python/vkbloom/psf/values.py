@@ -1,0 +1,65 @@
+"""Arrays that are values: copied, read-only, compared and hashed by what they hold."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+__all__ = ["ArrayValue"]
+
+
+class ArrayValue:
+    """An array of float32 that can be a field of a frozen dataclass.
+
+    Parameters
+    ----------
+    array : array-like
+        Anything that NumPy can view, or what `to_plain` gave. It is copied.
+    """
+
+    __slots__ = ("_hash", "array")
+
+    def __init__(self, array: Any) -> None:
+        if isinstance(array, Mapping):
+            array = _from_plain(array)
+        elif isinstance(array, ArrayValue):
+            array = array.array
+        values = np.array(array, np.float32, order="C")
+        values.flags.writeable = False
+        self.array: NDArray[np.float32] = values
+        self._hash = hash((values.shape, zlib.crc32(values.tobytes())))
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.array, dtype=dtype, copy=copy)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ArrayValue):
+            return NotImplemented
+        return self._hash == other._hash and np.array_equal(self.array, other.array)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __reduce__(self) -> tuple[type[Self], tuple[NDArray[np.float32]]]:
+        return type(self), (self.array,)
+
+    def __repr__(self) -> str:
+        return f"<array of shape {self.array.shape}, {self._hash & 0xFFFFFFFF:08x}>"
+
+    def to_plain(self) -> dict[str, Any]:
+        """Return shape and compressed values, as JSON can hold them."""
+        data = zlib.compress(self.array.astype("<f4").tobytes())
+        return {"shape": list(self.array.shape), "zlib": base64.b64encode(data).decode("ascii")}
+
+
+def _from_plain(plain: Mapping[str, Any]) -> NDArray[Any]:
+    try:
+        data = zlib.decompress(base64.b64decode(plain["zlib"], validate=True))
+        return np.frombuffer(data, "<f4").reshape([int(side) for side in plain["shape"]])
+    except (KeyError, TypeError, ValueError, zlib.error) as error:
+        raise ValueError(f"array: not an array's shape and values: {error}") from None

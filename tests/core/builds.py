@@ -1,0 +1,120 @@
+"""Builds of the core, and of programs beside it, that tests make; what they need, or a skip."""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Prints the folder of volk, or ends with what is missing for a build of the core.
+PROBE = """
+import shutil, sys
+import setuptools
+setuptools.setup = lambda **_: None
+import setup
+setup.check_vulkan_headers()
+print(setup.volk_folder())
+if not (shutil.which("glslangValidator") or shutil.which("glslang")):
+    sys.exit("glslangValidator is missing")
+"""
+
+
+def compiler() -> list[str]:
+    """Return the command of the C compiler; without one the test is skipped."""
+    command = os.environ.get("CC", "cc").split()
+    if os.name == "nt" or shutil.which(command[0]) is None:
+        pytest.skip(f"there is no C compiler here: {command[0]}")
+    return command
+
+
+def require_header(name: str) -> None:
+    """Skip the test where the compiler does not find the header."""
+    done = subprocess.run(
+        [*compiler(), "-fsyntax-only", "-x", "c", "-"],
+        input=f"#include <{name}>\n",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        pytest.skip(f"the header {name} is not here")
+
+
+@functools.cache
+def _probe() -> tuple[str, str]:
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if done.returncode == 0:
+        return done.stdout.strip(), ""
+    return "", done.stderr.strip().splitlines()[-1]
+
+
+def volk_folder() -> str:
+    """Return where volk is; the test is skipped where the core cannot be built."""
+    require_header("stdio.h")
+    folder, missing = _probe()
+    if missing:
+        pytest.skip(f"the core cannot be built here: {missing}")
+    return folder
+
+
+def succeed(tree: Path, *command: str | Path) -> None:
+    """Run a command of a build in its tree."""
+    done = subprocess.run(
+        command,
+        cwd=tree,
+        # Not optimized: the compiler takes most of the time.
+        env={**os.environ, "CFLAGS": "-O0", "VKBLOOM_CFLAGS": "-DVKBLOOM_FAULTS -Wall -Werror"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    import fcntl
+
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def core_with_faults(temporary: Path) -> Path:
+    """Build a core that fails on demand (VKBLOOM_FAULTS), once in a run of the tests.
+
+    Parameters
+    ----------
+    temporary
+        The folder of this process's temporary files; xdist's workers share the one above.
+
+    Returns
+    -------
+    Path
+        The tree with sources, objects and, in ``python``, the package.
+    """
+    volk_folder()
+    shared = temporary.parent if "PYTEST_XDIST_WORKER" in os.environ else temporary
+    tree, whole = shared / "faults", shared / "faults.whole"
+    with _locked(shared / "faults.lock"):
+        if not whole.exists():
+            shutil.rmtree(tree, ignore_errors=True)
+            ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__", "*.egg-info")
+            for folder in ("csrc", "shaders", "python"):
+                shutil.copytree(ROOT / folder, tree / folder, ignore=ignored)
+            for name in ("setup.py", "pyproject.toml", "README.md"):
+                shutil.copy(ROOT / name, tree / name)
+            succeed(tree, sys.executable, "setup.py", "--quiet", "build_ext", "--inplace")
+            whole.touch()
+    return tree

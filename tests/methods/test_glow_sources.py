@@ -1,0 +1,357 @@
+"""What glows and what becomes of alpha: masks, emissions, and the field `alpha`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
+
+from tests.images import hdr_picture, picture
+from tests.tolerance import assert_matches_reference
+from vkbloom import (
+    BevyBloom,
+    BlenderGlare,
+    DualKawase,
+    FilamentBloom,
+    GodotBloom,
+    HdrpBloom,
+    KinoBloom,
+    PygfxBloom,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    UnrealBloom,
+    UrpBloom,
+    reference,
+)
+
+Image = NDArray[Any]
+
+
+class Case(NamedTuple):
+    settings: Settings
+    given: tuple[str, ...]
+    dtype: str = "float32"
+    size: tuple[int, int] = (61, 47)
+
+
+BOTH = ("mask", "emission")
+
+# Every method with its threshold, every formula of alpha and mix, every way to a smaller bloom;
+# sizes of which some levels are exactly half of the one before.
+CASES: dict[str, Case] = {
+    "separable": Case(Separable(threshold=0.3, knee=0.5, composite="mix"), ("mask",)),
+    "separable-fused": Case(Separable(threshold=0.30001), BOTH, "uint8", (64, 48)),
+    "separable-half": Case(Separable(bloom_scale=0.5, alpha="blur"), ("mask",)),
+    "separable-layers": Case(
+        Separable(layers=((1.0, 1.0), (2.0, 0.5)), alpha="blur", blur_strength=0.5),
+        ("emission",),
+        "float16",
+    ),
+    "separable-direct": Case(Separable(direct=True, alpha="max"), ("mask",), "uint8", (31, 17)),
+    "separable-loops": Case(Separable(loops=2, blur_scale=1.7, alpha="blur"), (), "uint8"),
+    "pyramid": Case(
+        Pyramid(levels=3, threshold=0.3, composite="mix"), ("mask",), "float16", (64, 48)
+    ),
+    "pyramid-alpha": Case(Pyramid(levels=3, alpha="blur"), ("mask",), "float32", (64, 48)),
+    "pyramid-firefly": Case(Pyramid(firefly_filter=True, alpha="blur"), BOTH, "uint8"),
+    "pyramid-max": Case(Pyramid(levels=2, alpha="max", exposure=1.0), ("emission",), size=(64, 48)),
+    "pyramid-weights": Case(
+        Pyramid(levels=3, level_weights=(0.2, 0.5, 0.4), format="rgba16float", alpha="blur"),
+        ("mask",),
+        "uint8",
+    ),
+    "dual-kawase": Case(DualKawase(levels=3, threshold=0.30001, alpha="blur"), ("mask",)),
+    "kino": Case(KinoBloom(threshold=0.5, alpha="blur"), ("mask",)),
+    "bevy": Case(BevyBloom(threshold=0.3, max_mip_dimension=32, alpha="blur"), ("mask",)),
+    "bevy-emission": Case(BevyBloom(max_mip_dimension=32), ("emission",), "float16"),
+    "filament": Case(FilamentBloom(threshold=0.4, resolution=16, alpha="blur"), ("mask",)),
+    "filament-near": Case(FilamentBloom(resolution=48, alpha="max"), BOTH),
+    "urp": Case(UrpBloom(threshold=0.5, clamp_max=3.0, alpha="blur"), ("mask",)),
+    "hdrp": Case(HdrpBloom(composite="mix", alpha="blur"), ("mask",)),
+    "unreal": Case(UnrealBloom(threshold=0.5, alpha="blur"), ("mask",)),
+    "godot": Case(
+        GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"), ("mask",)
+    ),
+    "godot-emission": Case(GodotBloom(composite="mix", alpha="max"), ("emission",), "float16"),
+    "blender": Case(BlenderGlare(threshold=0.5, alpha="blur"), ("mask",)),
+    "pygfx": Case(PygfxBloom(karis_average=True, alpha="blur"), ("mask",)),
+}
+
+
+def image_of(size: tuple[int, int], dtype: str, seed: int = 0) -> Image:
+    """Return a picture whose alpha is 0 to 1, and whose right quarter is transparent black."""
+    image = hdr_picture(*size, 4, dtype, seed)
+    if dtype != "uint8":
+        image[..., 3] = np.clip(image[..., 3] / 8, 0, 1)
+    image[:, 3 * size[0] // 4 :] = 0
+    return image
+
+
+def given_of(case: Case) -> dict[str, Any]:
+    mask = np.random.default_rng(3).random(case.size[::-1], dtype=np.float32)
+    mask[:9, :9] = 0
+    made = {"mask": mask, "emission": image_of(case.size, case.dtype, seed=5)}
+    return {name: made[name] for name in case.given}
+
+
+@pytest.fixture(scope="module", params=("fragment", "cpu", "gpu"))
+def formed(request: pytest.FixtureRequest) -> Iterator[Renderer]:
+    """A renderer that is held to one column of the table of variants."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VKBLOOM_FORM", str(request.param))
+        opened = Renderer(validation=True)
+    with opened:
+        yield opened
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_against_the_reference(formed: Renderer, name: str) -> None:
+    case = CASES[name]
+    image, given = image_of(case.size, case.dtype), given_of(case)
+    frames = formed.apply(image, case.settings, **given)
+    assert_matches_reference(frames, image, case.settings, **given)
+    # A fused pass may stand for several.
+    formed.apply(image[::-1], case.settings, attachments=("glow",), **given)
+    alone = formed.apply(image, case.settings, attachments=("final",), **given)
+    assert_array_equal(alone["final"], frames["final"])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_mask_of_one_changes_no_bit_and_one_of_zero_leaves_no_bloom(
+    renderer: Renderer, name: str
+) -> None:
+    case = CASES[name]
+    image = image_of(case.size, case.dtype)
+    settings = case.settings
+    ones = np.ones(case.size[::-1], bool)
+    plain, full = renderer.apply(image, settings), renderer.apply(image, settings, mask=ones)
+    for framebuffer in plain:
+        assert_array_equal(full[framebuffer], plain[framebuffer], framebuffer)
+    dark = renderer.apply(image, settings, mask=~ones)
+    assert not dark["bloom"][..., :3].any()
+    assert_array_equal(dark["final"][..., 3], image[..., 3])
+
+
+# --- Formulas, by hand ---
+
+
+def flat(*colour: float) -> Image:
+    return np.broadcast_to(np.array(colour, np.float32), (8, 12, len(colour))).copy()
+
+
+@pytest.mark.parametrize(
+    "settings", [Pyramid(levels=2), PygfxBloom(levels=1, format="rgba32float")]
+)
+def test_mix_takes_from_the_scene_what_the_bloom_came_of(
+    renderer: Renderer, settings: Settings
+) -> None:
+    # Flat images stay flat: the bloom is m s or e.
+    mixed = settings.replace(composite="mix", intensity=0.25)
+    image, mask = flat(0.8, 0.4, 0.2), np.full((8, 12), 0.5, np.float32)
+    masked = renderer.apply(image, mixed, mask=mask)
+    assert_allclose(masked["bloom"][..., :3], 0.5 * image, rtol=1e-5)
+    # s + i (b - m s) with b = m s.
+    assert_allclose(masked["final"], image, rtol=1e-5)
+    emission = flat(0.0, 1.0, 2.0)
+    for white in (None, np.full((8, 12), 255, np.uint8)):
+        lit = renderer.apply(image, mixed, emission=emission, mask=white)
+        assert_allclose(lit["final"], image + 0.25 * emission, rtol=1e-5)
+
+
+def test_an_emission_takes_the_place_of_the_image(renderer: Renderer) -> None:
+    image, emission = picture(33, 17, 4), 3 * picture(33, 17, 4, seed=2)
+    settings = Pyramid(levels=2, threshold=1.0)
+    lit, own = (
+        renderer.apply(image, settings, emission=emission),
+        renderer.apply(emission, settings),
+    )
+    for name in ("glow", "down_0", "bloom"):
+        assert_array_equal(lit[name], own[name], name)
+    expected = image[..., :3] + lit["bloom"][..., :3]
+    assert_allclose(lit["final"][..., :3], expected, rtol=1e-6)
+    assert_array_equal(lit["final"][..., 3], image[..., 3])
+
+
+@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
+def test_alpha_max(renderer: Renderer, composite: Any) -> None:
+    image = flat(0.5, 2.0, 0.25, 0.125)
+    settings = Pyramid(levels=1, alpha="max", composite=composite, intensity=0.2)
+    settings = settings.replace(exposure=3.0, tonemap="reinhard", encoding="srgb")
+    # i b, before exposure and curve.
+    assert_allclose(renderer.apply(image, settings)["final"][..., 3], 0.4, rtol=1e-5)
+    high = settings.replace(intensity=2.0)
+    assert_array_equal(renderer.apply(image, high)["final"][..., 3], 1.0)
+    low = settings.replace(intensity=0.01)
+    assert_array_equal(renderer.apply(image, low)["final"][..., 3], np.float32(0.125))
+
+
+def test_alpha_blur(renderer: Renderer) -> None:
+    image = flat(0.5, 0.25, 0.25, 0.5)
+    settings = Pyramid(levels=1, alpha="blur", intensity=0.5)
+    frames = renderer.apply(image, settings, mask=np.full((8, 12), 0.5, np.float16))
+    assert_allclose(frames["glow"][..., 3], 0.25)
+    assert_allclose(frames["bloom"][..., 3], 0.25, rtol=1e-6)
+    # 1 - (1 - a)(1 - i b_a)
+    assert_allclose(frames["final"][..., 3], 1 - 0.5 * (1 - 0.125), rtol=1e-6)
+    # What does not pass the threshold has no alpha either.
+    dark = renderer.apply(image, settings.replace(threshold=1.0))
+    assert not dark["bloom"].any()
+    assert_array_equal(dark["final"], image)
+
+
+def test_alpha_blur_of_a_grey_image_blurs_alpha_like_its_colours(renderer: Renderer) -> None:
+    image = np.repeat(picture(31, 21, 1), 4, axis=2)
+    for settings in (Separable(), Pyramid(firefly_filter=True), KinoBloom(), HdrpBloom()):
+        bloom = renderer.apply(image, settings.replace(alpha="blur"))["bloom"]
+        assert_allclose(bloom[..., 3], bloom[..., 0], rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("alpha", ["max", "blur"])
+def test_nan_and_infinity_of_an_alpha_stay_in_their_pixels(renderer: Renderer, alpha: Any) -> None:
+    image = picture(21, 13, 4)
+    image[3, 4, 3], image[5, 6, 3] = np.nan, np.inf
+    settings = Pyramid(levels=2, alpha=alpha, intensity=0.2)
+    frames = renderer.apply(image, settings)
+    assert_matches_reference(frames, image, settings)
+    assert np.isnan(frames["final"][3, 4, 3])
+    assert np.isposinf(frames["final"][5, 6, 3])
+    assert np.isfinite(frames["bloom"]).all()
+
+
+def test_scenes_ignore_alpha(renderer: Renderer, scene: Scene) -> None:
+    plain = renderer.render(scene, Pyramid(levels=2), (48, 32))
+    blurred = renderer.render(scene, Pyramid(levels=2, alpha="blur"), (48, 32))
+    for name in plain:
+        assert_array_equal(blurred[name], plain[name], name)
+
+
+def test_masked_buffers_of_rg11b10(renderer: Renderer) -> None:
+    image = picture(33, 17, 4)
+    mask = np.random.default_rng(4).random((17, 33)) < 0.5
+    settings = Pyramid(levels=2, format="rg11b10ufloat")
+    masked = renderer.apply(image, settings, mask=mask)
+    lit = renderer.apply(image, settings, emission=image * mask[..., np.newaxis])
+    for name in lit:
+        assert_array_equal(masked[name], lit[name], name)
+
+
+# --- What is given ---
+
+
+def test_masks_of_other_types(renderer: Renderer) -> None:
+    image, settings = picture(19, 14, 3), Pyramid(levels=2)
+    levels = np.arange(14 * 19, dtype=np.uint8).reshape(14, 19)
+
+    def glow(mask: object) -> Image:
+        return renderer.apply(image, settings, mask=mask)["glow"]  # type: ignore[arg-type]
+
+    assert_array_equal(glow(levels), glow(levels / np.float32(255)))
+    halves = (levels / np.float32(255)).astype(np.float16)
+    assert_array_equal(glow(halves), glow(halves.astype(np.float32)))
+    assert_array_equal(glow(levels > 99), glow((levels > 99).astype(np.float32)))
+    singles = halves.astype(np.float32)
+    assert_array_equal(glow(singles.astype(">f4")), glow(singles))
+    assert_array_equal(glow(np.asfortranarray(singles)), glow(singles))
+    assert_array_equal(glow(np.repeat(singles, 2, axis=1)[:, ::2]), glow(singles))
+    assert_array_equal(glow(memoryview(singles.data)), glow(singles))
+
+
+def test_what_is_given_again_is_not_sent_again(renderer: Renderer) -> None:
+    image, emission = picture(24, 16, 4, seed=8), picture(24, 16, 4, seed=9)
+    mask = np.random.default_rng(1).random((16, 24), dtype=np.float32)
+    settings = Separable(composite="mix")
+    renderer.apply(image, settings, mask=mask, emission=emission)
+    assert not renderer.apply(image, settings, mask=mask, emission=emission).timings
+    mask[15, 23] /= 2
+    changed = renderer.apply(image, settings, mask=mask, emission=emission)
+    assert next(iter(changed.timings)) == "glow"
+    emission[15, 23] /= 2
+    changed = renderer.apply(image, settings, mask=mask, emission=emission)
+    assert next(iter(changed.timings)) == "glow"
+    image[15, 23] /= 2
+    changed = renderer.apply(image, settings, mask=mask, emission=emission)
+    assert list(changed.timings) == ["final"]
+    given: tuple[dict[str, Any], ...] = ({"mask": mask}, {"emission": emission}, {})
+    for kwargs in given:
+        frames = renderer.apply(image, settings, **kwargs)
+        assert_matches_reference(frames, image, settings, **kwargs)
+
+
+def test_nan_and_infinity_of_an_emission_count(renderer: Renderer) -> None:
+    image, emission = picture(9, 7, 3), picture(9, 7, 3, seed=1)
+    image[0, 0, 0], emission[1, 2, :2], emission[3, 3] = np.nan, np.nan, np.inf
+    settings = Pyramid(levels=2)
+    frames = renderer.apply(image, settings, emission=emission)
+    assert (frames.info["nan"], frames.info["inf"]) == (3, 3)
+    assert_matches_reference(frames, image, settings, emission=emission)
+    off = renderer.apply(image, settings.replace(bloom=False), emission=emission)
+    assert (off.info["nan"], off.info["inf"]) == (3, 3)
+    assert_array_equal(off["final"], image)
+
+
+IMAGE = np.zeros((6, 8, 4), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "message"),
+    [
+        (
+            {"mask": np.zeros((8, 6))},
+            ValueError,
+            r"mask: shape \(8, 6\) is not the image's, \(6, 8\)",
+        ),
+        ({"mask": np.zeros((6, 8, 1))}, ValueError, r"take one channel: mask\[..., 0\]"),
+        ({"mask": np.full((6, 8), 1.5)}, ValueError, "mask: 1.5 is out of range, 0 to 1; clip it"),
+        ({"mask": np.full((6, 8), -1e-3)}, ValueError, "mask: -0.001 is out of range"),
+        ({"mask": np.full((6, 8), np.nan)}, ValueError, "mask: nan is out of range"),
+        (
+            {"mask": np.zeros((6, 8), np.uint16)},
+            TypeError,
+            r"\(mask / 65535\).astype\(np.float32\)",
+        ),
+        (
+            {"mask": np.ma.masked_equal(np.zeros((6, 8)), 0)},
+            ValueError,
+            "mask: some of it is masked",
+        ),
+        ({"mask": "all"}, TypeError, "mask: an array is needed, not str"),
+        (
+            {"emission": IMAGE[..., :3]},
+            ValueError,
+            r"emission: shape \(6, 8, 3\) is not the image's",
+        ),
+        ({"emission": IMAGE[:5]}, ValueError, r"emission: shape \(5, 8, 4\) is not the image's"),
+        ({"emission": IMAGE.astype(np.float16)}, ValueError, "emission: dtype float16 is not the"),
+        ({"emission": IMAGE[..., 0]}, ValueError, r"emission: shape \(6, 8\) is not \(H, W, 3\)"),
+        ({"emission": 1}, TypeError, "emission: an array is needed, not int"),
+    ],
+)
+def test_what_does_not_fit(
+    renderer: Renderer, kwargs: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        renderer.apply(IMAGE, **kwargs)
+    assert not renderer.apply(IMAGE)["bloom"][..., :3].any()
+
+
+@pytest.mark.parametrize("alpha", ["max", "blur"])
+@pytest.mark.parametrize("bloom", [True, False])
+def test_an_alpha_that_is_not_there(renderer: Renderer, alpha: Any, bloom: bool) -> None:
+    settings = Separable(alpha=alpha, bloom=bloom)
+    with pytest.raises(ValueError, match=f"alpha: '{alpha}' needs an image of 4 channels"):
+        renderer.apply(IMAGE[..., :3], settings)
+    buffers = settings.replace(format="rg11b10ufloat")
+    with pytest.raises(ValueError, match="needs bloom buffers that have an alpha"):
+        renderer.apply(IMAGE, buffers)
+    for image, asked in ((IMAGE[..., :3], settings), (IMAGE, buffers)):
+        with pytest.raises(ValueError, match="alpha"):
+            reference.apply(image, asked)
+    with pytest.raises(ValueError, match="alpha: 'most' is not one of keep, max, blur"):
+        settings.replace(alpha="most")
