@@ -1,4 +1,4 @@
-// The graphs, as rows: a source (a scene, an image) and a method of blurring its glow.
+// Builds graphs as rows: for a source (a scene or an image) and a method that blurs its glow.
 #ifndef VKB_METHODS_H
 #define VKB_METHODS_H
 
@@ -15,9 +15,9 @@ struct vkb_image_source {
     bool has_emission, has_mask;
 };
 
-// Whether the sizes that all others of a graph follow from are within 1 and max_side: asked before
-// a graph is built, where sizes that follow from longer sides would not fit 32 bits. `name` is what
-// the caller knows the frame by.
+// Checks that the sizes from which a graph derives all others are 1 to max_side. It is called
+// before a graph is built, since sizes derived from longer sides may not fit 32 bits. `name` is the
+// name of the frame in the message.
 bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,
                      uint32_t max_side, struct vkb_error *error);
 
@@ -33,7 +33,7 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
 bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image_source *image,
                      struct vkb_graph *graph, struct vkb_error *error);
 
-// The rows of the method that the settings name; *bloom is the image that they end in.
+// Adds the rows of the method that the settings name; *bloom is the last image.
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
 #define VKB_METHOD_FUNCTION(constant, name, published) \
@@ -43,7 +43,8 @@ bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_s
 VKB_METHODS(VKB_METHOD_FUNCTION)
 #undef VKB_METHOD_FUNCTION
 
-// The bloom buffers' size: fixed, or a floored part of the frame, never under 1 a side.
+// The size of the bloom buffers: fixed, or a part of the frame, floored, but at least 1 on each
+// side.
 struct vkb_size vkb_bloom_size(const struct vkb_settings *settings, struct vkb_size frame);
 
 #endif

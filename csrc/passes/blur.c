@@ -8,8 +8,8 @@ static bool is_integer(double number)
     return floor(number) == number;
 }
 
-// Shares the taps out to the texels to both sides of them. False where the kernel is longer than a
-// line's.
+// Distributes each tap to the texels on both sides of it. False if the kernel is longer than that
+// of a line.
 static bool move_to_texels(const struct vkb_blur *blur, double step, double weights[MAX_WEIGHTS],
                            uint32_t *count)
 {
@@ -22,7 +22,7 @@ static bool move_to_texels(const struct vkb_blur *blur, double step, double weig
     for (uint32_t tap = 1; tap < blur->count; ++tap) {
         const double at = tap * step, part = at - floor(at);
         const int texel = (int)floor(at);
-        // On the centre's texel both sides of the pair come together.
+        // The taps on both sides contribute to the centre texel.
         weights[texel] += (texel == 0 ? 2.0 : 1.0) * (1.0 - part) * blur->weights[tap];
         if (part > 0.0)
             weights[texel + 1] += part * blur->weights[tap];
@@ -44,7 +44,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     struct vkb_blur_params *params = &row.params.blur;
     struct vkb_blur moved = *blur;
 
-    // Taps of one place are one tap, whatever the sizes are.
+    // With a step of 0 all taps are one tap, for all sizes.
     if (blur->direction != DIRECTION_BOTH && (step == 0.0 || (same_size && !is_integer(step)))
         && move_to_texels(blur, step, moved.weights, &moved.count))
         moved.step_x = moved.step_y = 1.0;
@@ -56,7 +56,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     params->target_width = sampling.width;
     params->target_height = sampling.height;
     params->limit = sampling.limit;
-    // In one direction part of the weights, so that variants need to know nothing of it.
+    // In one direction the gain is part of the weights, so that variants need not apply it.
     params->gain = blur->direction == DIRECTION_BOTH ? (float)blur->gain : 1.0f;
     for (uint32_t i = 0; i < moved.count; ++i) {
         const double gain = blur->direction == DIRECTION_BOTH ? 1.0 : blur->gain;

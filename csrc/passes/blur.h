@@ -14,13 +14,14 @@ struct vkb_blur {
     enum vkb_mode direction;
     double weights[MAX_WEIGHTS];  // of the taps 0, 1, ... to each side
     uint32_t count;
-    double gain;            // of what is added up
+    double gain;            // factor of the sum
     double step_x, step_y;  // the distance of two taps in a row and in a column, in source texels
-    bool filter;            // taps between texels go through the sampler, else they are fetched
+    bool filter;            // the sampler filters taps between texels; otherwise the shader does
 };
 
-// The row of a blur from one image to another. Where all pixels of the target lie on texels, taps
-// between texels are shared out to both, and no variant of the pass filters.
+// The row of a blur from one image to another. If all pixels of the target lie on texels, taps
+// between texels are distributed to the two neighbours, so that no variant of the pass has to
+// filter.
 struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
                                  const struct vkb_blur *blur, uint32_t from, uint32_t to);
 

@@ -80,7 +80,7 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_s
 
     row.reads[0] = from;
     row.read_count = 1;
-    // Never the sampler's filter: lavapipe's is good to 8 bits, and the errors of a chain add up.
+    // The sampler's filter is not used: lavapipe's has 8 bits, and the errors of a chain add up.
     row.constants.sampling = SAMPLING_FETCH;
     return row;
 }
@@ -186,9 +186,9 @@ bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
         && add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, levels->downs[level], error);
 }
 
-// What the taps of an upsampling to twice the size are on integer texels: those of a pixel at a
-// quarter of a texel after a texel's centre, from the texel before it. The tent's outer taps are up
-// to one texel away; a bilinear sample is a tent of no width.
+// The weights of four integer texels for an upsampling to twice the size, for a pixel that is a
+// quarter of a texel after a texel's centre. The first texel is the one before. The outer taps of
+// the tent are up to one texel away; a bilinear sample is a tent with a radius of 0.
 static void find_up_taps(double radius, float taps[4])
 {
     static const double shares[3] = {0.25, 0.5, 0.25};

@@ -1,5 +1,5 @@
-// What the methods with levels of falling size share: the images of a chain, its pass rows, and the
-// way up again.
+// Shared by methods with levels of decreasing size: the images of a chain, its downsampling rows,
+// and its upsampling rows.
 #ifndef VKB_LEVELS_H
 #define VKB_LEVELS_H
 
@@ -28,18 +28,18 @@ struct vkb_combination {
 // The same `own` and `coarse` for all levels.
 struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse);
 
-// Half of a size, floored, never under 1 a side.
+// Half of a size, floored, but at least 1 on each side.
 struct vkb_size vkb_halved(struct vkb_size size);
 
-// Appends sizes until `count` of them are there, each half of the one before; a level of 1 x 1 ends
-// the chain, unless it is the first.
+// Appends sizes until there are `count`, each half of the one before. The chain ends before a level
+// of 1 x 1, unless it is the first.
 void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count);
 
-// An image in the format of the bloom buffers; `number` is put into the name, if that has a %u.
+// An image in the format of the bloom buffers. `number` replaces a %u in the name.
 bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
                       struct vkb_size size, uint32_t *image, struct vkb_error *error);
 
-// The same image as a step that is no framebuffer.
+// The same as an intermediate image, which is not a framebuffer.
 bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
                      struct vkb_size size, uint32_t *image, struct vkb_error *error);
 

@@ -1,4 +1,4 @@
-// What the rows of all passes have in common.
+// Shared by the rows of all passes.
 #ifndef VKB_PASS_H
 #define VKB_PASS_H
 
@@ -24,11 +24,11 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
                     struct vkb_size size, bool framebuffer, uint32_t *index,
                     struct vkb_error *error);
 
-// The format of what a method starts from and of the bloom, for bloom buffers of that format: of
-// the R11G11B10 of engines only the levels are, the frame before and after has a format of its own.
+// The format of the first image of a method and of its bloom, for bloom buffers of that format.
+// With R11G11B10, published methods store only their levels in it.
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers);
 
-// What SAMPLING_ROWS hold for a pass that writes `target`.
+// The values of SAMPLING_ROWS for a pass that writes `target`.
 struct vkb_sampling {
     int width, height;
     float limit;

@@ -1,4 +1,4 @@
-// What the user asked for, in C: filled by arguments.c, read by what makes rows.
+// The settings of a request in C: filled by arguments.c, read by the functions that make rows.
 #ifndef VKB_SETTINGS_H
 #define VKB_SETTINGS_H
 
@@ -36,9 +36,9 @@ struct vkb_layer {
 
 struct vkb_settings {
     enum vkb_method method;
-    struct vkb_values values;  // the numbers, where vkb_value_rows puts them
+    struct vkb_values values;  // the numbers, at the offsets of vkb_value_rows
     int choices[VKB_CHOICE_COUNT];
-    bool thresholded;                    // else the threshold and the knee do not count
+    bool thresholded;                    // false: threshold and knee have no effect
     uint32_t bloom_width, bloom_height;  // 0: by bloom_scale
     enum vkb_format format;              // VKB_FORMAT_NONE: by the source
     float weights[MAX_WEIGHTS];

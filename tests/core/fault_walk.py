@@ -2,7 +2,8 @@
 
 Runs over a core built with VKBLOOM_FAULTS: ``python fault_walk.py STRIDE [WORKLOAD ...]``. Point n
 is the n-th Vulkan call or allocation; the walk ends where the workload passes without reaching it.
-Of STRIDE points one is walked (1: all of them); without workloads, all of them are.
+Of STRIDE points one is walked (1: all of them). Without workloads, all of them are walked; where
+STRIDE is above 1, each method with one set of variants, by turns.
 """
 
 from __future__ import annotations
@@ -326,12 +327,21 @@ def walk_one(name: str, stride: int) -> None:
     print(json.dumps({"workload": name, **figures}), flush=True)
 
 
+def workloads(stride: int) -> list[str]:
+    """Return the names of those that are walked where none is given."""
+    methods = [name for name in WORK if name.startswith("apply ")]
+    others = [name for name in WORK if name not in methods]
+    # Three for each preset: of the first preset the first, of the next one the second.
+    some = [name for i, name in enumerate(methods) if i % 3 == i // 3 % 3]
+    return ["create", "close", *others, *(methods if stride == 1 else some)]
+
+
 def main(stride: int, names: list[str]) -> None:
     # What is made once in a process is there before anything is counted.
     with open_renderer() as renderer:
         WORK["render forward"](renderer)
     try:
-        for name in names or ["create", "close", *WORK]:
+        for name in names or workloads(stride):
             walk_one(name, stride)
     finally:
         shutil.rmtree(FOLDER, ignore_errors=True)

@@ -17,6 +17,7 @@ import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
+from vkbloom.cli.glow_options import accompanying, glow_options
 from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
@@ -47,6 +48,7 @@ _LARGEST_PORT: Final = 65535
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred", show_default=True)
 @subimage_option
 @layer_option
+@glow_options
 @device_options
 @scene_options
 @settings_options
@@ -59,6 +61,8 @@ def command(
     shading: Shading,
     subimage: int,
     layer: str | None,
+    mask: str | None,
+    emission: str | None,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -76,10 +80,14 @@ def command(
         raise click.UsageError(
             "--scene, --shading and --size are for a scene; leave them out with an IMAGE"
         )
+    if source is None and (mask or emission):
+        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
     looked_at: vkbloom.Scene | NDArray[Any]
     begun: vkbloom.Settings | None = settings
+    arguments: dict[str, Any] = {}
     if source is not None:
         looked_at = read_picture(source, subimage, None, layer=layer).pixels
+        arguments = accompanying(mask, emission)(looked_at)
     else:
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
@@ -89,7 +97,9 @@ def command(
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 
         def new_viewer() -> Viewer:
-            return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer)
+            return Viewer(
+                looked_at, begun, size=size, shading=shading, renderer=renderer, **arguments
+            )
 
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.

@@ -31,6 +31,8 @@ def explore(
     source: Scene | NDArray[Any] | None = None,
     settings: Settings | None = None,
     *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
     against: Settings | None = None,
     size: tuple[int, int] = (1280, 720),
     shading: Shading = "deferred",
@@ -52,6 +54,8 @@ def explore(
         To begin with; by default ``presets["bevy_natural"]`` for an image and
         ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and ``encoding="srgb"`` if
         the shading is deferred.
+    mask, emission : ndarray, optional
+        Of an image, as for `Renderer.apply`; they are reduced with it.
     against : Settings, optional
         The initial settings of B. Default: `settings` without bloom.
     size : (int, int)
@@ -101,5 +105,14 @@ def explore(
     from vkbloom.explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     return Explorer(
-        Viewer(source, settings, against=against, size=size, shading=shading, renderer=renderer)
+        Viewer(
+            source,
+            settings,
+            mask=mask,
+            emission=emission,
+            against=against,
+            size=size,
+            shading=shading,
+            renderer=renderer,
+        )
     )

@@ -1,4 +1,4 @@
-"""What can be set on the page: controls made from the settings' fields; settings as code."""
+"""The controls of the page, made from the fields of the settings; settings as Python code."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ __all__ = ["METHODS", "as_code", "controls", "settings_from"]
 #: Settings class of each method, by the method's name.
 METHODS: Final = methods()
 
-# Where a slider ends, of fields whose range is wider than what one looks at; the number beside the
-# slider takes the whole range. A range that a method narrows is its slider's.
+# Ends of the sliders of fields with a very wide range. The number beside the slider takes the
+# complete range. If a method narrows a range, its slider has this range.
 _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
     "threshold": (0, 4),
     "intensity": (0, 4),
@@ -45,7 +45,7 @@ _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
     "loops": (1, 8),
     "dither_seed": (0, 100),
 }
-# Of all methods' fields those that stand first, beside the numbers that are a method's own.
+# Fields that come first, in addition to the numbers that only this method has.
 _FIRST: Final = ("bloom", "threshold", "intensity", "exposure", "tonemap")
 _STEPS_OF_A_SLIDER: Final = 200
 # How a picture is developed: what stays on the page when another preset or method is chosen.
@@ -84,7 +84,7 @@ def _fields(kind: type[Settings]) -> list[dict[str, Any]]:
         control = _control(kind, field, annotations[field.name])
         if control is not None:
             own = field.name not in shared
-            # Whole numbers of which there are two are rather switches.
+            # An integer with two values is more like a switch than a slider.
             slides = (
                 control["kind"] == "number" and control["from"] + control["step"] < control["to"]
             )
@@ -94,14 +94,14 @@ def _fields(kind: type[Settings]) -> list[dict[str, Any]]:
                 "first": field.name in _FIRST or (own and slides),
             }
             found.append((field.name != "bloom", not own, control))
-    # A method's own come first, but for the switch: they are why one chose it.
+    # The fields of the method come first, after `bloom`: they are the reason to select it.
     return [control for _, _, control in sorted(found, key=lambda entry: entry[:2])]
 
 
 def _control(
     kind: type[Settings], field: dataclasses.Field[Any], annotation: Any
 ) -> dict[str, Any] | None:
-    """Return the control of a field; None of weights, layers, sizes and what a method refuses."""
+    """Return the control of a field; None for tuples, sizes, and fields that a method rejects."""
     parts = typing.get_args(annotation)
     optional = type(None) in parts
     if optional:
@@ -134,7 +134,7 @@ def _control(
 
 
 def _takes(kind: type[Settings], name: str, value: Any) -> bool:
-    """Return whether a method takes a value, all else being its default."""
+    """Return whether a method accepts a value, with all other fields at their defaults."""
     try:
         kind(**{name: value})
     except ValueError:
@@ -143,10 +143,10 @@ def _takes(kind: type[Settings], name: str, value: Any) -> bool:
 
 
 def _round_step(step: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is not above a step."""
+    """Return the largest step of 1, 2 or 5 times a power of ten that is not above a step."""
     for power in range(3, -9, -1):
         for digit in (5, 2, 1):
-            # The decimal that is meant, not a product near it.
+            # Parsed from text, since a product may not be the nearest float.
             if (round_one := float(f"{digit}e{power}")) <= step * (1 + 1e-9):
                 return round_one
     raise ValueError(f"step: {step!r} is too small")
@@ -202,5 +202,5 @@ def _arguments(settings: Settings, begun: Settings) -> str:
 
 
 def _literal(value: object) -> str:
-    # The choices' names need no escapes.
+    # Names of choices need no escapes.
     return f'"{value}"' if isinstance(value, str) else repr(value)

@@ -1,4 +1,4 @@
-"""Framebuffers as PNG, quickly: what takes a contact sheet its time is the sRGB curve."""
+"""Framebuffers as PNG, optimized for speed: the sRGB curve is a table."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from vkbloom.views import pictures
 
 __all__ = ["picture_of", "reduced", "texts_of"]
 
-# Of zlib: the pictures go to this machine's browser or through a notebook's server, and waiting
-# for a smaller file costs more than sending a larger one.
+# Compression level of zlib. The pictures go to a browser on this machine or through a notebook
+# server, where compressing takes longer than sending a larger file.
 _LEVEL: Final = 1
 
 
@@ -24,17 +24,17 @@ def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float
     ----------
     array : ndarray, shape (H, W, C) or (H, W)
     name : str
-        Of the framebuffer.
+        Name of the framebuffer.
     is_encoded : bool
-        Whether `final` has an encoding already.
+        Whether `final` is already encoded.
     stops : float
-        Exposure that colours of light in floats are shown with.
+        Exposure for framebuffers of floats with colours of light.
 
     Returns
     -------
     bytes
-        An 8-bit PNG file of 1 or 3 channels. Of float32 colours, those between two levels may
-        be a level off, since they are looked up as half floats.
+        An 8-bit PNG file of 1 or 3 channels. float32 colours may be off by one level, since they
+        are rounded to half floats for the table.
     """
     if array.dtype == np.uint8:
         picture = array[:, :, :3]
@@ -70,7 +70,7 @@ def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     Returns
     -------
     ndarray
-        Of the same dtype; the image itself where it fits.
+        Of the same dtype; the image itself if it fits.
     """
     height, width = image.shape[:2]
     shrink = min(size[0] / width, size[1] / height)
@@ -82,7 +82,7 @@ def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
 
 
 def texts_of(pixel: NDArray[Any]) -> list[str]:
-    """Return the numbers of a pixel in as many digits as tell them from their neighbours."""
+    """Return the numbers of a pixel with as many digits as identify each value of the dtype."""
     return [_text(number) for number in np.atleast_1d(pixel)]
 
 

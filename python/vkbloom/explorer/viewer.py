@@ -1,7 +1,7 @@
-"""One viewer of a source: takes the messages of a page, gives pictures and values.
+"""One viewer of a source: answers the messages of a page with pictures and values.
 
-The same for a notebook and for a page of its own; what carries the messages is none of its
-concern. Messages are plain values that JSON can hold:
+It is the same for notebooks and for the page of ``vkbloom explore``, and does not depend on how
+messages are transported. Messages are values that JSON can represent:
 
 ======== ============================================= =========================================
 kind     asked                                         answered
@@ -15,8 +15,8 @@ open     name; the content of a file as a buffer       source, and the settings 
 save     settings; all else as of frame                a picture of the source's own size
 ======== ============================================= =========================================
 
-``view`` and ``id`` come back as they were sent. A page asks for its next frame when it has the one
-before, so that between the two only the newest change counts.
+``view`` and ``id`` are returned as they were sent. A page asks for its next frame when it has
+received the one before. Of the changes in between, only the newest one is rendered.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom.checks import check_image, check_number, check_size
+from vkbloom.checks import check_emission, check_image, check_mask, check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.presets import presets
@@ -52,7 +52,7 @@ SIDES: Final = ("a", "b")
 GLOW: Final = 6.0
 
 _LARGEST_SIDE: Final = 8192
-# Views come without taking leave; what the pointer needs of more than these is forgotten.
+# Views do not say when they are closed. The framebuffers of the oldest ones are dropped.
 _VIEWS_KEPT: Final = 8
 _FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError)
 _LARGEST_GLOW: Final = 1e4
@@ -63,14 +63,14 @@ Answer = tuple[dict[str, Any], list[bytes]]
 
 
 class Viewer:
-    """A source and the two settings that it is looked at with.
+    """A source and the settings of both sides.
 
     Parameters
     ----------
-    source, settings, against, size, shading, renderer
+    source, settings, mask, emission, against, size, shading, renderer
         As for `vkbloom.explore`.
     adapter : str
-        Of the renderer, where none is given.
+        Adapter of the new renderer, if `renderer` is None.
 
     Attributes
     ----------
@@ -90,6 +90,8 @@ class Viewer:
         source: Scene | NDArray[Any] | None = None,
         settings: Settings | None = None,
         *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
         against: Settings | None = None,
         size: tuple[int, int] = (1280, 720),
         shading: Shading = "deferred",
@@ -109,8 +111,11 @@ class Viewer:
             self.settings["b"] = check_settings(against)
         if isinstance(source, Scene):
             self._own_size = check_size("size", size)
+            for name, given in (("mask", mask), ("emission", emission)):
+                if given is not None:
+                    raise ValueError(f"{name}: the source is a scene; leave the argument out")
         else:
-            self._show_image(source)
+            self._show_image(source, mask, emission)
         if renderer is not None and renderer.closed:
             raise ValueError("renderer: it is closed")
         self.renderer = Renderer(adapter) if renderer is None else renderer
@@ -119,7 +124,7 @@ class Viewer:
         self._shown: dict[object, dict[str, NDArray[Any]]] = {}
 
     def close(self) -> None:
-        """Close the renderer, unless it was given; may be called twice."""
+        """Close the renderer, unless the caller passed it; may be called twice."""
         if self._owned:
             self.renderer.close()
 
@@ -132,11 +137,22 @@ class Viewer:
         begun = check_settings(settings)
         self.settings = {"a": begun, "b": begun.replace(bloom=False)}
 
-    def _show_image(self, image: NDArray[Any]) -> None:
-        # A copy, since the page may ask for it long after the caller has changed it.
-        self._image = np.array(check_image(image), order="C")
-        self._scene = None
-        self._own_size = (self._image.shape[1], self._image.shape[0])
+    def _show_image(
+        self,
+        source: NDArray[Any],
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> None:
+        # Copies, since the caller may change the arrays while the page is open.
+        image = np.array(check_image(source), order="C")
+        given = {"image": image}
+        if emission is not None:
+            given["emission"] = np.array(check_emission(emission, image), order="C")
+        if mask is not None:
+            # One channel, since what is reduced has channels.
+            given["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
+        self._scene, self._image = None, given
+        self._own_size = (image.shape[1], image.shape[0])
         self._reduced = (self._own_size, self._image)
 
     def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
@@ -152,8 +168,8 @@ class Viewer:
         Returns
         -------
         (dict, list of bytes)
-            The answer and its pictures; ``{"kind": "error", "error": ...}`` where the message
-            makes no sense.
+            The answer and its pictures; ``{"kind": "error", "error": ...}`` if the message is
+            invalid.
         """
         kinds = {
             "setup": self._setup,
@@ -247,7 +263,7 @@ class Viewer:
                     stops=stops,
                 )
             except _FAILURES as error:
-                # The other side, or the picture before, is still worth looking at.
+                # The other side is still shown.
                 sides[side] = {"error": _described(error)}
                 continue
             self.settings[side], self.frames[side] = settings, frames
@@ -285,14 +301,18 @@ class Viewer:
     def _render(
         self, settings: Settings, size: tuple[int, int], message: Mapping[str, Any]
     ) -> tuple[Frames, list[str]]:
-        """Return one framebuffer, the one that is named or else `final`, and the names of all."""
+        """Return the framebuffer that is named, or `final` if there is none, and all names."""
         name = message.get("framebuffer", "final")
         time, self._shading, glow = self._looked_at(message)
         if self._scene is None:
-            image = self._image_of(size)
+            given: dict[str, Any] = dict(self._image_of(size))
+            image = given.pop("image")
+            if "mask" in given:
+                # Averages of 0 to 1 can be beyond it by a rounding.
+                given["mask"] = given["mask"][..., 0].clip(0, 1)
             names = list(self.renderer.plan(image, settings).outputs)
             chosen = str(name) if name in names else "final"
-            return self.renderer.apply(image, settings, attachments=[chosen]), names
+            return self.renderer.apply(image, settings, attachments=[chosen], **given), names
         if glow != self._scene.glow_intensity:
             self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
         plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
@@ -308,13 +328,15 @@ class Viewer:
         )
         return frames, names
 
-    def _image_of(self, size: tuple[int, int]) -> NDArray[Any]:
+    def _image_of(self, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
+        """Return the image, and its mask and emission, at the size at which it is shown."""
         if self._reduced[0] != size:
-            self._reduced = (size, reduced(self._image, size))
+            images = {name: reduced(array, size) for name, array in self._image.items()}
+            self._reduced = (size, images)
         return self._reduced[1]
 
     def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:
-        """Return the framebuffers that a view shows, by side, to be read and written."""
+        """Return the dict of the framebuffers that a view shows, by side."""
         arrays = self._shown.pop(str(view), {})
         self._shown[str(view)] = arrays
         while len(self._shown) > _VIEWS_KEPT:
@@ -323,7 +345,7 @@ class Viewer:
 
 
 def _finite(timings: Mapping[str, float]) -> dict[str, float]:
-    """Return the times that JSON can hold."""
+    """Return the times that are finite, which JSON requires."""
     return {name: seconds for name, seconds in timings.items() if math.isfinite(seconds)}
 
 
@@ -341,6 +363,6 @@ def _place(at: object) -> tuple[float, float]:
 
 def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
     height, width = array.shape[:2]
-    # 1 is the edge of the last pixel.
+    # A position of 1 is the far edge of the last pixel.
     x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
     return {"x": x, "y": y, "values": texts_of(array[y, x])}

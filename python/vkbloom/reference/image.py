@@ -1,4 +1,4 @@
-"""Images as they come in: real units, formats, and what storing in a format does."""
+"""Images in real units, formats, and the effect of storing values in a format."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FORMATS = {
     "uint8": "rgba8unorm",
     "float16": "rgba16float",
     "float32": "rgba32float",
-    # No format has doubles: they are for work in the reference alone, and nothing clamps them.
+    # No bloom buffer has doubles. They are for work within the reference, and are not clamped.
     "float64": "rgba32float",
 }
 
@@ -33,7 +33,7 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     name : str
         Of the argument, for the errors.
     channels : collection of int, optional
-        The numbers of channels C to accept; any from 1 by default.
+        Accepted numbers of channels C; by default any.
 
     Returns
     -------
@@ -100,10 +100,10 @@ def format_of(image: NDArray[Any], format: str | None) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Storage:
-    """What storing in a format does to the values: it keeps them between two ends.
+    """The effect of storing in a format: values are clamped to its range.
 
-    Nothing is rounded to a format's steps, which is what the tolerance of a comparison is for,
-    unless the format is as coarse as "rg11b10ufloat".
+    Values are not rounded to the steps of a format, except of "rg11b10ufloat", whose steps are
+    coarse. The tolerance of a comparison allows for the rounding.
     """
 
     low: float
@@ -117,10 +117,10 @@ class Storage:
         return np.clip(image, self.low, self.high)
 
     def end(self, image: Array) -> Array:
-        """Return an image as engines pass it on that keep only the levels between in the format.
+        """Return the first or last image of a published method as stored.
 
-        The frame that they start from and the one that they draw the bloom into have formats of
-        their own: with "rg11b10ufloat" nothing happens here.
+        Engines use "rg11b10ufloat" for the levels only: the frame and the bloom have other
+        formats, so that this format does not change them.
         """
         return image if self.is_coarse else self(image)
 
@@ -128,12 +128,12 @@ class Storage:
 def _as_rg11b10(image: Array) -> Array:
     """Round to the nearest values with 5 bits of exponent and 6 of mantissa, of blue 5.
 
-    Ties go to the even one, as IEEE 754 has it. The least step is 2^-20, of blue 2^-19.
+    Ties go to the even value, as in IEEE 754. The smallest step is 2^-20, for blue 2^-19.
 
     Parameters
     ----------
     image : ndarray of float64, shape (..., C)
-        Three channels are red, green and blue; with another number all have 6 bits.
+        Three channels are red, green and blue. With another number, all have 6 bits.
     """
     bits = np.array([6, 6, 5]) if image.shape[-1] == 3 else np.array(6)
     kept = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 2.0**16 - 2.0 ** (15 - bits))
@@ -145,7 +145,7 @@ def _as_rg11b10(image: Array) -> Array:
 
 _STORAGES = {
     "rgba8unorm": Storage(0, 1),
-    # A value that overflowed to infinity would spread over the picture, so buffers end here.
+    # Clamped, since a blur would spread an infinity over the picture.
     "rgba16float": Storage(-65504, 65504),
     "rgba32float": Storage(-math.inf, math.inf),
     "rg11b10ufloat": Storage(0, 65024, is_coarse=True),

@@ -1,4 +1,4 @@
-"""Scenes: meshes with materials, a camera, a sky; glTF files and skies are read here."""
+"""Scenes: meshes with materials, a camera and a sky; readers of glTF files and skies."""
 
 from __future__ import annotations
 

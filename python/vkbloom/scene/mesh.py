@@ -1,4 +1,4 @@
-"""Meshes: vertices, triangles and the surfaces that they are made of."""
+"""Meshes: vertices, triangles and surfaces."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ class Mesh:
     Parameters
     ----------
     vertices
-        ``(N, 9)`` float32, all finite: position xyz, normal xyz, linear colour rgb of each vertex.
-        y points down, as the renderer expects it.
+        ``(N, 9)`` float32, finite: position xyz, normal xyz and linear colour rgb of each vertex.
+        y points down.
     indices
-        ``(M,)`` uint32, M a positive multiple of 3, each under N: the triangles.
+        ``(M,)`` uint32, each less than N: the triangles. M is a positive multiple of 3.
     emission
-        ``(N, 3)`` float32, finite, or None where nothing emits: radiance rgb of each vertex, which
-        the deferred system adds to `brightness`.
+        ``(N, 3)`` float32, finite: emitted radiance rgb of each vertex, which the deferred system
+        adds to `brightness`. None: nothing emits.
     texcoords
-        ``(N, 4)`` float32, finite, or None where there are no surfaces: where in the base texture
-        each vertex lies, then where in the emission's; (0, 0) is the top left corner of a texture,
-        (1, 1) the bottom right one.
+        ``(N, 4)`` float32, finite: the position of each vertex in the base texture, then in the
+        emission texture. (0, 0) is the top left corner of a texture, (1, 1) the bottom right one.
+        May be None if there are no surfaces.
     surfaces
-        The textures of the last triangles: each `Surface` takes its `index_count` entries of
-        `indices`, one after the other, the last one to the end. Triangles before the first have
-        none.
+        The textures of triangles at the end of `indices`. Each `Surface` covers `index_count`
+        entries, one surface after the other; the last one ends at the last entry. The triangles
+        before the first surface have no textures.
 
     Arrays are copied unless they are read-only, C-contiguous owners of their memory.
 
@@ -44,8 +44,8 @@ class Mesh:
     TypeError
         An array has another type or dtype, or a surface another type.
     ValueError
-        An array has another shape, or holds values out of range; surfaces take more indices than
-        there are, or have no texture coordinates.
+        An array has another shape or values out of range; surfaces cover more indices than there
+        are, or have no texture coordinates.
     """
 
     vertices: NDArray[np.float32]
@@ -98,7 +98,7 @@ class Mesh:
 
     @property
     def summary(self) -> str:
-        """Its size in words."""
+        """The size of the mesh as text."""
         size = f"{len(self.indices) // 3} triangles, {len(self.vertices)} vertices"
         if not self.surfaces:
             return size
@@ -107,7 +107,7 @@ class Mesh:
 
 
 def _check_array(name: str, array: object, kind: type[np.generic], columns: int | None) -> None:
-    """Check the dtype, the shape ``(n,)`` or ``(n, columns)``, and that all is finite."""
+    """Check the dtype, the shape ``(n,)`` or ``(n, columns)``, and that all values are finite."""
     if not isinstance(array, np.ndarray) or array.dtype != np.dtype(kind):
         given = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
         raise TypeError(f"{name} must be an array of {np.dtype(kind)}, not {given}")

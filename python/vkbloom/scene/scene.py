@@ -1,7 +1,7 @@
 """Scenes: meshes, the sky and the camera, as immutable values.
 
-Loading needs no Vulkan. What a scene holds is read-only, so a renderer may keep what it uploaded
-for as long as the serial of the scene's contents stays the same.
+Loading needs no Vulkan. The data of a scene is read-only. So a renderer keeps its uploaded data as
+long as the serial of the scene's contents stays the same.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ _serials = itertools.count(1)
 
 
 class _Contents:
-    """What the scenes of the same meshes and sky share: one number, for as long as one is alive."""
+    """A serial that is shared by all living scenes with the same meshes and sky."""
 
     def __init__(self) -> None:
         self.serial = next(_serials)
 
 
-#: By the ids of body, glow and sky. A scene holds its contents and these three, so that no other
-#: object can have such an id while the entry is there.
+#: By the ids of body, glow and sky. A scene refers to its contents and to these three, so that no
+#: other object can have one of these ids while the entry exists.
 _contents: weakref.WeakValueDictionary[tuple[int, int, int], _Contents] = (
     weakref.WeakValueDictionary()
 )
@@ -53,7 +53,7 @@ class Camera:
         Translation xyz of the world in view space, in scene units. The camera looks along -z and
         y points down.
     rotation : (float, float, float)
-        Degrees about x, y and z.
+        Angles about x, y and z in degrees.
     fov : float
         Vertical field of view in degrees, over 0 and under 180.
     near, far : float
@@ -104,7 +104,7 @@ class Camera:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene:
-    """What is rendered: a body, a glow mesh, a sky, and the camera that looks at them.
+    """A body, a glow mesh, a sky, and the camera.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class Scene:
     skybox : Cubemap or None
         The sky, or None for black.
     camera : Camera
-        Where it is seen from.
+        The camera from which the scene is seen.
     glow_intensity : float
         Factor of the glow mesh's colour as emitted radiance in the deferred system, 0 or more.
 
