@@ -47,8 +47,8 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
         shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
         total += shares[levels.count];
     }
-    // An rgba8unorm image ends at 1: it holds the mean, and the bloom is multiplied by `total`.
-    if (source->format != VKB_FORMAT_RGBA8_UNORM)
+    // An image that ends at 1 holds the mean, and the bloom is multiplied by `total`.
+    if (!vkb_ends_at_one(source->format))
         total = 1.0;
     for (uint32_t level = 0; level < UNREAL_LEVELS; ++level)
         shares[level] /= total;

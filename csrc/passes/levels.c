@@ -245,7 +245,7 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
                         uint32_t *bloom, struct vkb_error *error)
 {
-    const bool means = levels->source->format == VKB_FORMAT_RGBA8_UNORM;
+    const bool means = vkb_ends_at_one(levels->source->format);
     uint32_t top = levels->downs[levels->count - 1];
     double below = combination->smallest;
 

@@ -2,6 +2,7 @@
 #ifndef VKB_FORMAT_H
 #define VKB_FORMAT_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <vulkan/vulkan_core.h>
 
@@ -34,6 +35,12 @@ extern const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT];
 static inline uint32_t vkb_pixel_size(enum vkb_format format)
 {
     return vkb_formats[format].channels * vkb_formats[format].channel_size;
+}
+
+// Whether the largest value is 1: sums of levels do not fit.
+static inline bool vkb_ends_at_one(enum vkb_format format)
+{
+    return vkb_formats[format].limit < 2.0f;
 }
 
 // The format of that name; VKB_FORMAT_NONE if there is none.

@@ -25,6 +25,8 @@ class Image:
         (H, W, 3) or (H, W, 4), as of the array that it was made of.
     dtype : numpy.dtype
         uint8, float16 or float32.
+    mask, emission : bool
+        Whether it was made with one, which then counts wherever it is used.
 
     See Also
     --------
@@ -43,14 +45,22 @@ class Image:
     0.0
     """
 
-    __slots__ = ("__weakref__", "_source", "dtype", "shape")
+    __slots__ = ("__weakref__", "_source", "dtype", "emission", "mask", "shape")
 
     def __init__(
-        self, source: _core.Source, shape: tuple[int, int, int], dtype: np.dtype[Any]
+        self,
+        source: _core.Source,
+        shape: tuple[int, int, int],
+        dtype: np.dtype[Any],
+        *,
+        mask: bool = False,
+        emission: bool = False,
     ) -> None:
         self._source = source
         self.shape = shape
         self.dtype = dtype
+        self.mask = mask
+        self.emission = emission
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("an Image cannot be copied or pickled; it is on one renderer's device")

@@ -70,6 +70,8 @@ class Plan:
         Of an image.
     channels : int or None
         Of an image: 3 or 4.
+    mask, emission : bool
+        Whether the image has one (`Renderer.upload`).
     settings : Settings
     attachments : tuple of str
         Names of the requested framebuffers, in the order of the data flow.
@@ -102,6 +104,8 @@ class Plan:
     size: tuple[int, int]
     dtype: np.dtype[Any] | None
     channels: int | None
+    mask: bool
+    emission: bool
     settings: Settings
     attachments: tuple[str, ...]
     outputs: Mapping[str, Framebuffer] = field(compare=False)

@@ -541,7 +541,13 @@ class Renderer:
         shape, dtype = image_kind(image)
         height, width, channels = shape
         source = self._core.upload(image_source(image, mask, emission), None, False)
-        return Image(source, (height, width, channels), dtype)
+        return Image(
+            source,
+            (height, width, channels),
+            dtype,
+            mask=mask is not None,
+            emission=emission is not None,
+        )
 
     def render_many(
         self,
@@ -649,7 +655,16 @@ class Renderer:
         outputs = framebuffers(plan)
         passes = tuple(Pass(*row[:-1]) for row in plan.passes)
         return Plan(
-            kind, (width, height), dtype, channels, settings, tuple(outputs), outputs, passes
+            kind,
+            (width, height),
+            dtype,
+            channels,
+            isinstance(source, Image) and source.mask,
+            isinstance(source, Image) and source.emission,
+            settings,
+            tuple(outputs),
+            outputs,
+            passes,
         )
 
     def grid(

@@ -30,6 +30,7 @@ from vkbloom import (
     UrpBloom,
     reference,
 )
+from vkbloom.explorer.viewer import Viewer
 
 Image = NDArray[Any]
 
@@ -294,6 +295,65 @@ def test_nan_and_infinity_of_an_emission_count(renderer: Renderer) -> None:
     off = renderer.apply(image, settings.replace(bloom=False), emission=emission)
     assert (off.info["nan"], off.info["inf"]) == (3, 3)
     assert_array_equal(off["final"], image)
+
+
+# --- Plans, grids, the explorer ---
+
+
+def test_plans_of_what_is_given(renderer: Renderer) -> None:
+    image, settings = picture(16, 12, 4), Separable(composite="mix")
+    mask = np.ones((12, 16), np.float32)
+    plain = renderer.plan(image, settings)
+    assert plain == renderer.plan(renderer.upload(image), settings)
+    plans = {
+        plain,
+        renderer.plan(renderer.upload(image, mask=mask), settings),
+        renderer.plan(renderer.upload(image, emission=image), settings),
+        renderer.plan(renderer.upload(image, mask=mask, emission=image), settings),
+    }
+    assert len(plans) == 4
+    masked = renderer.plan(renderer.upload(image, mask=mask), settings)
+    assert masked == renderer.plan(renderer.upload(image, mask=0 * mask), settings)
+    reads = {one.name: one.reads for one in masked.passes}
+    assert reads["glow"] == ("image", "mask")
+    assert reads["final"] == ("image", "bloom", "mask")
+    lit = renderer.plan(renderer.upload(image, emission=image), settings)
+    reads = {one.name: one.reads for one in lit.passes}
+    assert reads["glow"] == ("emission",)
+    assert reads["final"] == ("image", "bloom")
+
+
+def test_a_grid_of_a_handle(renderer: Renderer) -> None:
+    image = picture(16, 12, 3)
+    mask = np.random.default_rng(6).random((12, 16), dtype=np.float32)
+    axes: dict[str, list[Any]] = {"intensity": [0.5, 1.0], "composite": ["add", "mix"]}
+    handle = renderer.upload(image, mask=mask)
+    final = renderer.grid(handle, Pyramid(levels=2), axes, progress=False)["final"]
+    for intensity in axes["intensity"]:
+        for composite in axes["composite"]:
+            settings = Pyramid(levels=2, intensity=intensity, composite=composite)
+            expected = renderer.apply(image, settings, mask=mask)["final"]
+            found = final.sel(intensity=intensity, composite=composite).values
+            assert_array_equal(found, expected)
+
+
+def test_the_explorer_reduces_what_is_given_with_the_image(renderer: Renderer) -> None:
+    image, emission = picture(64, 48, 3), picture(64, 48, 3, seed=4)
+    mask = np.zeros((48, 64), np.float32)
+    mask[:, 32:] = 1
+    settings = Pyramid(levels=2, composite="mix")
+    viewer = Viewer(image, settings, mask=mask, emission=emission, renderer=renderer)
+    asked = {"kind": "frame", "sides": {"a": settings.to_dict()}, "size": [32, 24]}
+    answer, _ = viewer.answer({**asked, "framebuffer": "glow"})
+    assert "error" not in answer["sides"]["a"]
+    glow = viewer.frames["a"]["glow"]
+    assert glow.shape == (24, 32, 4)
+    assert not glow[:, :15, :3].any()
+    half = emission.reshape(24, 2, 32, 2, 3).mean(axis=(1, 3))
+    assert_allclose(glow[:, 18:, :3], half[:, 18:], atol=0.2)
+    assert glow[:, 18:, :3].any()
+    with pytest.raises(ValueError, match="mask: the source is a scene"):
+        Viewer(Scene.ufo(), mask=mask, renderer=renderer)
 
 
 IMAGE = np.zeros((6, 8, 4), np.float32)

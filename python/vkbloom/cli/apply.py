@@ -20,6 +20,13 @@ import vkbloom
 from vkbloom.cli import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command
+from vkbloom.cli.glow_options import (
+    accompanying,
+    glow_options,
+    has_straight,
+    premultiplied,
+    uploaded,
+)
 from vkbloom.cli.image_files import (
     COLOURS,
     input_colour_option,
@@ -34,6 +41,7 @@ from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.io import image_writing
+from vkbloom.io.array_files import divided
 from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.settings import Encoding
 
@@ -79,6 +87,7 @@ from vkbloom.settings import Encoding
 )
 @subimage_option
 @layer_option
+@glow_options
 @device_options
 @settings_options
 def command(
@@ -93,6 +102,8 @@ def command(
     raw: bool,
     subimage: int,
     layer: str | None,
+    mask: str | None,
+    emission: str | None,
     adapter: str,
     validation: bool,
     settings: vkbloom.Settings,
@@ -117,7 +128,12 @@ def command(
     values are encoded already and written as they come. EXIF, resolution and a JPEG's chroma
     subsampling are kept.
 
-    Alpha is kept, and colours are neither multiplied nor divided by it. Grey images become RGB
+    --mask limits what glows, --emission glows in the image's place; of several INs they are for
+    each.
+
+    Alpha is kept, unless --alpha says otherwise, and colours are neither multiplied nor divided by
+    it: with --alpha max or blur files of straight colours are multiplied first, and the result is
+    divided. Grey images become RGB
     and grey again. Of an OpenEXR file whose data window is smaller than its display window, the
     rest is black; a larger data window takes part, and is kept where OUT can have one. Images
     are turned upright where the file has an orientation. Of files with several parts the first
@@ -126,14 +142,7 @@ def command(
 
     OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
     """
-    if raw and (input_colour or output_colour):
-        raise click.UsageError(
-            "--raw does not convert colours; leave out --input-colour and --output-colour"
-        )
-    if settings.encoding != "none" and output_colour:
-        raise click.UsageError(
-            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
-        )
+    _check_colours(settings, input_colour, output_colour, raw=raw)
     given, out = _arguments(sources, out)
     if out == PIPE and attachments != "final":
         raise click.UsageError("standard output takes final alone, without --attachments")
@@ -146,11 +155,13 @@ def command(
     names = attachments if attachments == "all" else ["final", *attachments.split(",")]
     wanted = no_bloom.with_bloom(names, settings)
     several = len(work) > 1
+    is_blended = settings.alpha != "keep"
     with tempfile.TemporaryDirectory() as folder, silenced():
 
         def taken(source: str) -> Picture:
             file = _piped_in(folder) if source == PIPE else source
-            return read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            picture = read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            return premultiplied(picture) if is_blended else picture
 
         def write(picture: Picture, frames: vkbloom.Frames, target: str) -> None:
             if several:
@@ -165,14 +176,19 @@ def command(
 
         # Before the device is opened: the most likely failure comes at once.
         first = taken(work[0][0])
+        given_with = accompanying(mask, emission, input_colour, raw=raw, is_blended=is_blended)
         pictures = itertools.chain([first], read_ahead(taken, [name for name, _ in work[1:]]))
         # None: shown where standard error is a terminal.
         disable = None if several and sys.stderr is not None else True
         with vkbloom.Renderer(adapter, validation=validation) as renderer:
             _say(f"Rendering on {renderer.info.summary}", out)
+
+            def prepared(picture: Picture) -> Any:
+                return uploaded(renderer, picture.pixels, given_with(picture.pixels))
+
             with as_wrong_use():
-                renderer.plan(first.pixels, settings, attachments=wanted)
-            results = rendered(renderer, pictures, settings, wanted)
+                renderer.plan(prepared(first), settings, attachments=wanted)
+            results = rendered(renderer, pictures, settings, wanted, prepared)
             del first
             bar = tqdm(results, total=len(work), unit="image", leave=False, disable=disable)
             with written_behind() as write_next, contextlib.closing(results):
@@ -185,6 +201,29 @@ def command(
                     )
     if several:
         click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
+
+
+def _check_colours(
+    settings: vkbloom.Settings,
+    input_colour: Colour | None,
+    output_colour: SavedColour | None,
+    *,
+    raw: bool,
+) -> None:
+    """Raise click.UsageError for options that do not go together."""
+    if raw and (input_colour or output_colour):
+        raise click.UsageError(
+            "--raw does not convert colours; leave out --input-colour and --output-colour"
+        )
+    if settings.encoding != "none" and settings.alpha != "keep":
+        raise click.UsageError(
+            f"--alpha {settings.alpha} is for linear colours; leave out --encoding, OUT is encoded "
+            "as its format needs"
+        )
+    if settings.encoding != "none" and output_colour:
+        raise click.UsageError(
+            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
+        )
 
 
 def _arguments(sources: tuple[str, ...], out: str | None) -> tuple[list[str], str]:
@@ -218,7 +257,7 @@ def _written(
     """Write `final` and the other framebuffers, and return the files."""
     written = _save_others(frames, target)
     notes = image_writing.save(
-        _result(picture, frames["final"], frames.settings.encoding),
+        _result(picture, _straight(picture, frames), frames.settings.encoding),
         target,
         colour,
         {
@@ -252,3 +291,9 @@ def _result(
     """Return the picture with its bloom, with the encoding that its pixels now have."""
     done = picture.encoding if encoding == "none" else encoding
     return dataclasses.replace(picture, pixels=final, encoding=done)
+
+
+def _straight(picture: Picture, frames: vkbloom.Frames) -> NDArray[Any]:
+    """Return `final` with colours as the file's were, multiplied by alpha or not."""
+    final = frames["final"]
+    return divided(final) if frames.settings.alpha != "keep" and has_straight(picture) else final

@@ -16,6 +16,7 @@ import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
+from vkbloom.cli.glow_options import accompanying, glow_options
 from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
@@ -46,6 +47,7 @@ _LARGEST_PORT: Final = 65535
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @subimage_option
 @layer_option
+@glow_options
 @device_options
 @scene_options
 @settings_options
@@ -58,6 +60,8 @@ def command(
     shading: Shading,
     subimage: int,
     layer: str | None,
+    mask: str | None,
+    emission: str | None,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -73,13 +77,20 @@ def command(
         raise click.UsageError(
             "--scene, --shading and --size are for a scene; leave them out with an IMAGE"
         )
+    if source is None and (mask or emission):
+        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
     looked_at: vkbloom.Scene | NDArray[Any] = (
         scene() if source is None else read_picture(source, subimage, None, layer=layer).pixels
+    )
+    arguments: dict[str, Any] = (
+        {} if isinstance(looked_at, vkbloom.Scene) else accompanying(mask, emission)(looked_at)
     )
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 
         def new_viewer() -> Viewer:
-            return Viewer(looked_at, settings, size=size, shading=shading, renderer=renderer)
+            return Viewer(
+                looked_at, settings, size=size, shading=shading, renderer=renderer, **arguments
+            )
 
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.

@@ -52,14 +52,15 @@ def rendered(
     pictures: Iterable[Picture],
     settings: vkbloom.Settings,
     attachments: str | list[str],
+    prepared: Callable[[Picture], Any],
 ) -> Generator[tuple[Picture, vkbloom.Frames], None, None]:
-    """Yield each picture with its frames."""
+    """Yield each picture with its frames; `prepared` gives what the renderer takes for it."""
     waiting: deque[Picture] = deque()
 
     def pixels() -> Iterator[Any]:
         for picture in pictures:
             waiting.append(picture)
-            yield picture.pixels
+            yield prepared(picture)
 
     for frames in renderer.apply_each(pixels(), settings, attachments=attachments):
         yield waiting.popleft(), frames

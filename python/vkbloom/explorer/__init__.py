@@ -31,6 +31,8 @@ def explore(
     source: Scene | NDArray[Any],
     settings: Settings | None = None,
     *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
     against: Settings | None = None,
     size: tuple[int, int] = (1280, 720),
     shading: Shading = "forward",
@@ -50,6 +52,8 @@ def explore(
     settings : Settings, optional
         To begin with; by default ``presets["bevy_natural"]`` for an image and
         ``presets["tutorial"]`` for a scene.
+    mask, emission : ndarray, optional
+        Of an image, as for `Renderer.apply`; they are reduced with it.
     against : Settings, optional
         The initial settings of B. Default: `settings` without bloom.
     size : (int, int)
@@ -99,5 +103,14 @@ def explore(
     from vkbloom.explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     return Explorer(
-        Viewer(source, settings, against=against, size=size, shading=shading, renderer=renderer)
+        Viewer(
+            source,
+            settings,
+            mask=mask,
+            emission=emission,
+            against=against,
+            size=size,
+            shading=shading,
+            renderer=renderer,
+        )
     )

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom.checks import check_image, check_number, check_size
+from vkbloom.checks import check_emission, check_image, check_mask, check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.presets import presets
@@ -56,7 +56,7 @@ class Viewer:
 
     Parameters
     ----------
-    source, settings, against, size, shading, renderer
+    source, settings, mask, emission, against, size, shading, renderer
         As for `vkbloom.explore`.
     adapter : str
         Adapter of the new renderer, if `renderer` is None.
@@ -79,6 +79,8 @@ class Viewer:
         source: Scene | NDArray[Any],
         settings: Settings | None = None,
         *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
         against: Settings | None = None,
         size: tuple[int, int] = (1280, 720),
         shading: Shading = "forward",
@@ -99,11 +101,20 @@ class Viewer:
         if isinstance(source, Scene):
             self._scene: Scene | None = source
             self._own_size = check_size("size", size)
+            for name, given in (("mask", mask), ("emission", emission)):
+                if given is not None:
+                    raise ValueError(f"{name}: the source is a scene; leave the argument out")
         else:
             self._scene = None
-            # A copy, since the caller may change the array while the page is open.
-            self._image = np.array(check_image(source), order="C")
-            self._own_size = (self._image.shape[1], self._image.shape[0])
+            # Copies, since the caller may change the arrays while the page is open.
+            image = np.array(check_image(source), order="C")
+            self._own_size = (image.shape[1], image.shape[0])
+            self._image = {"image": image}
+            if emission is not None:
+                self._image["emission"] = np.array(check_emission(emission, image), order="C")
+            if mask is not None:
+                # One channel, since what is reduced has channels.
+                self._image["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
             self._reduced = (self._own_size, self._image)
         if renderer is not None and renderer.closed:
             raise ValueError("renderer: it is closed")
@@ -208,10 +219,14 @@ class Viewer:
     ) -> tuple[Frames, list[str]]:
         """Return the framebuffer of that name, or `final` if there is none, and all names."""
         if self._scene is None:
-            image = self._image_of(size)
+            given: dict[str, Any] = dict(self._image_of(size))
+            image = given.pop("image")
+            if "mask" in given:
+                # Averages of 0 to 1 can be beyond it by a rounding.
+                given["mask"] = given["mask"][..., 0].clip(0, 1)
             names = list(self.renderer.plan(image, settings).outputs)
             chosen = str(name) if name in names else "final"
-            return self.renderer.apply(image, settings, attachments=[chosen]), names
+            return self.renderer.apply(image, settings, attachments=[chosen], **given), names
         plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
         names = list(plan.outputs)
         chosen = str(name) if name in names else "final"
@@ -225,9 +240,11 @@ class Viewer:
         )
         return frames, names
 
-    def _image_of(self, size: tuple[int, int]) -> NDArray[Any]:
+    def _image_of(self, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
+        """Return the image, and its mask and emission, at the size at which it is shown."""
         if self._reduced[0] != size:
-            self._reduced = (size, reduced(self._image, size))
+            images = {name: reduced(array, size) for name, array in self._image.items()}
+            self._reduced = (size, images)
         return self._reduced[1]
 
     def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:

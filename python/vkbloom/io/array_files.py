@@ -16,7 +16,7 @@ from vkbloom.io import image_reading, safe_writing
 from vkbloom.io.image_writing import as_numbers, check_quality, encoded, put
 from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, is_exr
 
-__all__ = ["read", "write"]
+__all__ = ["divided", "multiplied", "read", "write"]
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22"]
 
@@ -126,7 +126,7 @@ def read(
     pixels = picture.pixels
     has_alpha = pixels.shape[2] == 4
     if has_alpha and stored.associated is not premultiplied:
-        pixels = _multiplied(pixels) if premultiplied else _divided(pixels)
+        pixels = multiplied(pixels) if premultiplied else divided(pixels)
     if not metadata:
         return pixels
     facts: dict[str, Any] = {
@@ -233,7 +233,7 @@ def write(
         numbers = _numbers(oiio, values, bits, temporary, target)
         is_integer = numbers.startswith("uint")
         if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
-            values = _divided(values) if premultiplied else _multiplied(values)
+            values = divided(values) if premultiplied else multiplied(values)
         curve = encoding or ("srgb" if is_integer else "linear")
         if is_float:
             values = encoded(values, curve)
@@ -303,12 +303,12 @@ def _numbers(
     raise ValueError(f"{target}: {kind} cannot hold {' or '.join(wanted)}; try another bits=")
 
 
-def _multiplied(values: NDArray[Any]) -> NDArray[Any]:
+def multiplied(values: NDArray[Any]) -> NDArray[Any]:
     """Return colours multiplied by alpha, in the same dtype."""
     return _with_alpha(values, values[:, :, -1:])
 
 
-def _divided(values: NDArray[Any]) -> NDArray[Any]:
+def divided(values: NDArray[Any]) -> NDArray[Any]:
     """Return colours divided by alpha, in the same dtype; as they are where that is 0."""
     alpha = values[:, :, -1:].astype(np.float32)
     one = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)

@@ -1,0 +1,114 @@
+"""The options for what of an image glows: ``--mask`` and ``--emission``."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom.cli.image_files import read_picture
+from vkbloom.io.array_files import multiplied
+from vkbloom.io.images import Colour, Picture
+
+__all__ = ["accompanying", "glow_options", "has_straight", "premultiplied", "uploaded"]
+
+Array = NDArray[Any]
+
+
+def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--mask`` and ``--emission``, the arguments of `vkbloom.Renderer.apply`."""
+
+    @click.option(
+        "--mask",
+        metavar="FILE",
+        type=click.Path(),
+        help="A grey image of the image's size: what may glow, white all, black nothing. Its "
+        "values are taken as they are, not as colours.",
+    )
+    @click.option(
+        "--emission",
+        metavar="FILE",
+        type=click.Path(),
+        help="An image of the image's size that glows in its place, such as a renderer's pass of "
+        "emissive materials. It is decoded like the image.",
+    )
+    @functools.wraps(command)
+    def run(**arguments: object) -> object:
+        return command(**arguments)
+
+    return run
+
+
+def accompanying(
+    mask: str | None,
+    emission: str | None,
+    colour: Colour | None = None,
+    *,
+    raw: bool = False,
+    is_blended: bool = False,
+) -> Callable[[Array], dict[str, Any]]:
+    """Read both files, and return what gives an image's arguments `mask` and `emission`.
+
+    `is_blended`: the emission's colours are to be multiplied by its alpha.
+
+    Raises
+    ------
+    OSError, ValueError
+        A file cannot be read, or the mask has colours.
+    """
+    mask_values = None if mask is None else _read_mask(mask)
+    glow = None
+    if emission is not None:
+        read = read_picture(emission, 0, colour, raw=raw)
+        glow = (premultiplied(read) if is_blended else read).pixels
+
+    def arguments(image: Array) -> dict[str, Array]:
+        given = {} if mask_values is None else {"mask": mask_values}
+        return given if glow is None else {**given, "emission": _alike(glow, image)}
+
+    return arguments
+
+
+def has_straight(picture: Picture) -> bool:
+    """Whether a picture's file has an alpha by which its colours are not multiplied."""
+    return picture.pixels.shape[2] == 4 and not picture.stored.associated
+
+
+def premultiplied(picture: Picture) -> Picture:
+    """Return a picture whose colours are multiplied by alpha, if there is one."""
+    if not has_straight(picture):
+        return picture
+    return dataclasses.replace(picture, pixels=multiplied(picture.pixels))
+
+
+def _read_mask(file: str) -> Array:
+    pixels = read_picture(file, 0, "linear").pixels
+    if (pixels[..., :3] != pixels[..., :1]).any():
+        raise ValueError(f"{file}: a mask is grey, and this image has colours")
+    return pixels[..., 0]
+
+
+def _alike(emission: Array, image: Array) -> Array:
+    """Return an emission with the channels and the dtype of an image; files may differ in both."""
+    channels = image.shape[2]
+    if emission.shape[2] < channels:
+        one = 255 if emission.dtype == np.uint8 else 1
+        alpha = np.full((*emission.shape[:2], 1), one, emission.dtype)
+        emission = np.concatenate([emission, alpha], axis=2)
+    if (emission.dtype == np.uint8) != (image.dtype == np.uint8):
+        # --raw of one and floats of the other: as they come.
+        return emission[..., :channels]
+    return emission[..., :channels].astype(image.dtype, copy=False)
+
+
+def uploaded(
+    renderer: vkbloom.Renderer, image: Array, arguments: dict[str, Array]
+) -> Array | vkbloom.Image:
+    """Return what a renderer takes for an image with its mask and its emission."""
+    return renderer.upload(image, **arguments) if arguments else image

@@ -1,0 +1,107 @@
+"""``--mask``, ``--emission`` and ``--alpha`` of the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.testing import assert_array_equal
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.images import picture
+from vkbloom.cli.program import program
+
+pytest.importorskip("OpenImageIO")
+
+PYRAMID = ("--method", "pyramid", "--levels", "2", "--composite", "mix")
+SETTINGS = vkbloom.Pyramid(levels=2, composite="mix")
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(program, [str(word) for word in words])
+
+
+def done(*words: object) -> Result:
+    result = run(*words)
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result
+
+
+def stored(path: Path, array: NDArray[Any]) -> Path:
+    return vkbloom.write(path, array)
+
+
+def expected(image: NDArray[Any], settings: vkbloom.Settings, **given: Any) -> NDArray[Any]:
+    with vkbloom.Renderer() as renderer:
+        return renderer.apply(image, settings, attachments="final", **given)["final"]
+
+
+def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:
+    image, emission = picture(24, 16, 3), picture(24, 16, 3, seed=1)
+    levels = np.arange(16 * 24, dtype=np.uint8).reshape(16, 24)
+    source = stored(tmp_path / "a.exr", image)
+    # 128 is half, not what sRGB makes of it; a file of three channels that are equal is grey too.
+    mask = stored(tmp_path / "mask.png", np.repeat(levels[..., None], 3, axis=2))
+    glow = stored(tmp_path / "glow.exr", emission)
+    out = tmp_path / "out.exr"
+    done("apply", source, out, *PYRAMID, "--mask", mask)
+    assert_array_equal(vkbloom.read(out), expected(image, SETTINGS, mask=levels))
+    done("apply", source, out, *PYRAMID, "--mask", mask, "--emission", glow)
+    both = expected(image, SETTINGS, mask=levels, emission=emission)
+    assert_array_equal(vkbloom.read(out), both)
+
+
+def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
+    # Files need not have the same channels and numbers.
+    images = [picture(24, 16, 4, seed=seed) for seed in (2, 3)]
+    emission = picture(24, 16, 3, "float16", seed=4)
+    sources = [tmp_path / f"f{i}.exr" for i in range(2)]
+    for source, image in zip(sources, images, strict=True):
+        vkbloom.write(source, image, premultiplied=True)
+    glow = stored(tmp_path / "glow.exr", emission)
+    done("apply", *sources, tmp_path / "out", *PYRAMID, "--alpha", "max", "--emission", glow)
+    alike = np.concatenate([emission, np.ones((16, 24, 1))], axis=2).astype(np.float32)
+    for source, image in zip(sources, images, strict=True):
+        found = vkbloom.read(tmp_path / "out" / source.name, premultiplied=True)
+        wanted = expected(image, SETTINGS.replace(alpha="max"), emission=alike)
+        assert_array_equal(found, wanted)
+
+
+def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
+    levels = picture(24, 16, 4, "uint8")
+    levels[:, :12, 3] = 0
+    source, out = stored(tmp_path / "a.png", levels), tmp_path / "out.png"
+    done("apply", source, out, *PYRAMID, "--alpha", "blur")
+    image = vkbloom.read(source, premultiplied=True)
+    final = expected(image, SETTINGS.replace(alpha="blur"))
+    vkbloom.write(tmp_path / "own.png", final, premultiplied=True)
+    difference = vkbloom.read(out) - vkbloom.read(tmp_path / "own.png")
+    assert np.abs(difference).max() <= 0.01
+    assert vkbloom.read(out)[:, 11, 3].min() > 0
+    refused = run("apply", source, out, "--alpha", "blur", "--encoding", "srgb")
+    assert refused.exit_code == 2
+
+
+def test_what_does_not_fit(tmp_path: Path) -> None:
+    source = stored(tmp_path / "a.exr", picture(24, 16, 3))
+    out = tmp_path / "out.exr"
+    small = stored(tmp_path / "small.png", np.zeros((8, 8, 3), np.uint8))
+    coloured = stored(tmp_path / "coloured.png", picture(24, 16, 3, "uint8"))
+    refused = run("apply", source, out, "--mask", small)
+    assert refused.exit_code == 2
+    assert "mask: shape (8, 8) is not the image's, (16, 24)" in refused.stderr
+    refused = run("apply", source, out, "--mask", coloured)
+    assert refused.exit_code == 1
+    assert refused.stderr.count("\n") == 1
+    assert "coloured.png: a mask is grey, and this image has colours" in refused.stderr
+    refused = run("apply", source, out, "--alpha", "blur")
+    assert refused.exit_code == 2
+    assert "alpha: 'blur' needs an image of 4 channels" in refused.stderr
+    assert not out.exists()
+    refused = run("explore", "--no-open", "--mask", coloured)
+    assert refused.exit_code == 2
+    assert "--mask and --emission are for an IMAGE" in refused.stderr
