@@ -27,7 +27,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Look for leaks in a worker of xdist, which ends without the sanitizer's look at its exit."""
+    """Look for leaks in a worker of xdist, which may end without the look at its exit."""
     if "VKBLOOM_SANITIZED" in os.environ and hasattr(config, "workerinput"):
         gc.collect()
         # (Of the library that is preloaded.)
