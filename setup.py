@@ -19,6 +19,10 @@ STAGES = (".vert", ".frag", ".comp")
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
+# Shaders whose images are always words.
+WORDS_ALONE = {"strip.comp", "threshold.comp", "blend.comp"}
+
+CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
 
 class Module(NamedTuple):
@@ -32,11 +36,20 @@ class Module(NamedTuple):
 def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to.
 
-    A pass over all pixels has a compute form too; a shader that loads texels without a sampler
-    is compiled for each format that it may load from.
+    A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
+    is compiled for each format that it may load from: for images as words, and for storage images,
+    unless only CPUs run it.
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
+    if '#include "variants/pixels.glsl"' in text:
+        found = []
+        for ours, glsl in FORMATS.items():
+            if shader.name not in WORDS_ALONE:
+                found.append(Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",)))
+            words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
+            found.append(Module(f"{shader.stem}_words_{ours}", shader, words))
+        return found
     if "SOURCE_FORMAT" in text:
         return [
             Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",))

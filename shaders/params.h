@@ -219,24 +219,29 @@
 
 // Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line, and of a fused
 // bloom. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
-#define LINE_RADIUS       64
-#define LINE_SHORT_RADIUS 8
-#define LINE_OUTPUTS      8
-#define LINE_VEC4S        34
-#define STRIP_RADIUS      4
-#define STRIP_COLUMNS     8
-#define STRIP_ROWS        72
-#define HALVE_COLUMNS     4
-#define HALVE_ROWS        16
-#define DOUBLE_COLUMNS    4
-#define DOUBLE_ROWS       32
-#define TEXEL_COLUMNS     4
-#define TEXEL_ROWS        16
-#define TILE_LOADED       64
-#define TILE_ROWS         32
-#define TILE_RUNS         4
-#define TILE_RADIUS       16
-#define FUSED_VEC4S       5
+#define LINE_RADIUS            64
+#define LINE_SHORT_RADIUS      8
+#define LINE_OUTPUTS           8
+#define LINE_VEC4S             34
+#define STRIP_RADIUS           4
+#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
+#define STRIP_ROWS             135
+#define HALVE_COLUMNS          4
+#define HALVE_ROWS             16
+#define DOUBLE_COLUMNS         4
+#define DOUBLE_ROWS            32
+// Blocks of words, which pixels of three channels fill, too. CHANNEL is the bytes of a channel.
+#define HALVE_WORDS_COLUMNS           8
+#define HALVE_WORDS_ROWS              32
+#define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
+#define DOUBLE_WORDS_ROWS             64
+#define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
+#define TEXEL_ROWS                    16
+#define TILE_LOADED                   64
+#define TILE_ROWS                     32
+#define TILE_RUNS                     4
+#define TILE_RADIUS                   16
+#define FUSED_VEC4S                   5
 
 // The most levels that one pass gathers, and the most of a chain.
 #define GATHERED_LEVELS 7

@@ -47,7 +47,7 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     PACK(constants);
     PACK(reads);
     PACK(read_count);
-    PACK(loads);
+    PACK(reading);
     PACK(fused);
     PACK(block_width);
     PACK(block_height);
@@ -91,7 +91,7 @@ uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first)
     return end;
 }
 
-static bool reads(const struct vkb_pass_row *pass, uint32_t image)
+bool vkb_pass_reads(const struct vkb_pass_row *pass, uint32_t image)
 {
     for (uint32_t i = 0; i < pass->read_count; ++i)
         if (pass->reads[i] == image)
@@ -139,13 +139,14 @@ enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
 {
     if (pass->geometry != VKB_GEOMETRY_DISPATCH)
         return VKB_ACCESS_SAMPLED;
-    return pass->loads ? VKB_ACCESS_DISPATCH_LOADED : VKB_ACCESS_DISPATCH_SAMPLED;
+    return pass->reading == VKB_READING_SAMPLED ? VKB_ACCESS_DISPATCH_SAMPLED
+                                                : VKB_ACCESS_DISPATCH_LOADED;
 }
 
 enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (reads(&graph->passes[i], image))
+        if (vkb_pass_reads(&graph->passes[i], image))
             return vkb_pass_reads_as(&graph->passes[i]);
     return graph->images[image].format == VKB_FORMAT_DEPTH32_FLOAT ? VKB_ACCESS_DEPTH_TARGET
                                                                    : VKB_ACCESS_COPY_SOURCE;
@@ -239,7 +240,7 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
     if ((row->format == VKB_FORMAT_DEPTH32_FLOAT) != depth)
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s: %s has the wrong kind of format",
                         pass->name, row->name);
-    if (reads(pass, target))
+    if (vkb_pass_reads(pass, target))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s reads its own target %s",
                         pass->name, row->name);
     if (row->width != graph->images[first].width || row->height != graph->images[first].height)
@@ -249,7 +250,7 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
     for (uint32_t i = pass_index; i-- > 0;) {
         if (vkb_graph_group_end(graph, i) > pass_index || (pass->fused && i == pass_index - 1))
             continue;
-        if (vkb_pass_writes(&graph->passes[i], target) || reads(&graph->passes[i], target))
+        if (vkb_pass_writes(&graph->passes[i], target) || vkb_pass_reads(&graph->passes[i], target))
             return vkb_fail(error, VKB_ERROR_GENERAL,
                             "graph: pass %s writes %s, which pass %s used before", pass->name,
                             row->name, graph->passes[i].name);
@@ -262,7 +263,8 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
     const struct vkb_pass_row *pass = &graph->passes[index];
 
     if (pass->target_count > VKB_MAX_TARGETS
-        || pass->read_count > (pass->loads ? VKB_MAX_LOADS : VKB_MAX_READS)
+        || pass->read_count > (pass->reading == VKB_READING_SAMPLED ? VKB_MAX_READS : VKB_MAX_LOADS)
+        || (pass->reading != VKB_READING_SAMPLED && pass->geometry != VKB_GEOMETRY_DISPATCH)
         || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
         || (pass->geometry == VKB_GEOMETRY_DISPATCH
             && (pass->target_count != 1 || pass->depth != VKB_NO_IMAGE || pass->blend

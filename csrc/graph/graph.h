@@ -11,7 +11,7 @@
 enum {
     VKB_NAME_SIZE = 32,
     VKB_MAX_READS = GATHERED_LEVELS,
-    // Storage images. With the target, one less than the four that every device supports.
+    // Storage images or words. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
 };
@@ -54,6 +54,14 @@ static inline bool vkb_is_mesh(enum vkb_geometry geometry)
     return geometry == VKB_GEOMETRY_BODY || geometry == VKB_GEOMETRY_GLOW;
 }
 
+// How a pass reads its images. A dispatch writes its target in the same way, except that a pass
+// that reads sampled images writes a storage image.
+enum vkb_reading {
+    VKB_READING_SAMPLED,
+    VKB_READING_LOADED,  // as storage images
+    VKB_READING_WORDS,   // as buffers of 16-byte words, on devices that share images with the host
+};
+
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
 enum vkb_blend {
     VKB_BLEND_NONE,
@@ -74,7 +82,7 @@ struct vkb_pass_row {
     struct vkb_constants constants;
     uint32_t reads[VKB_MAX_READS];
     uint32_t read_count;
-    bool loads;  // a dispatch that reads storage images instead of sampled ones
+    enum vkb_reading reading;
     bool fused;  // a fused pass: may replace the pass before it, with the same target
     uint32_t block_width, block_height;  // of a dispatch: pixels of a workgroup
     uint32_t targets[VKB_MAX_TARGETS];
@@ -118,6 +126,7 @@ uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 // equal if these bytes are equal. Returns the number of bytes.
 size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes);
 
+bool vkb_pass_reads(const struct vkb_pass_row *pass, uint32_t image);
 bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
 
 // The images that a pass writes, the depth last, into an array of VKB_MAX_TARGETS + 1. Returns

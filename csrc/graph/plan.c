@@ -24,6 +24,8 @@ bool vkb_content_begin_writing(struct vkb_content *content, uint64_t *clock, con
 {
     content->valid = false;
     content->version = ++*clock;
+    content->repeated =
+        size > 0 && content->recipe_size == size && memcmp(content->recipe, recipe, size) == 0;
     if (!vkb_grow(error, &content->recipe, &content->recipe_capacity, size, 1))
         return false;
     if (size)

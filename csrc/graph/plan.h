@@ -18,7 +18,8 @@ struct vkb_content {
     uint64_t version;       // new each time that the image is written
     unsigned char *recipe;  // without padding, to be compared with memcmp
     size_t recipe_size, recipe_capacity;
-    bool valid;  // once the device has run all recorded commands, the image matches the recipe
+    bool valid;     // once the device has run all recorded commands, the image matches the recipe
+    bool repeated;  // the writing before had the same recipe
 };
 
 // Makes the content invalid and gives it a new recipe and version. The caller sets `valid` once it

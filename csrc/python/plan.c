@@ -13,6 +13,8 @@ static const struct vkb_device any_device = {
         {
             .maxComputeSharedMemorySize = UINT32_MAX,
             .maxComputeWorkGroupInvocations = UINT32_MAX,
+            .maxTexelBufferElements = UINT32_MAX,
+            .maxStorageBufferRange = UINT32_MAX,
         },
     .max_side = VKB_MAX_SIDE,
     .features =
@@ -24,6 +26,7 @@ static const struct vkb_device any_device = {
             [VKB_FORMAT_DEPTH32_FLOAT] = ALL_FEATURES,
         },
     .dispatch = true,
+    .words = true,
 };
 
 static bool set_steal(PyObject *tuple, Py_ssize_t index, PyObject *item)

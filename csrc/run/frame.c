@@ -40,12 +40,14 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
                 &(VkDescriptorPoolCreateInfo){
                     .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
                     .maxSets = sets,
-                    .poolSizeCount = 3,
+                    .poolSizeCount = 5,
                     .pPoolSizes =
                         (VkDescriptorPoolSize[]){
                             {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets},
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, sets * VKB_MAX_READS},
-                            {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_READS + 1)},
+                            {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_LOADS + 1)},
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_LOADS},
+                            {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets},
                         },
                 },
                 NULL, &submission->descriptors)))
@@ -63,11 +65,12 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
     const struct vkb_scene *scene = &run->frame->scene;
     const uint32_t surfaces = scene->body.surface_count + scene->glow.surface_count;
     struct vkb_submission *submission = run->submission;
-    uint32_t passes = 0;
+    uint32_t passes = 0, sets = 0;
 
     for (uint32_t i = 0; i < request_count; ++i) {
         const struct vkb_plan *plan = requests[i].plan;
         passes += plan->graph.pass_count;
+        sets += vkb_record_sets(run->device, &plan->graph) + surfaces;
         for (uint32_t output = 0; output < plan->output_count; ++output) {
             const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
             if (!vkb_readback_plan(run->device, &submission->readback, row->format, row->width,
@@ -75,7 +78,7 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
                 return false;
         }
     }
-    return reserve_descriptors(run, passes + request_count * surfaces, error)
+    return reserve_descriptors(run, sets, error)
         && vkb_timer_reserve(run->device, passes, &submission->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
                               params * passes, &submission->uniforms, error)
@@ -223,9 +226,13 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
             return false;
     if (!vkb_planner_run(&frame->planner, &step, &frame->cache.clock, vkb_record_group, run, error))
         return false;
-    for (uint32_t i = 0; i < request->plan->output_count; ++i)
+    for (uint32_t i = 0; i < request->plan->output_count; ++i) {
+        struct vkb_cached_image *cached = run->images[request->plan->outputs[i]];
         vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
-                            &run->images[request->plan->outputs[i]]->image, &request->outputs[i]);
+                            &cached->image, &request->outputs[i]);
+        // What was stored to the caller's memory is not in the image.
+        cached->content.valid = cached->content.valid && !request->outputs[i].stored;
+    }
     return true;
 }
 

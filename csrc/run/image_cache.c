@@ -140,18 +140,6 @@ bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_gra
     return true;
 }
 
-// The image from the host: written by it in place where the device reads that as fast.
-static bool is_mapped(const struct vkb_device *device, const struct vkb_image_row *row)
-{
-    const VkFormatFeatureFlags features = VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT
-                                        | VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT
-                                        | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
-
-    return row->input
-        && vkb_device_shares_image(device, vkb_formats[row->format].vk, image_usage(row->format),
-                                   features, row->width, row->height);
-}
-
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
                           struct vkb_image *image, struct vkb_error *error)
 {
@@ -163,7 +151,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
                                 .layers = 1,
                                 .levels = 1,
                                 .usage = image_usage(row->format),
-                                .mapped = is_mapped(device, row),
+                                .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
                             },
                             image, error);
 }

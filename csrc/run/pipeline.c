@@ -63,31 +63,42 @@ static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkS
 }
 
 static const struct binding_kind {
-    VkDescriptorType read;
+    struct vkb_binding_types types;
     uint32_t most_reads;
-    bool target;
+    bool stores;
     VkShaderStageFlags parameter_stages, image_stages;
 } binding_kinds[VKB_BINDING_KINDS] = {
     [VKB_BINDINGS_DRAW] =
         {
-            .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .types.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
             .most_reads = VKB_MAX_READS,
             .parameter_stages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT,
             .image_stages = VK_SHADER_STAGE_FRAGMENT_BIT,
         },
     [VKB_BINDINGS_DISPATCH] =
         {
-            .read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .types.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .types.target = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
             .most_reads = VKB_MAX_READS,
-            .target = true,
+            .stores = true,
             .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
             .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
         },
     [VKB_BINDINGS_LOAD] =
         {
-            .read = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .types.read = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .types.target = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
             .most_reads = VKB_MAX_LOADS,
-            .target = true,
+            .stores = true,
+            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
+        },
+    [VKB_BINDINGS_WORDS] =
+        {
+            .types.read = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+            .types.target = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+            .most_reads = VKB_MAX_LOADS,
+            .stores = true,
             .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
             .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
         },
@@ -97,23 +108,23 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_pipelines
                            enum vkb_binding_kind kind, uint32_t images, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
-    const struct binding_kind *types = &binding_kinds[kind];
+    const struct binding_kind *bound = &binding_kinds[kind];
     VkDescriptorSetLayoutBinding bindings[VKB_MAX_READS + 2] = {
         {
             .binding = 0,
             .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
             .descriptorCount = 1,
-            .stageFlags = types->parameter_stages,
+            .stageFlags = bound->parameter_stages,
         },
     };
-    const uint32_t count = 1 + images + types->target;
+    const uint32_t count = 1 + images + bound->stores;
 
     for (uint32_t i = 1; i < count; ++i)
         bindings[i] = (VkDescriptorSetLayoutBinding){
             .binding = i,
-            .descriptorType = i <= images ? types->read : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .descriptorType = i <= images ? bound->types.read : bound->types.target,
             .descriptorCount = 1,
-            .stageFlags = types->image_stages,
+            .stageFlags = bound->image_stages,
         };
     return VK(error, vk->vkCreateDescriptorSetLayout(
                          device->handle,
@@ -129,6 +140,12 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_pipelines
                                              .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
                                              .setLayoutCount = 1,
                                              .pSetLayouts = &pipelines->set_layouts[kind][images],
+                                             .pushConstantRangeCount = kind == VKB_BINDINGS_WORDS,
+                                             .pPushConstantRanges =
+                                                 &(VkPushConstantRange){
+                                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
+                                                     .size = sizeof(struct vkb_words),
+                                                 },
                                          },
                                          NULL, &pipelines->layouts[kind][images]));
 }
@@ -236,7 +253,16 @@ static bool get_module(const struct vkb_device *device, struct vkb_pipelines *pi
     return true;
 }
 
-static VkAttachmentDescription describe_attachment(enum vkb_format format, enum vkb_load load,
+// Colour images that are buffers, too, stay in the general layout.
+static VkImageLayout attachment_layout(const struct vkb_device *device, enum vkb_format format,
+                                       enum vkb_access access)
+{
+    return device->words && format != VKB_FORMAT_DEPTH32_FLOAT ? VK_IMAGE_LAYOUT_GENERAL
+                                                               : vkb_access_layout(access);
+}
+
+static VkAttachmentDescription describe_attachment(const struct vkb_device *device,
+                                                   enum vkb_format format, enum vkb_load load,
                                                    const struct vkb_target_use *use)
 {
     enum vkb_access last = use->after == VKB_ACCESS_NONE ? use->during : use->after;
@@ -252,7 +278,7 @@ static VkAttachmentDescription describe_attachment(enum vkb_format format, enum 
         .stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE,
         .stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE,
         .initialLayout = VK_IMAGE_LAYOUT_UNDEFINED,
-        .finalLayout = vkb_access_layout(last),
+        .finalLayout = attachment_layout(device, format, last),
     };
 }
 
@@ -267,12 +293,13 @@ static bool create_render_pass(const struct vkb_device *device, const struct ren
     const struct vkb_target_use *colour_uses = key->uses + depth;
 
     for (uint32_t i = 0; i < key->target_count; ++i) {
-        attachments[i] = describe_attachment(key->formats[i], key->load, &colour_uses[i]);
-        references[i] = (VkAttachmentReference){i, vkb_access_layout(VKB_ACCESS_COLOR_TARGET)};
+        attachments[i] = describe_attachment(device, key->formats[i], key->load, &colour_uses[i]);
+        references[i] = (VkAttachmentReference){
+            i, attachment_layout(device, key->formats[i], VKB_ACCESS_COLOR_TARGET)};
     }
     if (depth)
         attachments[key->target_count] =
-            describe_attachment(key->depth_format, VKB_LOAD_CLEAR, &key->uses[0]);
+            describe_attachment(device, key->depth_format, VKB_LOAD_CLEAR, &key->uses[0]);
     return VK(error,
               device->vk.vkCreateRenderPass(
                   device->handle,
@@ -573,7 +600,14 @@ enum vkb_binding_kind vkb_pass_binding_kind(const struct vkb_pass_row *pass)
 {
     if (pass->geometry != VKB_GEOMETRY_DISPATCH)
         return VKB_BINDINGS_DRAW;
-    return pass->loads ? VKB_BINDINGS_LOAD : VKB_BINDINGS_DISPATCH;
+    return pass->reading == VKB_READING_SAMPLED ? VKB_BINDINGS_DISPATCH
+         : pass->reading == VKB_READING_LOADED  ? VKB_BINDINGS_LOAD
+                                                : VKB_BINDINGS_WORDS;
+}
+
+struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)
+{
+    return binding_kinds[vkb_pass_binding_kind(pass)].types;
 }
 
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)

@@ -11,12 +11,20 @@ struct vkb_render_pass_entry;
 struct vkb_pipeline_entry;
 
 // What the bindings after the parameters are: images read through samplers; with the target of a
-// dispatch; storage images with it.
+// dispatch; storage images with it; words with it, and their sizes as push constants.
 enum vkb_binding_kind {
     VKB_BINDINGS_DRAW,
     VKB_BINDINGS_DISPATCH,
     VKB_BINDINGS_LOAD,
+    VKB_BINDINGS_WORDS,
     VKB_BINDING_KINDS
+};
+
+// Images as words, as variants/words.glsl has them.
+struct vkb_words {
+    int32_t target[4];                // width, height, words in a row, first row of what is bound
+    int32_t reads[VKB_MAX_LOADS][4];  // width, height, words in a row
+    uint32_t zero;
 };
 
 struct vkb_pipelines {
@@ -66,6 +74,12 @@ VkSampler vkb_pipelines_sampler(const struct vkb_device *device,
 
 // How many images the pass reads by descriptor, the scene's cubemap or textures counted in.
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
+
+// The types of the descriptors that the pass reads and writes images by.
+struct vkb_binding_types {
+    VkDescriptorType read, target;
+};
+struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass);
 
 enum vkb_binding_kind vkb_pass_binding_kind(const struct vkb_pass_row *pass);
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass);

@@ -2,7 +2,11 @@
 
 #include <string.h>
 
-#define READBACK_USAGE VK_BUFFER_USAGE_TRANSFER_DST_BIT
+// Bytes of a row of the image, which may have more channels than the output.
+static size_t row_size(const struct vkb_output *output)
+{
+    return (size_t)output->width * vkb_pixel_size(output->format);
+}
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback)
 {
@@ -19,7 +23,8 @@ static bool import_pages(const struct vkb_device *device, struct vkb_output *out
     VkDeviceSize start = 0;
 
     if (!run->buffer.handle
-        && !vkb_buffer_import(device, READBACK_USAGE, run->memory, run->size, &run->buffer, &start))
+        && !vkb_buffer_import(device, vkb_device_import_usage(device), run->memory, run->size,
+                              &run->buffer, &start))
         return false;
     output->imported = run->buffer.handle;
     output->offset = start + (VkDeviceSize)((char *)output->memory - (char *)run->memory);
@@ -38,7 +43,8 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
         return false;
     if (output->pages)
         return import_pages(device, output);
-    if (!vkb_buffer_import(device, READBACK_USAGE, output->memory, size, buffer, &output->offset))
+    if (!vkb_buffer_import(device, vkb_device_import_usage(device), output->memory, size, buffer,
+                           &output->offset))
         return false;
     output->imported = buffer->handle;
     ++readback->import_count;
@@ -50,9 +56,10 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
                        struct vkb_error *error)
 {
     output->format = format;
-    output->pixels = (size_t)width * output->row_count;
+    output->width = width;
     output->imported = VK_NULL_HANDLE;
-    const size_t size = output->pixels * vkb_pixel_size(format);
+    output->stored = false;
+    const size_t size = row_size(output) * output->row_count;
     if (size >= VKB_IMPORTED_BYTES) {
         if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
                       readback->import_count + 1, sizeof *readback->imports))
@@ -66,17 +73,27 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     return true;
 }
 
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,
+                              uint32_t height)
+{
+    const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
+
+    return output->imported && output->row_count == height && row_size(output) % VKB_WORD_SIZE == 0
+        && output->offset % VKB_WORD_SIZE == 0 && output->offset % align == 0;
+}
+
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error)
 {
-    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, READBACK_USAGE, readback->used,
-                              &readback->staging, error);
+    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                              readback->used, &readback->staging, error);
 }
 
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          const struct vkb_readback *readback, struct vkb_image *image,
                          const struct vkb_output *output)
 {
+    const VkBuffer to = output->imported ? output->imported : readback->staging.handle;
     VkBufferImageCopy copy = {
         .bufferOffset = output->offset,
         .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
@@ -84,10 +101,11 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
         .imageExtent = {image->width, output->row_count, 1},
     };
 
+    if (output->stored)
+        return;
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
     device->vk.vkCmdCopyImageToBuffer(
-        commands, image->handle, vkb_access_layout(VKB_ACCESS_COPY_SOURCE),
-        output->imported ? output->imported : readback->staging.handle, 1, &copy);
+        commands, image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1, &copy);
 }
 
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
@@ -109,24 +127,24 @@ static inline void drop_alpha(unsigned char *to, const unsigned char *from, size
 
 void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
 {
-    const struct vkb_format_info *format = &vkb_formats[output->format];
+    const size_t pixels = (size_t)output->width * output->row_count;
 
     if (output->imported)
         return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
-    if (output->channels == format->channels) {
-        memcpy(output->memory, from, output->pixels * vkb_pixel_size(output->format));
+    if (output->channels == vkb_formats[output->format].channels) {
+        memcpy(output->memory, from, row_size(output) * output->row_count);
         return;
     }
-    switch (format->channel_size) {
+    switch (vkb_formats[output->format].channel_size) {
     case 1:
-        drop_alpha(output->memory, from, output->pixels, 1);
+        drop_alpha(output->memory, from, pixels, 1);
         break;
     case 2:
-        drop_alpha(output->memory, from, output->pixels, 2);
+        drop_alpha(output->memory, from, pixels, 2);
         break;
     default:
-        drop_alpha(output->memory, from, output->pixels, 4);
+        drop_alpha(output->memory, from, pixels, 4);
         break;
     }
 }

@@ -21,9 +21,12 @@ struct vkb_output {
         *pages;  // that the memory is in; NULL: none of the renderer's, or too little
     // What vkb_readback_plan decides.
     enum vkb_format format;
-    size_t pixels;
+    uint32_t width;
     VkBuffer imported;    // the caller's memory as a buffer; VK_NULL_HANDLE: through the staging
     VkDeviceSize offset;  // in either
+    // Decided while its passes are recorded: the last of them stores to the imported memory, so
+    // there is no copy.
+    bool stored;
 };
 
 struct vkb_readback {
@@ -39,11 +42,14 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
                        enum vkb_format format, uint32_t width, struct vkb_output *output,
                        struct vkb_error *error);
+// Whether a pass can store words to the output's memory, all rows of an image of that height.
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,
+                              uint32_t height);
 // After all of them: makes room for what goes through the staging memory.
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error);
 
-// Records the copy of the output's image.
+// Records the copy of the output's image, unless a pass stored it.
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          const struct vkb_readback *readback, struct vkb_image *image,
                          const struct vkb_output *output);

@@ -39,41 +39,53 @@ static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct 
     };
 }
 
-// Fills the set with the pass's parameters, which lie at that offset, what it reads, and the target
-// of a dispatch.
-static void write_descriptors(const struct vkb_run *run, const struct vkb_pass_row *pass,
-                              VkDeviceSize params_offset, const struct vkb_surface *surface,
+// Rows of a dispatch's target that one descriptor reaches, and where they are stored.
+struct band {
+    VkDescriptorBufferInfo buffer;
+    size_t row_pitch;
+    uint32_t first, rows;
+};
+
+// What a set describes: the pass with its parameters at that offset of the uniform buffer, the
+// surface whose textures it reads, the band that it stores. The last two may be NULL.
+struct binding {
+    const struct vkb_pass_row *pass;
+    VkDeviceSize params;
+    const struct vkb_surface *surface;
+    const struct band *band;
+};
+
+// Fills the set with the parameters, the images read and the target of a dispatch.
+static void write_descriptors(const struct vkb_run *run, const struct binding *binding,
                               VkDescriptorSet set)
 {
+    const struct vkb_pass_row *pass = binding->pass;
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
+    const struct vkb_binding_types types = vkb_pass_binding_types(pass);
     VkDescriptorImageInfo images[VKB_MAX_READS + 1];
     VkWriteDescriptorSet writes[VKB_MAX_READS + 2];
     uint32_t write_count = 0;
     VkDescriptorBufferInfo params = {
         .buffer = run->submission->uniforms.handle,
-        .offset = params_offset,
+        .offset = binding->params,
         .range = vkb_block_sizes[pass->block],
     };
     if (pass->block != VKB_BLOCK_NONE)
         writes[write_count++] = (VkWriteDescriptorSet){
-            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = set,
-            .dstBinding = 0,
-            .descriptorCount = 1,
             .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
             .pBufferInfo = &params,
         };
     for (uint32_t i = 0; i < image_count; ++i) {
-        images[i] = read_image(run, pass, surface, i);
-        writes[write_count++] = (VkWriteDescriptorSet){
-            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = set,
+        writes[write_count] = (VkWriteDescriptorSet){
             .dstBinding = i + 1,
-            .descriptorCount = 1,
-            .descriptorType = pass->loads ? VK_DESCRIPTOR_TYPE_STORAGE_IMAGE
-                                          : VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+            .descriptorType = types.read,
             .pImageInfo = &images[i],
         };
+        if (pass->reading == VKB_READING_WORDS)
+            writes[write_count].pTexelBufferView = &run->images[pass->reads[i]]->image.words;
+        else
+            images[i] = read_image(run, pass, binding->surface, i);
+        ++write_count;
     }
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
         const struct vkb_image *target = &run->images[pass->targets[0]]->image;
@@ -82,21 +94,24 @@ static void write_descriptors(const struct vkb_run *run, const struct vkb_pass_r
             .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
         };
         writes[write_count++] = (VkWriteDescriptorSet){
-            .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-            .dstSet = set,
             .dstBinding = image_count + 1,
-            .descriptorCount = 1,
-            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+            .descriptorType = types.target,
             .pImageInfo = &images[image_count],
+            .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
         };
+    }
+    for (uint32_t i = 0; i < write_count; ++i) {
+        writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        writes[i].dstSet = set;
+        writes[i].descriptorCount = 1;
     }
     run->device->vk.vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
 }
 
-static bool bind_descriptors(struct vkb_run *run, const struct vkb_pass_row *pass,
-                             VkDeviceSize params_offset, const struct vkb_surface *surface,
+static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
                              struct vkb_error *error)
 {
+    const struct vkb_pass_row *pass = binding->pass;
     const struct VolkDeviceTable *vk = &run->device->vk;
     const struct vkb_pipelines *pipelines = &run->frame->pipelines;
     const VkDescriptorSetLayout layout = vkb_pipelines_set_layout(pipelines, pass);
@@ -112,7 +127,7 @@ static bool bind_descriptors(struct vkb_run *run, const struct vkb_pass_row *pas
                        },
                        &set)))
         return false;
-    write_descriptors(run, pass, params_offset, surface, set);
+    write_descriptors(run, binding, set);
     vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
                                 vkb_pipelines_layout(pipelines, pass), 0, 1, &set, 0, NULL);
     return true;
@@ -138,7 +153,8 @@ static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
     bind_mesh(run, mesh, true);
     for (uint32_t i = 0; i < mesh->surface_count; ++i) {
         const struct vkb_surface *surface = &mesh->surfaces[i];
-        if (!bind_descriptors(run, pass, params, surface, error))
+        const struct binding binding = {.pass = pass, .params = params, .surface = surface};
+        if (!bind_descriptors(run, &binding, error))
             return false;
         run->device->vk.vkCmdDrawIndexed(run->submission->commands.buffer, surface->index_count, 1,
                                          first, 0, 0);
@@ -147,14 +163,114 @@ static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
     return true;
 }
 
-static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass)
+// Workgroups for so many rows of the target.
+static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass, uint32_t rows)
 {
     const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
 
     run->device->vk.vkCmdDispatch(run->submission->commands.buffer,
                                   (target->width + pass->block_width - 1) / pass->block_width,
-                                  (target->height + pass->block_height - 1) / pass->block_height,
-                                  1);
+                                  (rows + pass->block_height - 1) / pass->block_height, 1);
+}
+
+// As many rows as a storage buffer can have: whole blocks, that end where a buffer can begin.
+static uint32_t band_rows(const struct vkb_device *device, const struct vkb_pass_row *pass,
+                          size_t row_pitch)
+{
+    const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
+    const size_t block =
+        pass->block_height * (align > VKB_WORD_SIZE ? (size_t)align / VKB_WORD_SIZE : 1);
+    const size_t blocks = device->limits.maxStorageBufferRange / row_pitch / block;
+
+    return (uint32_t)((blocks ? blocks : 1) * block);
+}
+
+uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph *graph)
+{
+    uint32_t sets = 0;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        ++sets;
+        if (pass->reading == VKB_READING_WORDS) {
+            const struct vkb_image_row *row = &graph->images[pass->targets[0]];
+            const size_t pitch = vkb_image_row_pitch(row->format, row->width);
+            sets += row->height / band_rows(device, pass, pitch);
+        }
+    }
+    return sets;
+}
+
+// The output that the pass can store to, past the image: one that no other pass reads, and whose
+// content would not have been there anyway. Of a request that comes again the image keeps it.
+static struct vkb_output *find_stored(const struct vkb_run *run, const struct vkb_pass_row *pass)
+{
+    const struct vkb_plan *plan = run->request->plan;
+    const uint32_t image = pass->targets[0];
+
+    if (run->contents[image]->repeated)
+        return NULL;
+    for (uint32_t i = 0; i < run->graph->pass_count; ++i)
+        if (run->frame->planner.needed[i] && vkb_pass_reads(&run->graph->passes[i], image))
+            return NULL;
+    for (uint32_t i = 0; i < plan->output_count; ++i)
+        if (plan->outputs[i] == image
+            && vkb_readback_takes_words(run->device, &run->request->outputs[i],
+                                        run->graph->images[image].height))
+            return &run->request->outputs[i];
+    return NULL;
+}
+
+static void describe_words(const struct vkb_image *image, size_t row_pitch, int32_t words[4])
+{
+    words[0] = (int32_t)image->width;
+    words[1] = (int32_t)image->height;
+    words[2] = (int32_t)(row_pitch / VKB_WORD_SIZE);
+    words[3] = 0;
+}
+
+static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pass,
+                       const struct band *band)
+{
+    struct vkb_words words = {.zero = 0};
+
+    describe_words(&run->images[pass->targets[0]]->image, band->row_pitch, words.target);
+    words.target[3] = (int32_t)band->first;
+    for (uint32_t i = 0; i < pass->read_count; ++i) {
+        const struct vkb_image *image = &run->images[pass->reads[i]]->image;
+        describe_words(image, image->row_pitch, words.reads[i]);
+    }
+    run->device->vk.vkCmdPushConstants(run->submission->commands.buffer,
+                                       vkb_pipelines_layout(&run->frame->pipelines, pass),
+                                       VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
+}
+
+static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
+                           VkDeviceSize params, struct vkb_error *error)
+{
+    const struct vkb_image *image = &run->images[pass->targets[0]]->image;
+    struct vkb_output *output = find_stored(run, pass);
+    const VkDeviceSize start = output ? output->offset : 0;
+    struct band band = {
+        .buffer.buffer = output ? output->imported : image->buffer,
+        .row_pitch = output ? image->width * vkb_pixel_size(image->format) : image->row_pitch,
+    };
+    const struct binding binding = {.pass = pass, .params = params, .band = &band};
+    const uint32_t rows = band_rows(run->device, pass, band.row_pitch);
+
+    if (output)
+        output->stored = true;
+    for (; band.first < image->height; band.first += rows) {
+        const uint32_t left = image->height - band.first;
+        band.rows = rows < left ? rows : left;
+        band.buffer.offset = start + band.first * band.row_pitch;
+        band.buffer.range = band.rows * band.row_pitch;
+        if (!bind_descriptors(run, &binding, error))
+            return false;
+        push_words(run, pass, &band);
+        dispatch(run, pass, band.rows);
+    }
+    return true;
 }
 
 static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceSize params,
@@ -167,10 +283,12 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
 
     if (pass->textured)
         return draw_surfaces(run, pass, mesh, params, error);
-    if (!bind_descriptors(run, pass, params, NULL, error))
+    if (pass->reading == VKB_READING_WORDS)
+        return dispatch_words(run, pass, params, error);
+    if (!bind_descriptors(run, &(struct binding){.pass = pass, .params = params}, error))
         return false;
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
-        dispatch(run, pass);
+        dispatch(run, pass, run->graph->images[pass->targets[0]].height);
     } else if (!vkb_is_mesh(pass->geometry)) {
         vk->vkCmdDraw(commands, pass->geometry == VKB_GEOMETRY_SKYBOX ? 36 : 3, 1, 0, 0);
     } else if (mesh->plain_count > 0) {

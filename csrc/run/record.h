@@ -18,6 +18,9 @@ struct vkb_run {
     bool send_input[VKB_INPUT_COUNT];                   // the device does not have it yet
 };
 
+// The most descriptor sets that the graph's passes take, without those of surfaces.
+uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph *graph);
+
 // What a planner calls for each group of passes that has to run; `run` is a struct vkb_run.
 vkb_record vkb_record_group;
 

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const enum vkb_shader line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line_comp);
-static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(strip_comp);
+static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(strip);
 
 // A line's row: `origin` is the place of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct vkb_pass_row *blur,
@@ -25,7 +25,7 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     vkb_make_dispatch(&row, line_shaders[graph->images[blur->reads[0]].format],
                       vertical ? ROW_INVOCATIONS : ROW_INVOCATIONS * LINE_OUTPUTS,
                       vertical ? LINE_OUTPUTS : 1);
-    row.loads = true;
+    row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
     row.constants.direction = direction;
     row.constants.radius = kernel->radius <= LINE_SHORT_RADIUS ? kernel->radius : 0;
@@ -96,7 +96,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.params.threshold.target_height = sampling.height;
     row.params.threshold.limit = sampling.limit;
     return vkb_graph_add_pass(choice->graph, &line, error)
-        && vkb_add_fullscreen(choice->variants, choice->graph, &row, error);
+        && vkb_add_fullscreen(choice, &row, error);
 }
 
 // The chain of passes that gives an image its bloom where all have its size.
@@ -160,16 +160,16 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
 bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
     struct chain chain;
 
-    *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, &chain);
+    *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, &chain) && vkb_fits_words(choice, pass);
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
-    vkb_make_dispatch(&row, strip_shaders[choice->plain.images[pass->reads[0]].format],
-                      ROW_INVOCATIONS * STRIP_COLUMNS, STRIP_ROWS);
-    row.loads = true;
-    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
+    vkb_make_words(&row, strip_shaders[format], STRIP_COLUMNS(vkb_formats[format].channel_size),
+                   STRIP_ROWS);
+    return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -193,8 +193,7 @@ bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vk
     row.constants.format =
         vkb_stored_as(choice->device, choice->plain.images[pass->reads[1]].format);
     row.fused = true;
-    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
-        && vkb_add_fullscreen(choice->variants, choice->graph, &row, error);
+    return vkb_add_fullscreen(choice, pass, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
 // The same in tiles, for kernels of up to TILE_RADIUS in three steps.
@@ -215,6 +214,6 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
     struct vkb_pass_row row = fused_row(choice, &chain);
     vkb_make_dispatch(&row, VKB_SHADER_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row.constants.radius = radius;
-    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
+    return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

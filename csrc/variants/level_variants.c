@@ -9,13 +9,40 @@ static const enum vkb_shader halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(hal
 static const enum vkb_shader double_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(double_comp);
 static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
     VKB_BY_FORMAT(double_final_comp);
+static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
+static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
+static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(double_final);
 
-static void load_in_strips(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
-                           uint32_t rows)
+// Blocks of an invocation, in storage images and in words.
+static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                         enum vkb_format format)
 {
-    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
-    row->loads = true;
-    row->constants = (struct vkb_constants){.alpha = row->constants.alpha};
+    if (choice->variants == VKB_VARIANTS_CPU) {
+        vkb_make_words(row, halve_words[format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
+    } else {
+        vkb_make_dispatch(row, halve_shaders[format], ROW_INVOCATIONS * HALVE_COLUMNS, HALVE_ROWS);
+        row->reading = VKB_READING_LOADED;
+    }
+}
+
+static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                          const enum vkb_shader *shaders, const enum vkb_shader *words,
+                          enum vkb_format format)
+{
+    if (choice->variants == VKB_VARIANTS_CPU) {
+        vkb_make_words(row, words[format], DOUBLE_WORDS_COLUMNS(vkb_formats[format].channel_size),
+                       DOUBLE_WORDS_ROWS);
+    } else {
+        vkb_make_dispatch(row, shaders[format], ROW_INVOCATIONS * DOUBLE_COLUMNS, DOUBLE_ROWS);
+        row->reading = VKB_READING_LOADED;
+    }
+}
+
+// Whether the device can run the pass in the way of make_halving and make_doubling.
+static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    return choice->variants != VKB_VARIANTS_CPU || vkb_fits_words(choice, pass);
 }
 
 // If the threshold pass writes the larger level: adds a fused pass that starts from the image
@@ -45,12 +72,12 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
     const struct vkb_graph *plain = &choice->plain;
     struct vkb_pass_row row;
 
-    *fits = vkb_halves(pass);
+    *fits = vkb_halves(pass) && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    load_in_strips(&row, halve_shaders[plain->images[pass->reads[0]].format], HALVE_COLUMNS,
-                   HALVE_ROWS);
+    row.constants = (struct vkb_constants){.alpha = pass->constants.alpha};
+    make_halving(choice, &row, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error)
         && add_halved_image(choice, pass, &row, error);
 }
@@ -61,13 +88,15 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
     const struct vkb_graph *plain = &choice->plain;
     struct vkb_pass_row row;
 
-    *fits = vkb_doubles(pass);
+    *fits = vkb_doubles(pass) && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    load_in_strips(&row, double_shaders[plain->images[pass->reads[0]].format], DOUBLE_COLUMNS,
-                   DOUBLE_ROWS);
-    row.constants.add_own = pass->constants.add_own;
+    row.constants = (struct vkb_constants){
+        .add_own = pass->constants.add_own,
+        .alpha = pass->constants.alpha,
+    };
+    make_doubling(choice, &row, double_shaders, double_words, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -83,14 +112,14 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
     *fits = up && vkb_doubles(up) && !up->constants.add_own && !pass->constants.masked
-         && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format;
+         && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format
+         && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    vkb_make_dispatch(&row, double_final_shaders[plain->images[up->reads[0]].format],
-                      ROW_INVOCATIONS * DOUBLE_COLUMNS, DOUBLE_ROWS);
-    row.loads = true;
+    make_doubling(choice, &row, double_final_shaders, double_final_words,
+                  plain->images[up->reads[0]].format);
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
@@ -100,6 +129,6 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     VKB_TAKE_COMPOSITE(&row, double_final, pass);
     row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
     memcpy(params->taps, up->params.pyramid.taps, sizeof params->taps);
-    return vkb_add_fullscreen(choice->variants, choice->graph, pass, error)
+    return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

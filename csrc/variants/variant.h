@@ -6,6 +6,7 @@
 #include "passes/composite.h"
 #include "passes/threshold.h"
 #include "variants/variants.h"
+#include "vulkan/memory.h"
 
 // The choice of variants for one graph: the passes of `plain` to those of `graph`.
 struct vkb_variant_choice {
@@ -35,6 +36,9 @@ vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
         [VKB_FORMAT_RG11B10_UFLOAT] = VKB_SHADER_##shader##_rgba32float, \
     }
 
+// The same for images as words.
+#define VKB_WORDS_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_words)
+
 // What an image of the format gives back of what is stored: of STORED_*.
 enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format);
 
@@ -50,9 +54,15 @@ void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 // Makes a dispatch of a pass over all pixels.
 void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
                        uint32_t block_height);
+// Makes a dispatch of a pass whose images are words, by a block of so many columns and rows for
+// each of ROW_INVOCATIONS.
+void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
+                    uint32_t rows);
+// Whether the images that a pass of words accesses are small enough for that.
+bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 // A pass over all pixels of one target: on processors drawn, where its texels cannot be loaded, on
 // GPUs a compute shader, for some of them (made to compute) draw slowly.
-bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
-                        const struct vkb_pass_row *pass, struct vkb_error *error);
+bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_error *error);
 
 #endif

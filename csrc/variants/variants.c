@@ -68,6 +68,24 @@ void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_
     row->block_height = block_height;
 }
 
+void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
+                    uint32_t rows)
+{
+    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
+    row->reading = VKB_READING_WORDS;
+}
+
+bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    bool fits = choice->device->words;
+
+    for (uint32_t i = 0; i < pass->read_count; ++i) {
+        const struct vkb_image_row *row = &choice->graph->images[pass->reads[i]];
+        fits = fits && vkb_image_fits_words(choice->device, row->format, row->width, row->height);
+    }
+    return fits;
+}
+
 const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image)
 {
     const struct vkb_pass_row *writer = NULL;
@@ -88,8 +106,14 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
              : NULL;
 }
 
-static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(blend_comp);
-static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(threshold_comp);
+static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
+static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(threshold);
+
+// Whether the pixels of both have the same bytes. (Single floats hold R11G11B10.)
+static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
+{
+    return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
+}
 
 // A composite whose images have one size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -97,33 +121,40 @@ static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pas
     return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN && !pass->constants.masked
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
-        && graph->images[pass->reads[0]].format == graph->images[pass->reads[1]].format;
+        && has_format_of(graph, pass->reads[0], pass->reads[1])
+        && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-// A pass that needs the texels at each pixel's own place alone, by a shader that loads them, of the
-// first images that it reads.
-static void load_texels(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t read_count)
+// A threshold pass between images of one format.
+static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    vkb_make_dispatch(row, shader, ROW_INVOCATIONS * TEXEL_COLUMNS, TEXEL_ROWS);
-    row->loads = true;
+    return vkb_is_threshold(pass) && has_format_of(graph, pass->reads[0], pass->targets[0]);
+}
+
+// A pass that needs the pixels at each pixel's own place alone, of the first images that it reads.
+static void load_pixels(struct vkb_pass_row *row, enum vkb_shader shader, enum vkb_format format,
+                        uint32_t read_count)
+{
+    vkb_make_words(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
     vkb_drop_reads(row, read_count);
 }
 
-bool vkb_add_fullscreen(enum vkb_variants variants, struct vkb_graph *graph,
-                        const struct vkb_pass_row *pass, struct vkb_error *error)
+bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
 {
+    const struct vkb_graph *graph = choice->graph;
     const enum vkb_format format = graph->images[pass->reads[0]].format;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    if (variants == VKB_VARIANTS_GPU)
+    if (choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
                           PIXEL_INVOCATIONS);
-    else if (blends(graph, pass))
-        load_texels(&row, blend_shaders[format], 2);
-    else if (vkb_is_threshold(pass))
-        load_texels(&row, threshold_shaders[format], 1);
-    return vkb_graph_add_pass(graph, &row, error);
+    else if (vkb_fits_words(choice, pass) && blends(graph, pass))
+        load_pixels(&row, blend_shaders[format], format, 2);
+    else if (vkb_fits_words(choice, pass) && loads_threshold(graph, pass))
+        load_pixels(&row, threshold_shaders[format], format, 1);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -132,7 +163,7 @@ static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb
     *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
          && vkb_spirv[pass->shader].dispatch != pass->shader
          && vkb_is_written_once(&choice->plain, pass->targets[0]);
-    return !*fits || vkb_add_fullscreen(choice->variants, choice->graph, pass, error);
+    return !*fits || vkb_add_fullscreen(choice, pass, error);
 }
 
 struct variant {

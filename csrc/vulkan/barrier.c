@@ -83,29 +83,39 @@ VkImageLayout vkb_access_layout(enum vkb_access access)
 }
 
 void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,
-                        const VkImageMemoryBarrier *image, enum vkb_access from, enum vkb_access to)
+                        const VkImageMemoryBarrier *image, bool memory, enum vkb_access from,
+                        enum vkb_access to)
 {
     const struct access_info *before = &accesses[from], *after = &accesses[to];
-    VkImageMemoryBarrier barrier = *image;
+    const VkMemoryBarrier all = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+        .srcAccessMask = before->writes,
+        .dstAccessMask = after->reads | after->writes,
+    };
+    VkImageMemoryBarrier barrier;
 
     if (from == to && !after->writes)
         return;
-    barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
-    barrier.srcAccessMask = before->writes;
-    barrier.dstAccessMask = after->reads | after->writes;
-    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    device->vk.vkCmdPipelineBarrier(commands, before->stages, after->stages, 0, 0, NULL, 0, NULL, 1,
-                                    &barrier);
+    if (image) {
+        barrier = *image;
+        barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
+        barrier.srcAccessMask = all.srcAccessMask;
+        barrier.dstAccessMask = all.dstAccessMask;
+        barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+        barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    }
+    device->vk.vkCmdPipelineBarrier(commands, before->stages, after->stages, 0, memory, &all, 0,
+                                    NULL, image != NULL, &barrier);
 }
 
-static void record_copy_barrier(const struct vkb_device *device, VkCommandBuffer commands,
-                                VkPipelineStageFlags stages, VkAccessFlags reads)
+static void record_buffer_barrier(const struct vkb_device *device, VkCommandBuffer commands,
+                                  enum vkb_access from, VkPipelineStageFlags stages,
+                                  VkAccessFlags reads)
 {
-    device->vk.vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, stages, 0, 1,
+    device->vk.vkCmdPipelineBarrier(commands, accesses[from].stages, stages, 0, 1,
                                     &(VkMemoryBarrier){
                                         .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
-                                        .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
+                                        .srcAccessMask = accesses[from].writes,
                                         .dstAccessMask = reads,
                                     },
                                     0, NULL, 0, NULL);
@@ -113,13 +123,17 @@ static void record_copy_barrier(const struct vkb_device *device, VkCommandBuffer
 
 void vkb_barrier_record_host_read(const struct vkb_device *device, VkCommandBuffer commands)
 {
-    record_copy_barrier(device, commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
+    record_buffer_barrier(device, commands, VKB_ACCESS_COPY_TARGET, VK_PIPELINE_STAGE_HOST_BIT,
+                          VK_ACCESS_HOST_READ_BIT);
+    record_buffer_barrier(device, commands, VKB_ACCESS_DISPATCH_STORED, VK_PIPELINE_STAGE_HOST_BIT,
+                          VK_ACCESS_HOST_READ_BIT);
 }
 
 void vkb_barrier_record_upload(const struct vkb_device *device, VkCommandBuffer commands)
 {
-    record_copy_barrier(device, commands, VK_PIPELINE_STAGE_VERTEX_INPUT_BIT,
-                        VK_ACCESS_INDEX_READ_BIT | VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT);
+    record_buffer_barrier(device, commands, VKB_ACCESS_COPY_TARGET,
+                          VK_PIPELINE_STAGE_VERTEX_INPUT_BIT,
+                          VK_ACCESS_INDEX_READ_BIT | VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT);
 }
 
 static uint32_t add_dependency(VkSubpassDependency *dependencies, uint32_t count,

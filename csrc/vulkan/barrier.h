@@ -21,13 +21,13 @@ enum vkb_access {
 
 VkImageLayout vkb_access_layout(enum vkb_access access);
 
-// Records the barrier between two accesses to an image, with the given layouts. Two equal read
-// accesses need no barrier.
+// Records the barrier between two accesses: for an image with the given layouts (NULL: its layout
+// stays), and with `memory` for all memory. Two equal read accesses need no barrier.
 void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,
-                        const VkImageMemoryBarrier *image, enum vkb_access from,
+                        const VkImageMemoryBarrier *image, bool memory, enum vkb_access from,
                         enum vkb_access to);
 
-// Makes copies to host-visible buffers available to the host after the fence.
+// Makes copies and stores to host-visible buffers available to the host after the fence.
 void vkb_barrier_record_host_read(const struct vkb_device *device, VkCommandBuffer commands);
 
 // Makes copies to buffers visible to vertex input.

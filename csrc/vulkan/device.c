@@ -25,7 +25,14 @@ static bool has_extension(const struct vkb_device *device, const char *name, boo
     return done;
 }
 
-// Whether the device can import host memory as a destination of copies.
+VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device)
+{
+    return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
+             ? VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+             : VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+}
+
+// Whether the device can import host memory for that usage.
 static bool imports_buffers(const struct vkb_device *device)
 {
     VkExternalBufferProperties properties = {
@@ -36,7 +43,7 @@ static bool imports_buffers(const struct vkb_device *device)
         device->adapter.physical,
         &(VkPhysicalDeviceExternalBufferInfo){
             .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO,
-            .usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+            .usage = vkb_device_import_usage(device),
             .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
         },
         &properties);
@@ -133,6 +140,74 @@ static void read_properties(struct vkb_device *device)
     device->timestamp_mask = timestamp_mask(device);
 }
 
+// Whether images of the format can do with linear tiling all that they can do with optimal tiling.
+static bool is_linear(const struct vkb_device *device, VkFormat format)
+{
+    const VkFormatFeatureFlags used =
+        VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT
+        | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT
+        | VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT;
+    const VkImageUsageFlags usage = VK_IMAGE_USAGE_TRANSFER_SRC_BIT
+                                  | VK_IMAGE_USAGE_TRANSFER_DST_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
+                                  | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT
+                                  | VK_IMAGE_USAGE_STORAGE_BIT;
+    const struct vkb_instance_table *vk = &device->instance->vk;
+    VkFormatProperties properties;
+    VkImageFormatProperties limits;
+
+    vk->vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
+    return (properties.linearTilingFeatures & used) == (properties.optimalTilingFeatures & used)
+        && VK_RESULT(vk->vkGetPhysicalDeviceImageFormatProperties(
+               device->adapter.physical, format, VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage, 0,
+               &limits))
+               == VK_SUCCESS
+        && limits.maxExtent.width >= device->max_side
+        && limits.maxExtent.height >= device->max_side;
+}
+
+// Whether the rows of a linear image are whole words.
+static bool has_whole_words(const struct vkb_device *device)
+{
+    VkSubresourceLayout layout;
+    VkImage image;
+
+    if (VK_RESULT(device->vk.vkCreateImage(device->handle,
+                                           &(VkImageCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                                               .imageType = VK_IMAGE_TYPE_2D,
+                                               .format = vkb_formats[VKB_FORMAT_RGBA8_UNORM].vk,
+                                               .extent = {1, 1, 1},
+                                               .mipLevels = 1,
+                                               .arrayLayers = 1,
+                                               .samples = VK_SAMPLE_COUNT_1_BIT,
+                                               .tiling = VK_IMAGE_TILING_LINEAR,
+                                               .usage = VK_IMAGE_USAGE_STORAGE_BIT,
+                                           },
+                                           NULL, &image))
+        != VK_SUCCESS)
+        return false;
+    device->vk.vkGetImageSubresourceLayout(
+        device->handle, image, &(VkImageSubresource){.aspectMask = VK_IMAGE_ASPECT_COLOR_BIT},
+        &layout);
+    device->vk.vkDestroyImage(device->handle, image, NULL);
+    return layout.offset == 0 && layout.rowPitch % VKB_WORD_SIZE == 0;
+}
+
+static bool has_words(const struct vkb_device *device)
+{
+    VkFormatProperties properties;
+
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU || !device->dispatch)
+        return false;
+    for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
+        if (format != VKB_FORMAT_DEPTH32_FLOAT && !is_linear(device, vkb_formats[format].vk))
+            return false;
+    device->instance->vk.vkGetPhysicalDeviceFormatProperties(device->adapter.physical,
+                                                             VKB_WORD_FORMAT, &properties);
+    return (properties.bufferFeatures & VK_FORMAT_FEATURE_UNIFORM_TEXEL_BUFFER_BIT)
+        && has_whole_words(device);
+}
+
 static bool create_handle(struct vkb_device *device, const char *adapter_choice, const char *driver,
                           bool validation, struct vkb_error *error)
 {
@@ -143,6 +218,7 @@ static bool create_handle(struct vkb_device *device, const char *adapter_choice,
     vkb_instance_load_device(device->instance, device->handle, &device->vk);
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
     read_properties(device);
+    device->words = has_words(device);
     return true;
 }
 
@@ -180,25 +256,6 @@ bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format
                          VkFormatFeatureFlags features)
 {
     return (device->features[format] & features) == features;
-}
-
-bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
-                             VkImageUsageFlags usage, VkFormatFeatureFlags features, uint32_t width,
-                             uint32_t height)
-{
-    VkFormatProperties properties;
-    VkImageFormatProperties limits;
-
-    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU)
-        return false;
-    device->instance->vk.vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format,
-                                                             &properties);
-    return (properties.linearTilingFeatures & features) == features
-        && VK_RESULT(device->instance->vk.vkGetPhysicalDeviceImageFormatProperties(
-               device->adapter.physical, format, VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage, 0,
-               &limits))
-               == VK_SUCCESS
-        && width <= limits.maxExtent.width && height <= limits.maxExtent.height;
 }
 
 static bool remember_loss(struct vkb_device *device, bool done, const struct vkb_error *error)

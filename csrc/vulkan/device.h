@@ -19,7 +19,10 @@ struct vkb_device {
     VkPhysicalDeviceLimits limits;
     uint32_t max_side;                                // of images that passes write
     VkFormatFeatureFlags features[VKB_FORMAT_COUNT];  // of images with optimal tiling
-    bool dispatch;            // compute shaders can write images of every format
+    bool dispatch;  // compute shaders can write images of every format
+    // Colour images have linear tiling and lie in host-visible memory, which shaders also access as
+    // buffers of 16-byte words. This is the case on a CPU: its memory is host memory.
+    bool words;
     uint64_t timestamp_mask;  // 0: the queue has no timestamps
     // Imported host memory starts and ends at multiples of this; 0: import is not supported.
     VkDeviceSize import_alignment;
@@ -42,11 +45,8 @@ void vkb_device_destroy(struct vkb_device *device);
 bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format,
                          VkFormatFeatureFlags features);
 
-// Whether such images should be in host-visible memory. This is the case on a CPU: its memory is
-// host memory, and linear tiling is not slower.
-bool vkb_device_shares_image(const struct vkb_device *device, VkFormat format,
-                             VkImageUsageFlags usage, VkFormatFeatureFlags features, uint32_t width,
-                             uint32_t height);
+// How the device uses host memory of the caller that it imports as a buffer.
+VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device);
 
 // Submits the recorded commands. The unsignalled `fence` is signalled when the device has run them
 // and all earlier submissions. Device loss is stored in the device.

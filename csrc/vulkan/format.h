@@ -20,6 +20,10 @@ enum vkb_format {
 // The longest side of an image, for which the integers in sampling.glsl fit 32 bits.
 enum { VKB_MAX_SIDE = 32768 };
 
+// Images of a CPU are also buffers of such words.
+enum { VKB_WORD_SIZE = 16 };
+#define VKB_WORD_FORMAT VK_FORMAT_R32G32B32A32_UINT
+
 struct vkb_format_info {
     const char *name;   // "rgba8unorm"
     const char *dtype;  // "uint8"

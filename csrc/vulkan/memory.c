@@ -262,20 +262,70 @@ static bool create_view(const struct vkb_device *device, struct vkb_image *image
                          NULL, &image->view));
 }
 
-static bool map_image(const struct vkb_device *device, struct vkb_image *image,
-                      struct vkb_error *error)
+static size_t round_up(size_t size, size_t step)
+{
+    return (size + step - 1) / step * step;
+}
+
+size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width)
+{
+    // No driver aligns rows to more than that.
+    return round_up((size_t)width * vkb_pixel_size(format), 256);
+}
+
+bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format format, uint32_t width,
+                          uint32_t height)
+{
+    const uint64_t words = vkb_image_row_pitch(format, width) / VKB_WORD_SIZE;
+
+    return words * height <= device->limits.maxTexelBufferElements;
+}
+
+// The image's memory as a buffer.
+static bool create_buffer(const struct vkb_device *device, struct vkb_image *image,
+                          VkMemoryRequirements *requirements, struct vkb_error *error)
 {
     VkSubresourceLayout layout;
+    VkMemoryRequirements own;
 
     device->vk.vkGetImageSubresourceLayout(
         device->handle, image->handle,
         &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
-    if (!VK(error, device->vk.vkMapMemory(device->handle, image->memory, 0, VK_WHOLE_SIZE, 0,
-                                          &image->mapped)))
-        return false;
-    image->mapped = (char *)image->mapped + layout.offset;
     image->row_pitch = (size_t)layout.rowPitch;
+    if (!VK(error, device->vk.vkCreateBuffer(device->handle,
+                                             &(VkBufferCreateInfo){
+                                                 .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                                                 .size = image->row_pitch * image->height,
+                                                 .usage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
+                                                        | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+                                                        | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                             },
+                                             NULL, &image->buffer)))
+        return false;
+    device->vk.vkGetBufferMemoryRequirements(device->handle, image->buffer, &own);
+    requirements->memoryTypeBits &= own.memoryTypeBits;
+    if (requirements->size < own.size)
+        requirements->size = own.size;
     return true;
+}
+
+static bool map_image(const struct vkb_device *device, struct vkb_image *image,
+                      struct vkb_error *error)
+{
+    if (!VK(error, device->vk.vkBindBufferMemory(device->handle, image->buffer, image->memory, 0))
+        || !VK(error, device->vk.vkMapMemory(device->handle, image->memory, 0, VK_WHOLE_SIZE, 0,
+                                             &image->mapped)))
+        return false;
+    return !vkb_image_fits_words(device, image->format, image->width, image->height)
+        || VK(error,
+              device->vk.vkCreateBufferView(device->handle,
+                                            &(VkBufferViewCreateInfo){
+                                                .sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                                .buffer = image->buffer,
+                                                .format = VKB_WORD_FORMAT,
+                                                .range = image->row_pitch * image->height,
+                                            },
+                                            NULL, &image->words));
 }
 
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
@@ -295,8 +345,9 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
     if (!create_handle(device, spec, image, error))
         return false;
     vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
-    if (!allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE, &requirements,
-                  &image->memory, &flags, error)
+    if ((spec->mapped && !create_buffer(device, image, &requirements, error))
+        || !allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE, &requirements,
+                     &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
         || !create_view(device, image, error)) {
@@ -308,6 +359,8 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
 
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
 {
+    device->vk.vkDestroyBufferView(device->handle, image->words, NULL);
+    device->vk.vkDestroyBuffer(device->handle, image->buffer, NULL);
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
     device->vk.vkDestroyImage(device->handle, image->handle, NULL);
     device->vk.vkFreeMemory(device->handle, image->memory, NULL);
@@ -324,13 +377,15 @@ VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access ac
 void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer commands,
                           struct vkb_image *image, enum vkb_access access)
 {
-    vkb_barrier_record(device, commands,
-                       &(VkImageMemoryBarrier){
-                           .oldLayout = vkb_image_layout(image, image->access),
-                           .newLayout = vkb_image_layout(image, access),
-                           .image = image->handle,
-                           .subresourceRange = all_of_image(image),
-                       },
-                       image->access, access);
+    const VkImageMemoryBarrier barrier = {
+        .oldLayout = vkb_image_layout(image, image->access),
+        .newLayout = vkb_image_layout(image, access),
+        .image = image->handle,
+        .subresourceRange = all_of_image(image),
+    };
+
+    // A mapped image is accessed as a buffer, too, whose writes only a memory barrier covers.
+    vkb_barrier_record(device, commands, barrier.oldLayout != barrier.newLayout ? &barrier : NULL,
+                       image->mapped, image->access, access);
     image->access = access;
 }

@@ -29,9 +29,13 @@ struct vkb_image {
     enum vkb_access access;  // the last access recorded
     void *mapped;            // its pixels, row by row; NULL: not host-visible
     size_t row_pitch;        // of the mapped pixels, in bytes
+    // The mapped pixels as a buffer, and as words if they are few enough for a view.
+    VkBuffer buffer;
+    VkBufferView words;
 };
 
-// Six layers make a cubemap. A mapped image has one layer and one level.
+// Six layers make a cubemap. A mapped image has one layer and one level, and is a buffer, too;
+// device->words is required.
 struct vkb_image_spec {
     enum vkb_format format;
     uint32_t width, height, layers, levels;
@@ -65,6 +69,13 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
+
+// An upper bound of the bytes from a row of a mapped image to the next.
+size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width);
+
+// Whether an image of that size is small enough for a view of its words.
+bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format format, uint32_t width,
+                          uint32_t height);
 
 // The layout of the image for that access. A mapped image is always in the general layout.
 VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access);

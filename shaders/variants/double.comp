@@ -1,21 +1,26 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // A level of the pyramid on the way up to exactly twice the size of the smaller one.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
+#include "variants/pixels.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D smaller;
-layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D own;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+READ_IMAGE(1, smaller);
+READ_IMAGE(2, own);
+WRITE_IMAGE(3);
 
-#include "variants/double.glsl"
+#define HAS_OWN (ADD_OWN != 0)
+#define OWN_CHANNELS 4
 
-vec4 shade(ivec2 pixel, vec4 sum)
+uvec4 shade(uvec4 level, vec4 sum, ivec2 pixel)
 {
     if (ADD_OWN != 0)
-        sum += params.own * imageLoad(own, pixel);
-    return stored(sum);
+        sum += params.own * value_of(level);
+    return buffer_of(sum);
 }
+
+#include "variants/double.glsl"

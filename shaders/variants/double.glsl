@@ -1,52 +1,78 @@
 // From a level to one of exactly twice its size. An invocation walks down a strip and loads each
-// texel once. A shader that includes this has `smaller`, `target`, and what a pixel makes of its sum.
+// texel once. A shader that includes this defines, with pixels.glsl, `smaller`, `own` (of the target's
+// size, and of OWN_CHANNELS as the target; HAS_OWN: whether it is read), and shade(): what a pixel
+// becomes by its own pixel and the sum.
 #include "lib/doubling.glsl"
 
-vec4 shade(ivec2 pixel, vec4 sum);
-
+#ifdef WORDS
+const int COLUMNS = DOUBLE_WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROWS;
+#else
+const int COLUMNS = DOUBLE_COLUMNS, ROWS = DOUBLE_ROWS;
+#endif
 // Texels of the smaller level, columns and rows; a pixel of an odd place starts one texel later.
-const int LOADED = DOUBLE_COLUMNS / 2 + 4;
+const int LOADED = COLUMNS / 2 + 4;
 const int KEPT = 5;
 
-void store(ivec2 pixel, vec4 sum, ivec2 size)
-{
-    if (all(lessThan(pixel, size)))
-        imageStore(target, pixel, shade(pixel, params.coarse * sum));
-}
+#define LOAD load_smaller
+#define LOAD_IMAGE smaller
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS 4
+#define LOAD_FROM -2
+#define LOAD_COUNT LOADED
+#include "variants/load.glsl"
+
+#define LOAD load_own
+#define LOAD_IMAGE own
+#define LOAD_NUMBER 2
+#define LOAD_CHANNELS OWN_CHANNELS
+#define LOAD_FROM 0
+#define LOAD_COUNT COLUMNS
+#include "variants/load.glsl"
+
+#define STORE_COUNT COLUMNS
+#define STORE_CHANNELS OWN_CHANNELS
+#include "variants/store.glsl"
 
 void main()
 {
-    ivec2 last = imageSize(smaller) - 1, size = imageSize(target);
-    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(DOUBLE_COLUMNS, DOUBLE_ROWS);
-    int end = min(first.y + DOUBLE_ROWS, size.y) / 2;
-    vec4 rows[KEPT][DOUBLE_COLUMNS];
+    ivec2 last = READ_SIZE(smaller, 1) - 1, size = TARGET_SIZE();
+    ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
+    int end = min(first.y + ROWS, size.y) / 2;
+    vec4 rows[KEPT][COLUMNS];
+    vec4 texels[LOADED];
+    uvec4 raw[LOADED], pixels[COLUMNS];
 
     if (any(greaterThanEqual(first, size)))
         return;
-    for (int row = 0; row < KEPT; ++row)
-        for (int i = 0; i < DOUBLE_COLUMNS; ++i)
+    [[unroll]] for (int row = 0; row < KEPT; ++row)
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             rows[row][i] = vec4(0.0);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        pixels[i] = uvec4(0);
     for (int y = first.y / 2 - 2; y < end + 2; ++y) {
-        vec4 texels[LOADED];
-        for (int i = 0; i < LOADED; ++i) {
-            ivec2 texel = ivec2(first.x / 2 + i - 2, y);
-            texels[i] = imageLoad(smaller, clamp(texel, ivec2(0), last));
-        }
-        for (int row = 1; row < KEPT; ++row)
-            for (int i = 0; i < DOUBLE_COLUMNS; ++i)
+        load_smaller(first.x / 2, clamp(y, 0, last.y), raw);
+        [[unroll]] for (int i = 0; i < LOADED; ++i)
+            texels[i] = value_of(raw[i]);
+        [[unroll]] for (int row = 1; row < KEPT; ++row)
+            [[unroll]] for (int i = 0; i < COLUMNS; ++i)
                 rows[row - 1][i] = rows[row][i];
-        for (int i = 0; i < DOUBLE_COLUMNS; ++i) {
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             int at = (i + 1) / 2;
             rows[KEPT - 1][i] = four(texels[at], texels[at + 1], texels[at + 2], texels[at + 3],
                                      (i & 1) == 1);
         }
         if (y < first.y / 2 + 2)
             continue;
-        for (int i = 0; i < DOUBLE_COLUMNS; ++i) {
-            ivec2 pixel = ivec2(first.x + i, 2 * (y - 2));
-            store(pixel, four(rows[0][i], rows[1][i], rows[2][i], rows[3][i], false), size);
-            store(pixel + ivec2(0, 1), four(rows[1][i], rows[2][i], rows[3][i], rows[4][i], true),
-                  size);
+        [[unroll]] for (int part = 0; part < 2; ++part) {
+            int line = 2 * (y - 2) + part;
+            if (HAS_OWN)
+                load_own(first.x, line, pixels);
+            [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+                vec4 sum = four(rows[part][i], rows[part + 1][i], rows[part + 2][i],
+                                rows[part + 3][i], part == 1);
+                pixels[i] = shade(pixels[i], params.coarse * sum, ivec2(first.x + i, line));
+            }
+            store(first.x, line, pixels);
         }
     }
 }

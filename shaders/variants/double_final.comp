@@ -1,20 +1,25 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // The finished picture from the largest level of a bloom of twice its size.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(DOUBLE_FINAL_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/composite.glsl"
+#include "variants/pixels.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D smaller;
-layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D scene;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+READ_IMAGE(1, smaller);
+READ_IMAGE(2, own);
+WRITE_IMAGE(3);
+
+#define HAS_OWN true
+#define OWN_CHANNELS 4
+
+uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
+{
+    return finished(scene, finish(value_of(scene), as_stored(sum, FORMAT), pixel));
+}
 
 #include "variants/double.glsl"
-
-vec4 shade(ivec2 pixel, vec4 sum)
-{
-    return finish(imageLoad(scene, pixel), as_stored(sum, FORMAT), pixel);
-}

@@ -1,56 +1,82 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // The complete bloom of an image for processors without fast shared memory: an invocation walks down a
 // strip, with the vertical sums of the rows to come in registers.
 #include "variants/fused_bloom.glsl"
+#include "variants/pixels.glsl"
+
+const int COLUMNS = STRIP_COLUMNS(CHANNEL_BYTES);
+const int SUMS = 2 * STRIP_RADIUS;
+const int LOADED = COLUMNS + 2 * STRIP_RADIUS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
-layout(set = 0, binding = 2) uniform writeonly image2D target;
+READ_IMAGE(1, image);
+WRITE_IMAGE(2);
 
-const int SUMS = 2 * STRIP_RADIUS;
-const int LOADED = STRIP_COLUMNS + 2 * STRIP_RADIUS;
+#define LOAD load_wide
+#define LOAD_IMAGE image
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS 4
+#define LOAD_FROM -STRIP_RADIUS
+#define LOAD_COUNT LOADED
+#include "variants/load.glsl"
+
+#define LOAD load_own
+#define LOAD_IMAGE image
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS 4
+#define LOAD_FROM 0
+#define LOAD_COUNT COLUMNS
+#include "variants/load.glsl"
+
+#define STORE_COUNT COLUMNS
+#define STORE_CHANNELS 4
+#include "variants/store.glsl"
 
 void main()
 {
-    ivec2 last = imageSize(image) - 1;
-    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(STRIP_COLUMNS, STRIP_ROWS);
-    int end = min(first.y + STRIP_ROWS, last.y + 1);
+    ivec2 size = READ_SIZE(image, 1);
+    ivec2 first = first_pixel(ivec2(COLUMNS, STRIP_ROWS));
+    int end = min(first.y + STRIP_ROWS, size.y);
     vec3 sums[SUMS][LOADED];
     vec3 line[LOADED];
-    vec3 bloom[STRIP_COLUMNS];
+    uvec4 raw[LOADED], own[COLUMNS];
+    float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
 
-    if (any(greaterThan(first, last)))
+    if (any(greaterThanEqual(first, size)))
         return;
-    for (int row = 0; row < SUMS; ++row)
-        for (int i = 0; i < LOADED; ++i)
+    [[unroll]] for (int i = 0; i <= STRIP_RADIUS; ++i) {
+        weights[i] = vertical_weight(i);
+        row_weights[i] = horizontal_weight(i);
+    }
+    [[unroll]] for (int row = 0; row < SUMS; ++row)
+        [[unroll]] for (int i = 0; i < LOADED; ++i)
             sums[row][i] = vec3(0.0);
+    // Every loop but this is unrolled: else the sums would be memory.
     for (int y = first.y - STRIP_RADIUS; y < end + STRIP_RADIUS; ++y) {
-        int row = clamp(y, 0, last.y);
-        // In small loops, each of which drivers unroll; in one large one the sums would be memory.
-        for (int i = 0; i < LOADED; ++i)
-            line[i] = thresholded(imageLoad(image, ivec2(clamp(first.x + i - STRIP_RADIUS, 0, last.x), row)).rgb);
-        for (int i = 0; i < LOADED; ++i) {
+        load_wide(first.x, clamp(y, 0, size.y - 1), raw);
+        [[unroll]] for (int i = 0; i < LOADED; ++i)
+            line[i] = thresholded(value_of(raw[i]).rgb);
+        [[unroll]] for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
             // The row that ends here, and those to come, each one place further.
-            line[i] = as_stored(sums[0][i] + vertical_weight(STRIP_RADIUS) * added, FORMAT);
-            for (int tap = 1; tap < SUMS; ++tap)
-                sums[tap - 1][i] = sums[tap][i] + vertical_weight(STRIP_RADIUS - tap) * added;
-            sums[SUMS - 1][i] = vertical_weight(STRIP_RADIUS) * added;
+            line[i] = as_stored(sums[0][i] + weights[STRIP_RADIUS] * added, FORMAT);
+            [[unroll]] for (int tap = 1; tap < SUMS; ++tap)
+                sums[tap - 1][i] = sums[tap][i] + weights[abs(STRIP_RADIUS - tap)] * added;
+            sums[SUMS - 1][i] = weights[STRIP_RADIUS] * added;
         }
         if (y < first.y + STRIP_RADIUS)
             continue;
-        for (int i = 0; i < STRIP_COLUMNS; ++i) {
-            vec3 sum = vec3(0.0);
-            for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
-                sum += horizontal_weight(tap) * line[i + STRIP_RADIUS + tap];
-            bloom[i] = as_stored(sum, FORMAT);
-        }
-        for (int i = 0; i < STRIP_COLUMNS; ++i) {
+        load_own(first.x, y - STRIP_RADIUS, own);
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             ivec2 pixel = ivec2(first.x + i, y - STRIP_RADIUS);
-            if (pixel.x <= last.x)
-                imageStore(target, pixel,
-                           finish(imageLoad(image, pixel), vec4(bloom[i], 1.0), pixel));
+            vec3 sum = vec3(0.0);
+            [[unroll]] for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
+                sum += row_weights[abs(tap)] * line[i + STRIP_RADIUS + tap];
+            vec4 bloom = vec4(as_stored(sum, FORMAT), 1.0);
+            own[i] = finished(own[i], finish(value_of(own[i]), bloom, pixel));
         }
+        store(first.x, y - STRIP_RADIUS, own);
     }
 }

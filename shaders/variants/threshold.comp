@@ -1,23 +1,49 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The threshold pass if the bloom buffers have the size of the image. Texels are loaded directly,
-// without the sampler.
+#extension GL_EXT_control_flow_attributes : require
+// The threshold pass if the bloom buffers have the size of the image.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "lib/storage.glsl"
+#include "variants/pixels.glsl"
+
+const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES);
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D image;
-layout(set = 0, binding = 2) uniform writeonly image2D target;
+READ_IMAGE(1, image);
+WRITE_IMAGE(2);
 
-#include "variants/texels.glsl"
+#define LOAD load_run
+#define LOAD_IMAGE image
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS 4
+#define LOAD_FROM 0
+#define LOAD_COUNT COLUMNS
+#include "variants/load.glsl"
 
-vec4 shade(ivec2 pixel)
+#define STORE_COUNT COLUMNS
+#define STORE_CHANNELS 4
+#include "variants/store.glsl"
+
+void main()
 {
-    vec4 colour = finite_or_zero(imageLoad(image, pixel));
-    vec4 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
-    return stored(kept);
+    ivec2 size = TARGET_SIZE();
+    ivec2 first = first_pixel(ivec2(COLUMNS, TEXEL_ROWS));
+    int end = min(first.y + TEXEL_ROWS, size.y);
+    uvec4 raw[COLUMNS];
+
+    if (first.x >= size.x)
+        return;
+    for (int y = first.y; y < end; ++y) {
+        load_run(first.x, y, raw);
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+            vec4 colour = finite_or_zero(value_of(raw[i]));
+            raw[i] = buffer_of(
+                apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee));
+        }
+        store(first.x, y, raw);
+    }
 }

@@ -77,6 +77,8 @@ static void lower_limits(VkPhysicalDeviceLimits *limits)
     lower(&limits->maxFragmentInputComponents, 64);
     lower(&limits->maxVertexOutputComponents, 64);
     lower(&limits->maxUniformBufferRange, 16384);
+    lower(&limits->maxTexelBufferElements, 65536);
+    lower(&limits->maxStorageBufferRange, 1 << 27);
     lower(&limits->maxPerStageDescriptorSamplers, 16);
     lower(&limits->maxPerStageDescriptorUniformBuffers, 12);
     lower(&limits->maxPerStageDescriptorSampledImages, 16);
@@ -110,6 +112,9 @@ static void change_properties(VkPhysicalDeviceProperties *properties)
         properties->limits.maxPerStageDescriptorStorageImages = 0;
     if (lacks("indices"))
         properties->limits.maxDrawIndexedIndexValue = 9;
+    // Less than the largest image of the test has.
+    if (lacks("bands"))
+        lower(&properties->limits.maxStorageBufferRange, 1 << 19);
     if (lacks("wide"))
         lower(&properties->limits.maxImageDimension2D, 5000);
     if (lacks("high"))

@@ -87,12 +87,12 @@ def test_variants_are_seen_without_a_renderer() -> None:
         ("composite_frag", "fragment"),
     ]
     assert variants("cpu") == [
-        ("threshold_comp_rgba16float", "pixels"),
+        ("threshold_words_rgba16float", "pixels"),
         ("line_comp_rgba16float", "line"),
         ("line_comp_rgba16float", "line"),
-        ("blend_comp_rgba16float", "pixels"),
+        ("blend_words_rgba16float", "pixels"),
     ]
-    assert variants("cpu", ("final",)) == [("strip_comp_rgba16float", "strips")]
+    assert variants("cpu", ("final",)) == [("strip_words_rgba16float", "strips")]
     assert variants("gpu", ("final",)) == [("tile_comp", "tiles")]
 
 

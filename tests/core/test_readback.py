@@ -68,9 +68,32 @@ def test_every_framebuffer_both_ways(renderer: Renderer, scene: Scene, shading: 
     out = {name: placed(array.shape, array.dtype.name, 1)[0] for name, array in whole.items()}
     # Without its alignment an array cannot be the device's.
     apart = renderer.render(scene, settings, size, shading=shading, time=0.1, out=out)
-    assert apart.timings == {}
+    # (What a pass stored to the array was not kept.)
+    assert apart.timings.keys() <= {"final"}
     for name, array in whole.items():
         np.testing.assert_array_equal(apart[name], array, err_msg=name)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("width", [960, 701])
+def test_a_final_that_comes_again_is_kept(
+    new_renderer: Callable[[], Renderer], width: int, dtype: str, channels: int
+) -> None:
+    image = picture(width, 600, channels, dtype, 5)
+    renderer = new_renderer()
+    finals = []
+    runs = []
+    for _ in range(4):
+        frames = renderer.apply(image, attachments=("final",))
+        finals.append(frames["final"].copy())
+        runs.append(list(frames.timings))
+        # It is the caller's alone.
+        frames["final"][:] = 0
+    for final in finals[1:]:
+        np.testing.assert_array_equal(final, finals[0])
+    assert runs[0] == ["final"]
+    assert runs[2:] == [[], []]
 
 
 def test_large_frames_in_the_air(new_renderer: Callable[[], Renderer]) -> None:

@@ -124,6 +124,25 @@ def test_every_form_gives_the_same_bits(
         np.testing.assert_array_equal(frames[framebuffer], expected[framebuffer], framebuffer)
 
 
+@pytest.mark.parametrize("size", [(256, 160), (61, 97), (33, 5), (1, 1)], ids=str)
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("name", ["tutorial", "threshold", "outline", "pyramid", "long"])
+def test_three_channels_have_the_bits_of_four(
+    formed: Renderer, unfused: Renderer, name: str, dtype: str, size: tuple[int, int]
+) -> None:
+    image = hdr_picture(*size, 4, dtype)
+    image[..., 3] = 255 if dtype == "uint8" else 1
+    expected = unfused.apply(image, BIT_EQUAL[name])
+    image = np.ascontiguousarray(image[..., :3])
+    alone = formed.apply(image, BIT_EQUAL[name], attachments=("final",))
+    np.testing.assert_array_equal(alone["final"], expected["final"][..., :3])
+    formed.apply(image[::-1], BIT_EQUAL[name])
+    frames = formed.apply(image, BIT_EQUAL[name])
+    for framebuffer in expected:
+        right = expected[framebuffer][..., : frames[framebuffer].shape[2]]
+        np.testing.assert_array_equal(frames[framebuffer], right, framebuffer)
+
+
 @pytest.mark.parametrize("name", presets)
 def test_final_alone_has_the_bits_of_the_final_of_all(formed: Renderer, name: str) -> None:
     for dtype in DTYPES:

@@ -1,0 +1,97 @@
+// How variants load and store runs of pixels. With WORDS an image is a buffer of 16-byte words, as a
+// CPU has it: llvmpipe loads and stores a word nearly as fast as one channel. Else an image is a
+// storage image. A shader that includes this has included storage.glsl.
+//
+// A pixel is `raw` before its channels are floats: with WORDS the bits of its CHANNEL_BYTES bytes a
+// channel, else the bits of single floats. load.glsl and store.glsl make the functions.
+
+#ifdef WORDS
+
+layout(push_constant) uniform Words {
+    ivec4 target;    // width, height, words in a row, first row of what is bound
+    ivec4 reads[2];  // by binding, from 1 on: width, height, words in a row
+    uint zero;       // 0, which compilers do not know
+} words;
+
+#define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
+#define WRITE_IMAGE(number) \
+    layout(set = 0, binding = number, std430) writeonly buffer Target { uvec4 row_words[]; } target
+#define READ_SIZE(name, number) (words.reads[number - 1].xy)
+#define TARGET_SIZE() (words.target.xy)
+// Where a dispatch begins that does not reach all rows.
+#define FIRST_ROW() (words.target.w)
+
+#else
+
+#define CHANNEL_BYTES 0
+#define READ_IMAGE(number, name) \
+    layout(set = 0, binding = number, SOURCE_FORMAT) uniform readonly image2D name
+#define WRITE_IMAGE(number) layout(set = 0, binding = number) uniform writeonly image2D target
+#define READ_SIZE(name, number) imageSize(name)
+#define TARGET_SIZE() imageSize(target)
+#define FIRST_ROW() 0
+
+#endif
+
+// The first pixel of an invocation's block of that size, in the whole target.
+ivec2 first_pixel(ivec2 block)
+{
+    return ivec2(gl_GlobalInvocationID.xy) * block + ivec2(0, FIRST_ROW());
+}
+
+vec4 value_of(uvec4 raw)
+{
+#if CHANNEL_BYTES == 1
+    // As llvmpipe reads 8 bits.
+    return vec4(ivec4(raw.x, raw.x >> 8, raw.x >> 16, raw.x >> 24) & 255) * (1.0 / 255.0);
+#elif CHANNEL_BYTES == 2
+    return vec4(unpackHalf2x16(raw.x), unpackHalf2x16(raw.y));
+#else
+    return uintBitsToFloat(raw);
+#endif
+}
+
+uvec4 raw_of(vec4 value)
+{
+#if CHANNEL_BYTES == 1
+    // A sum with 2^23 is rounded to an integer, which its last bits are: Mesa 25 converts lane by lane.
+    uvec4 level = floatBitsToUint(clamp(value, 0.0, 1.0) * 255.0 + 8388608.0) & 255u;
+    return uvec4(level.r | level.g << 8 | level.b << 16 | level.a << 24, 0, 0, 0);
+#elif CHANNEL_BYTES == 2
+    return uvec4(packHalf2x16(value.rg), packHalf2x16(value.ba), 0, 0);
+#else
+    return floatBitsToUint(value);
+#endif
+}
+
+// The value with the bits of `own` for its alpha.
+uvec4 with_alpha_of(uvec4 own, vec4 value)
+{
+#if CHANNEL_BYTES == 1
+    return uvec4((raw_of(value).x & 0xffffffu) | (own.x & 0xff000000u), 0, 0, 0);
+#elif CHANNEL_BYTES == 2
+    uint blue = packHalf2x16(vec2(value.b, 0.0)) & 0xffffu;
+    return uvec4(packHalf2x16(value.rg), blue | (own.y & 0xffff0000u), 0, 0);
+#else
+    return uvec4(floatBitsToUint(value.rgb), own.a);
+#endif
+}
+
+// A value of a bloom buffer, whose alpha is 1 unless it is blurred like a colour.
+uvec4 buffer_of(vec4 value)
+{
+#if CHANNEL_BYTES == 1
+    const uvec4 one = uvec4(0xff000000u, 0, 0, 0);
+#elif CHANNEL_BYTES == 2
+    const uvec4 one = uvec4(0, 0x3c000000u, 0, 0);
+#else
+    const uvec4 one = uvec4(0, 0, 0, 0x3f800000u);
+#endif
+    return ALPHA == ALPHA_BLUR ? raw_of(stored(value)) : with_alpha_of(one, stored(value));
+}
+
+// A pixel of the finished picture.
+uvec4 finished(uvec4 own, vec4 value)
+{
+    return ALPHA == ALPHA_KEEP ? with_alpha_of(own, value) : raw_of(value);
+}

@@ -1,0 +1,40 @@
+// Makes the function that stores a run of STORE_COUNT pixels, a multiple of 16 bytes, to a row of the
+// target, whose pixels have STORE_CHANNELS channels (a storage image: 4).
+
+void store(int first, int row, uvec4 raw[STORE_COUNT])
+{
+#ifdef WORDS
+    const int BYTES = STORE_CHANNELS * CHANNEL_BYTES;
+    const int COUNT = STORE_COUNT * BYTES / 16;
+    int start = first * BYTES / 16;
+    int last = (words.target.x * BYTES - 1) / 16;
+    int row_start = (row - words.target.w) * words.target.z;
+    [[unroll]] for (int i = 0; i < COUNT; ++i) {
+        uvec4 word;
+        [[unroll]] for (int j = 0; j < 4; ++j) {
+            // The pixel in which this quarter of a word begins, and the bytes of it before that.
+            int byte = 16 * i + 4 * j, pixel = byte / BYTES, skipped = byte % BYTES;
+#if STORE_CHANNELS * CHANNEL_BYTES == 3
+            word[j] = (raw[pixel].x & 0xffffffu) >> 8 * skipped;
+            word[j] |= raw[min(pixel + 1, STORE_COUNT - 1)].x << (24 - 8 * skipped);
+#elif STORE_CHANNELS * CHANNEL_BYTES == 6
+            word[j] = skipped == 0   ? raw[pixel].x
+                    : skipped == 2 ? raw[pixel].x >> 16 | raw[pixel].y << 16
+                                   : (raw[pixel].y & 0xffffu)
+                                         | raw[min(pixel + 1, STORE_COUNT - 1)].x << 16;
+#else
+            word[j] = raw[pixel][skipped / 4];
+#endif
+        }
+        // (Without the maximum LLVM packs lane by lane, in the loop that stores them.)
+        if (start + i <= last)
+            target.row_words[row_start + start + i] = max(word, uvec4(words.zero));
+    }
+#else
+    [[unroll]] for (int i = 0; i < STORE_COUNT; ++i) {
+        ivec2 pixel = ivec2(first + i, row);
+        if (pixel.x < imageSize(target).x)
+            imageStore(target, pixel, uintBitsToFloat(raw[i]));
+    }
+#endif
+}
