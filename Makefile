@@ -40,7 +40,7 @@ check: build/stamp/core build/stamp/test build/stamp/lint
 	$(PYTHON) -m pytest -q $(PARALLEL) $(FAST)
 
 docs: build/stamp/core build/stamp/docs
-	rm -rf docs/api
+	rm -rf docs/api docs/examples
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
 
 # The build root and Mesa are built once, in build/wheels.
@@ -69,7 +69,7 @@ sanitize: build/stamp/core build/stamp/test
 	    PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh; tests=$$?; wait $$threads && exit $$tests
 
 clean:
-	rm -rf build out docs/api $(VENV) python/vkbloom/_core*.so
+	rm -rf build out docs/api docs/examples $(VENV) python/vkbloom/_core*.so
 
 build/stamp/system:
 	tools/setup_system.sh build

@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 SIZE = (640, 360)
-CELL = "import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo())\nexplorer"
+CELL = (
+    "import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo(), shading='forward')\nexplorer"
+)
 # The range of each slider. They make different passes out of date: only the composite, the blur, or
 # all passes.
 SLIDERS = {
@@ -113,7 +115,9 @@ def main(count: int, in_lab: bool, adapter: str) -> None:
         stack.callback(browser.close)
         renderer = stack.enter_context(vkbloom.Renderer(adapter))
         scene = vkbloom.Scene.ufo()
-        url = stack.enter_context(served(lambda: Viewer(scene, renderer=renderer)))
+        url = stack.enter_context(
+            served(lambda: Viewer(scene, shading="forward", renderer=renderer))
+        )
         page = browser.new_page(viewport={"width": 1024, "height": 900})
         page.goto(url)
         fit(page)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from importlib.metadata import version as _version
+from pathlib import Path
 
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
@@ -12,12 +14,21 @@ release = _version("vkbloom")
 copyright = "the vkbloom authors, MIT licence"
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
 ]
 exclude_patterns = ["README.md", "measured_table.md"]
+
+# Sphinx reads what is in this folder alone. The notebooks are shown with the outputs that they are
+# stored with (tools/run_notebooks.py).
+_here = Path(__file__).parent
+(_here / "examples").mkdir(exist_ok=True)
+for _notebook in (_here.parent / "examples").glob("*.ipynb"):
+    shutil.copy(_notebook, _here / "examples")
+nb_execution_mode = "off"
+nb_merge_streams = True
 default_role = "py:obj"
 
 myst_enable_extensions = ["colon_fence", "dollarmath"]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
+import gc
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -22,6 +24,14 @@ def pytest_configure(config: pytest.Config) -> None:
     hypothesis.settings.register_profile("untimed", deadline=None)
     hypothesis.settings.load_profile("untimed")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Look for leaks in a worker of xdist, which may end without the look at its exit."""
+    if "VKBLOOM_SANITIZED" in os.environ and hasattr(config, "workerinput"):
+        gc.collect()
+        # (Of the library that is preloaded.)
+        ctypes.CDLL(None)["__lsan_do_recoverable_leak_check"]()
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:

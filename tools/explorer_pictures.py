@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 THEMES: tuple[Any, ...] = ("light", "dark")
 CELLS = (
-    "import vkbloom\n\nexplorer = vkbloom.explore(vkbloom.Scene.ufo())\nexplorer",
+    "import vkbloom\n\nexplorer = vkbloom.explore()\nexplorer",
     "explorer.settings",
 )
 
@@ -54,20 +54,20 @@ def save(page: Page, path: Path) -> None:
 
 def photograph_own_page(browser: Browser, folder: Path) -> None:
     """Two methods side by side, with the pointer on the picture."""
-    scene = vkbloom.Scene.ufo()
+    look: dict[str, Any] = {"tonemap": "aces", "encoding": "srgb"}
     with vkbloom.Renderer("software") as renderer:
-        against = vkbloom.Separable()
-        begun = vkbloom.Separable(blur_scale=1.6)
-        with served(lambda: Viewer(scene, begun, against=against, renderer=renderer)) as url:
+        against = vkbloom.Separable(**look)
+        begun = vkbloom.Separable(blur_scale=1.6, **look)
+        with served(lambda: Viewer(None, begun, against=against, renderer=renderer)) as url:
             for theme in THEMES:
-                page = browser.new_page(viewport={"width": 1120, "height": 560}, color_scheme=theme)
+                page = browser.new_page(viewport={"width": 1120, "height": 640}, color_scheme=theme)
                 page.goto(url)
                 wait(page, "blur_scale=1.6")
                 page.get_by_label("method").select_option("pyramid")
                 page.locator("[data-field=intensity]").fill("1.5")
-                wait(page, "Pyramid(intensity=1.5)")
+                wait(page, "Pyramid(intensity=1.5")
                 page.get_by_label("wipe A | B").check()
-                page.locator("canvas").hover(position={"x": 330, "y": 215})
+                page.locator("canvas").hover(position={"x": 330.5, "y": 215.5})
                 page.get_by_text("B final[215, 330]").wait_for()
                 save(page, folder / f"explorer_page_{theme}.jpg")
                 page.close()
@@ -84,9 +84,9 @@ def photograph_jupyterlab(browser: Browser, folder: Path) -> None:
                 page.get_by_text("Python 3 (ipykernel) | Idle").wait_for(timeout=60_000)
                 page.locator(".jp-CodeCell .cm-content").first.click()
                 page.keyboard.press("Shift+Enter")
-                wait(page, "vkbloom.Separable()")
+                wait(page, "vkbloom.Separable(")
                 page.get_by_label("preset").select_option("unity_urp")
-                wait(page, "vkbloom.UrpBloom()")
+                wait(page, "vkbloom.UrpBloom(")
                 page.locator("[data-field=intensity]").fill("2")
                 wait(page, "intensity=2.0")
                 page.locator(".jp-CodeCell .cm-content").nth(1).click()

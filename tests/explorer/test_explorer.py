@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
+import itertools
 import json
 import sys
 from collections.abc import Callable
@@ -48,7 +50,7 @@ def image() -> np.ndarray[Any, Any]:
 
 @pytest.fixture
 def viewer(scene: Scene, renderer: Renderer) -> Viewer:
-    return Viewer(scene, renderer=renderer, size=(64, 36))
+    return Viewer(scene, renderer=renderer, size=(64, 36), shading="forward")
 
 
 class TestControls:
@@ -108,6 +110,13 @@ class TestControls:
         code = as_code(settings)
         ast.parse(code)
         assert eval(code, {"vkbloom": vkbloom}) == settings
+
+    def test_code_of_a_preset_with_another_look(self) -> None:
+        settings = presets["jimenez2014"].replace(tonemap="aces", exposure=1)
+        code = 'vkbloom.presets["jimenez2014"].replace(tonemap="aces", exposure=1.0)'
+        assert sorted(as_code(settings)) == sorted(code)
+        assert eval(as_code(settings), {"vkbloom": vkbloom}) == settings
+        assert as_code(settings.replace(levels=3)).startswith("vkbloom.Pyramid(")
 
     def test_code_is_short(self) -> None:
         assert as_code(Separable()) == "vkbloom.Separable()"
@@ -192,6 +201,67 @@ class TestViewer:
         assert answer["sides"]["a"] == json.loads(json.dumps(Separable().to_dict()))
         assert answer["sides"]["b"]["bloom"] is False
         assert (answer["animated"], answer["own_size"]) == (True, [64, 36])
+
+    def test_the_scene_to_begin_with(self, renderer: Renderer) -> None:
+        """Its lights tell all presets apart, by more than two levels in the mean of a pixel's
+        three channels somewhere: pictures that are alike differ by rounding alone."""
+        viewer = Viewer(renderer=renderer, size=(160, 90))
+        answer, _ = ask(viewer, kind="setup")
+        assert (answer["shading"], answer["glow"], answer["animated"]) == ("deferred", 6, True)
+        assert answer["shadings"] == ["forward", "deferred"]
+        begun = presets["tutorial"].replace(tonemap="aces", encoding="srgb")
+        assert settings_from(answer["sides"]["a"]) == begun
+        pictures = {}
+        for name, preset in presets.items():
+            frame(viewer, preset.replace(tonemap="aces", encoding="srgb"))
+            pictures[name] = viewer.frames["a"]["final"][..., :3].astype(int)
+        for one, other in itertools.combinations(pictures, 2):
+            difference = np.abs(pictures[one] - pictures[other])
+            assert difference.mean() > 0.5, (one, other)
+            assert difference.max() > 20, (one, other)
+
+    def test_shading_and_glow(self, viewer: Viewer, scene: Scene, renderer: Renderer) -> None:
+        frame(viewer, Pyramid(), shading="deferred", glow=9)
+        bright = dataclasses.replace(scene, glow_intensity=9)
+        expected = renderer.render(bright, Pyramid(), (64, 36), shading="deferred")["final"]
+        assert np.array_equal(viewer.frames["a"]["final"], expected)
+        # What a message leaves out stays.
+        frame(viewer, Pyramid())
+        assert np.array_equal(viewer.frames["a"]["final"], expected)
+        frame(viewer, Pyramid(), shading="forward")
+        expected = renderer.render(scene, Pyramid(), (64, 36))["final"]
+        assert np.array_equal(viewer.frames["a"]["final"], expected)
+
+    def test_a_file_is_opened(self, viewer: Viewer, tmp_path: Path) -> None:
+        pixels = np.random.default_rng(1).integers(0, 256, (21, 34, 3), dtype=np.uint8)
+        path = vkbloom.write(tmp_path / "a.png", pixels)
+        answer, _ = viewer.answer({"kind": "open", "name": "folder/photo.png"}, [path.read_bytes()])
+        assert (answer["kind"], answer["name"]) == ("open", "photo.png")
+        assert (answer["own_size"], answer["shadings"]) == ((34, 21), [])
+        # A scene's settings turn photographs white.
+        assert settings_from(answer["sides"]["a"]) == presets["bevy_natural"]
+        frame(viewer, Separable(bloom=False))
+        assert np.array_equal(viewer.frames["a"]["final"], vkbloom.read(path))
+        # Of the next image, the settings stay.
+        answer, _ = viewer.answer({"kind": "open", "name": "b.png"}, [path.read_bytes()])
+        assert settings_from(answer["sides"]["a"]) == Separable(bloom=False)
+
+    def test_files_that_are_no_images(self, viewer: Viewer) -> None:
+        for name in ("words.png", "no extension", "../../x.exr", "a." + "x" * 300):
+            answer, _ = viewer.answer({"kind": "open", "name": name}, [b"words"])
+            assert answer["kind"] == "error"
+            assert Path(name).name in answer["error"]
+            assert "image." not in answer["error"]
+        # What was looked at is still there.
+        assert frame(viewer, Separable())[0]["size"] == [64, 36]
+
+    def test_the_picture_is_saved_in_its_own_size(self, image: Any, renderer: Renderer) -> None:
+        viewer = Viewer(image, renderer=renderer)
+        frame(viewer, Pyramid(), size=[20, 15])
+        answer, (picture,) = ask(viewer, kind="save", settings=Pyramid().to_dict(), stops=-2)
+        assert answer["framebuffer"] == "final"
+        whole = renderer.apply(image, Pyramid())["final"]
+        assert picture == picture_of(whole, "final", is_encoded=False, stops=-2.0)
 
     def test_a_frame_is_that_of_the_renderer(
         self, viewer: Viewer, scene: Scene, renderer: Renderer, tmp_path: Path
@@ -295,6 +365,10 @@ class TestViewer:
             {"kind": "frame", "sides": {}, "time": "now"},
             {"kind": "frame", "sides": {}, "stops": 1e9},
             {"kind": "frame", "sides": {}, "at": [2, 0]},
+            {"kind": "frame", "sides": {}, "shading": "x"},
+            {"kind": "frame", "sides": {}, "glow": -1},
+            {"kind": "open", "name": "a.png"},
+            {"kind": "save"},
             {"kind": "probe"},
             {"kind": "probe", "at": [None, 0]},
         ],
@@ -306,7 +380,7 @@ class TestViewer:
 
     def test_arguments(self, scene: Scene, renderer: Renderer, image: Any) -> None:
         for arguments, kind, message in (
-            ((None,), TypeError, "image"),
+            (("photo.png",), TypeError, "image"),
             ((image[0],), ValueError, "shape"),
             ((scene, 3), TypeError, "settings"),
         ):

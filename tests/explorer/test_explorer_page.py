@@ -7,6 +7,7 @@ What is shown is compared, to the pixel, with what the renderer gives: in the pa
 from __future__ import annotations
 
 import base64
+import dataclasses
 import re
 import shutil
 import time
@@ -19,9 +20,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.explorer.explorer_hosts import PATIENCE, jupyterlab, served
 from tests.framebuffers import decode
-from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
+from vkbloom import BevyBloom, KinoBloom, Pyramid, Renderer, Scene, Separable, presets
+from vkbloom.explorer.shown import picture_of
 from vkbloom.explorer.viewer import Viewer
 
 if TYPE_CHECKING:
@@ -32,7 +35,9 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 ASPECT = (1280, 720)
-NOTEBOOK = "import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo())\nexplorer"
+NOTEBOOK = (
+    'import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo(), shading="forward")\nexplorer'
+)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +64,7 @@ def serve() -> Iterator[Callable[[Callable[[], Viewer]], str]]:
 def scene_url(
     serve: Callable[[Callable[[], Viewer]], str], scene: Scene, renderer: Renderer
 ) -> str:
-    return serve(lambda: Viewer(scene, renderer=renderer, size=ASPECT))
+    return serve(lambda: Viewer(scene, renderer=renderer, size=ASPECT, shading="forward"))
 
 
 @contextmanager
@@ -176,6 +181,9 @@ def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_p
     page.get_by_label("method").select_option("kino")
     wait_for_code(page, "vkbloom.KinoBloom(exposure=2.0)")
     assert page.get_by_label("preset").input_value() == ""
+    # And when a preset is chosen.
+    page.get_by_label("preset").select_option("jimenez2014")
+    wait_for_code(page, 'vkbloom.presets["jimenez2014"].replace(exposure=2.0)')
 
 
 def test_what_is_refused_is_said(page: Page) -> None:
@@ -300,7 +308,11 @@ def test_pictures_follow_the_window(page: Page, tmp_path: Path) -> None:
     page.get_by_text(f"{after[0]} × {after[1]} uint8").wait_for()
     page.get_by_label("size").select_option("own")
     page.get_by_text("1280 × 720 uint8").wait_for()
-    assert size_of(see(page, tmp_path)) == after
+    # A pixel of the screen for each of its own; what does not fit is cut off.
+    page.get_by_text("100 %", exact=True).wait_for()
+    area = page.locator("canvas").bounding_box()
+    assert area is not None
+    assert (area["width"], area["height"]) == (1280, 720)
 
 
 def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Path) -> None:
@@ -327,15 +339,149 @@ def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Pa
 
 def test_a_server_that_stops_is_noticed(browser: Browser, serve: Any, renderer: Renderer) -> None:
     class Failing(Viewer):
-        def answer(self, message: Any) -> Any:
+        def answer(self, message: Any, files: Any = ()) -> Any:
             if message["kind"] == "frame" and message["sides"]["a"]["bloom"] is False:
                 raise ZeroDivisionError
-            return super().answer(message)
+            return super().answer(message, files)
 
     image = np.zeros((9, 16, 3), np.uint8)
     with opened(browser, serve(lambda: Failing(image, renderer=renderer))) as page:
         field(page, "bloom").uncheck()
         page.get_by_role("alert").get_by_text("The server has stopped.").wait_for()
+
+
+def test_the_address_keeps_the_state(
+    browser: Browser, scene_url: str, renderer: Renderer, scene: Scene, tmp_path: Path
+) -> None:
+    with opened(browser, scene_url) as page:
+        page.get_by_label("method").select_option("pyramid")
+        field(page, "levels").fill("3")
+        page.get_by_label("shading").select_option("deferred")
+        field(page, "glow").locator("xpath=following-sibling::input").fill("9")
+        page.get_by_label("framebuffer").select_option("bloom")
+        page.get_by_label("wipe A | B").check()
+        wait_for_code(page, "vkbloom.Pyramid(levels=3)")
+        page.wait_for_url("**%22glow%22%3A9**")
+        page.wait_for_url("**wipe**")
+        link = page.url
+    for other in (link, None):
+        with opened(browser, link) as page:
+            if other is None:
+                page.reload()
+                page.locator(".vkb-status", has_text="until shown").wait_for()
+            wait_for_code(page, "vkbloom.Pyramid(levels=3)")
+            assert page.get_by_label("wipe A | B").is_checked()
+            assert page.get_by_label("framebuffer").input_value() == "bloom"
+            assert page.get_by_label("shading").input_value() == "deferred"
+            page.get_by_label("wipe A | B").uncheck()
+            picture = see(page, tmp_path)
+            bright = dataclasses.replace(scene, glow_intensity=9)
+            expected = renderer.render(
+                bright, Pyramid(levels=3), size_of(picture), shading="deferred"
+            )["bloom"]
+            assert np.array_equal(
+                picture,
+                decode(picture_of(expected, "bloom", is_encoded=False, stops=0.0), tmp_path),
+            )
+    with opened(browser, scene_url + "#%7B%22a%22%3A3%2C%22zoom%22%3A%5B%22x%22%5D%7D") as page:
+        wait_for_code(page, "vkbloom.Separable()")
+    with opened(browser, link) as page:
+        page.get_by_role("button", name="Reset").click()
+        wait_for_code(page, "vkbloom.Separable()")
+        page.wait_for_url(scene_url)
+
+
+def test_zoom_and_pan(page: Page) -> None:
+    def corner() -> Any:
+        return page.evaluate(
+            "(e => [e.offsetLeft, e.offsetTop, e.offsetWidth])(document.querySelector('canvas'))"
+        )
+
+    left, top, width = corner()
+    assert (left, top) == (0, 0)
+    page.locator("canvas").hover(position={"x": 100, "y": 50})
+    page.mouse.wheel(0, -120)
+    page.mouse.wheel(0, -120)
+    page.get_by_text("200 %", exact=True).wait_for()
+    # The place under the pointer stays.
+    assert np.allclose(corner(), (-100, -50, 2 * width), atol=1)
+    page.mouse.down()
+    page.mouse.move(40, 40, steps=3)
+    page.mouse.up()
+    assert corner()[0] < -120
+    page.locator(".vkb-stage").focus()
+    page.keyboard.press("0")
+    assert np.allclose(corner(), (0, 0, width))
+    page.keyboard.press("+")
+    page.get_by_text("150 %", exact=True).wait_for()
+    page.get_by_role("button", name="fit the picture").click()
+    assert np.allclose(corner(), (0, 0, width))
+
+
+def test_files(page: Page, tmp_path: Path) -> None:
+    pixels = np.random.default_rng(4).integers(0, 256, (30, 50, 3), dtype=np.uint8)
+    path = vkbloom.write(tmp_path / "photo.png", pixels)
+    page.get_by_label("image or settings").set_input_files(path)
+    page.locator(".vkb-status", has_text="50 × 30 float32").wait_for()
+    wait_for_code(page, "vkbloom.BevyBloom()")
+    assert page.get_by_label("shading").count() == 0
+    field(page, "bloom").uncheck()
+    wait_for_code(page, "vkbloom.BevyBloom(bloom=False)")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save picture").click()
+    assert download.value.suggested_filename == "final.png"
+    saved = decode(download.value.path().read_bytes(), tmp_path)
+    # Encoded again, by way of half floats.
+    assert np.abs(saved.astype(int) - pixels).max() <= 1
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save settings").click()
+    settings = download.value.path()
+    assert vkbloom.Settings.from_json(settings.read_text()) == BevyBloom(bloom=False)
+    # Dropped, not chosen.
+    text = KinoBloom(radius=3).to_json()
+    page.evaluate(
+        """(text) => {
+            const carried = new DataTransfer();
+            carried.items.add(new File([text], "settings.json"));
+            const options = { dataTransfer: carried, bubbles: true, cancelable: true };
+            document.querySelector("canvas").dispatchEvent(new DragEvent("drop", options));
+        }""",
+        text,
+    )
+    wait_for_code(page, "vkbloom.KinoBloom(radius=3.0)")
+    (tmp_path / "words.png").write_text("words")
+    page.get_by_label("image or settings").set_input_files(tmp_path / "words.png")
+    page.get_by_role("alert").get_by_text("words.png").wait_for()
+    page.locator(".vkb-status", has_text="50 × 30 float32").wait_for()
+
+
+def test_narrow_screens(browser: Browser, scene_url: str) -> None:
+    """At 390 pixels nothing is cut off, and the picture stays in view while controls are moved."""
+    with opened(browser, scene_url) as page:
+        page.set_viewport_size({"width": 390, "height": 844})
+        page.locator(".vkb-status", has_text="358 × 201").wait_for()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        field(page, "blur_strength").scroll_into_view_if_needed()
+        page.evaluate("window.scrollTo(0, document.documentElement.scrollHeight)")
+        assert page.evaluate("window.scrollY") > 100
+        area = page.locator("canvas").bounding_box()
+        assert area is not None
+        assert area["y"] >= 0
+        assert area["y"] + area["height"] <= 844 / 2
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_rule_of_accessibility_is_broken(browser: Browser, scene_url: str, theme: Any) -> None:
+    """Deque's axe-core, with all that the page can show open, in both layouts."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    with opened(browser, scene_url, color_scheme=theme) as page:
+        page.get_by_label("wipe A | B").check()
+        page.get_by_text("More").click()
+        for width in (980, 390):
+            page.set_viewport_size({"width": width, "height": 844})
+            page.wait_for_timeout(300)
+            found = axe.run(page)
+            assert found.violations_count == 0, found.generate_report()
 
 
 def luminance(colour: str) -> float:

@@ -199,7 +199,22 @@ def test_the_newest_wins(serve: Any) -> None:
     serve(talk)
 
 
-@pytest.mark.parametrize("message", ["", "{", "[]", "3", "{}", b"\xff"])
+def test_a_file_comes_as_bytes(serve: Any, tmp_path: Any) -> None:
+    path = vkbloom.write(tmp_path / "a.png", noise(8, 9, 3, dtype="uint8"))
+    header = json.dumps({"kind": "open", "name": "a.png"}).encode()
+    message = struct.pack("<I", len(header)) + header + path.read_bytes()
+    assert len(message) > 100
+
+    async def talk(server: Server) -> None:
+        page = await connect(server)
+        await page.write_message(message, binary=True)
+        source, _ = await answer(page)
+        assert (source["kind"], source["own_size"]) == ("open", [9, 8])
+
+    serve(talk)
+
+
+@pytest.mark.parametrize("message", ["", "{", "[]", "3", "{}", b"\xff", b"\xff\xff\xff\xff{}"])
 def test_messages_of_no_page(serve: Any, message: str | bytes) -> None:
     async def talk(server: Server) -> None:
         page = await connect(server)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import signal
 import webbrowser
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.explorer.viewer import Viewer
+from vkbloom.explorer.viewer import GLOW, Viewer
 from vkbloom.settings import SHADINGS, Shading
 
 _LARGEST_PORT: Final = 65535
@@ -44,7 +45,7 @@ _LARGEST_PORT: Final = 65535
     show_default=True,
     help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
-@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default="deferred", show_default=True)
 @subimage_option
 @layer_option
 @glow_options
@@ -70,7 +71,9 @@ def command(
     """Explore the bloom of IMAGE, or of a scene, in a browser with controls for all settings.
 
     The page is served on 127.0.0.1 until Ctrl-C, to every program that knows its address. IMAGE
-    is decoded as vkbloom apply decodes it.
+    is decoded as vkbloom apply decodes it. The built-in scene has lights 6 times as bright as
+    white, unless --glow-intensity says otherwise. Without options of settings, a scene in deferred
+    shading begins with the tone map "aces" and the encoding "srgb".
     """
     import_extra("tornado", "notebook", "explore")
     if source is not None and (given("base") or given("shading") or given("size")):
@@ -79,17 +82,23 @@ def command(
         )
     if source is None and (mask or emission):
         raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
-    looked_at: vkbloom.Scene | NDArray[Any] = (
-        scene() if source is None else read_picture(source, subimage, None, layer=layer).pixels
-    )
-    arguments: dict[str, Any] = (
-        {} if isinstance(looked_at, vkbloom.Scene) else accompanying(mask, emission)(looked_at)
-    )
+    looked_at: vkbloom.Scene | NDArray[Any]
+    begun: vkbloom.Settings | None = settings
+    arguments: dict[str, Any] = {}
+    if source is not None:
+        looked_at = read_picture(source, subimage, None, layer=layer).pixels
+        arguments = accompanying(mask, emission)(looked_at)
+    else:
+        looked_at = scene()
+        if not any(given(name) for name in ("base", "glow", "glow_intensity")):
+            looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
+        if settings == vkbloom.presets["tutorial"] and not (given("preset") or given("method")):
+            begun = None
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 
         def new_viewer() -> Viewer:
             return Viewer(
-                looked_at, settings, size=size, shading=shading, renderer=renderer, **arguments
+                looked_at, begun, size=size, shading=shading, renderer=renderer, **arguments
             )
 
         with as_wrong_use():

@@ -28,14 +28,14 @@ __all__ = ["explore"]
 
 
 def explore(
-    source: Scene | NDArray[Any],
+    source: Scene | NDArray[Any] | None = None,
     settings: Settings | None = None,
     *,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
     against: Settings | None = None,
     size: tuple[int, int] = (1280, 720),
-    shading: Shading = "forward",
+    shading: Shading = "deferred",
     renderer: Renderer | None = None,
 ) -> Explorer:
     """Explore a bloom in a notebook, with controls for all settings.
@@ -46,12 +46,14 @@ def explore(
 
     Parameters
     ----------
-    source : Scene or ndarray
+    source : Scene or ndarray, optional
         The scene, or an image as `Renderer.apply` takes it. An image that is larger than it is
-        shown is reduced first by averaging, unless the page selects its own size.
+        shown is reduced first by averaging, unless the page selects its own size. Default:
+        ``Scene.ufo()`` with lights 6 times as bright as white.
     settings : Settings, optional
         To begin with; by default ``presets["bevy_natural"]`` for an image and
-        ``presets["tutorial"]`` for a scene.
+        ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and ``encoding="srgb"`` if
+        the shading is deferred.
     mask, emission : ndarray, optional
         Of an image, as for `Renderer.apply`; they are reduced with it.
     against : Settings, optional
@@ -59,8 +61,8 @@ def explore(
     size : (int, int)
         Width and height of a scene's frame: its aspect, and its size if the page selects that.
         Not used for an image.
-    shading : {"forward", "deferred"}
-        Shading of a scene.
+    shading : {"deferred", "forward"}
+        Shading of a scene to begin with; the page has a control for it.
     renderer : Renderer, optional
         Default: a new renderer, which `Explorer.close` closes.
 

@@ -48,6 +48,8 @@ _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
 # Fields that come first, in addition to the numbers that only this method has.
 _FIRST: Final = ("bloom", "threshold", "intensity", "exposure", "tonemap")
 _STEPS_OF_A_SLIDER: Final = 200
+# How a picture is developed: what stays on the page when another preset or method is chosen.
+_LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
 
 def controls() -> dict[str, Any]:
@@ -60,7 +62,8 @@ def controls() -> dict[str, Any]:
         "kind" ("bool", "number", "choice"), "help", whether it stands "first", and whether it is
         "optional", which is to say may be None. Numbers have "from", "to" and "step" of their
         slider, "low" and "high" of what is accepted, and "whole"; choices have "choices".
-        "presets": settings by name, as `Settings.to_dict` gives them.
+        "presets": settings by name, as `Settings.to_dict` gives them. "look": the fields that say
+        how a picture is developed.
     """
     return {
         "methods": {
@@ -68,6 +71,7 @@ def controls() -> dict[str, Any]:
             for name, kind in METHODS.items()
         },
         "presets": {name: settings.to_dict() for name, settings in presets.items()},
+        "look": _LOOK,
     }
 
 
@@ -175,17 +179,26 @@ def as_code(settings: Settings) -> str:
     Returns
     -------
     str
-        A preset by its name, else the method with the fields that are not the default.
+        A preset by its name, where need be with another look, else the method with the fields
+        that are not the default.
     """
+    look = {name: getattr(settings, name) for name in _LOOK}
     for name, preset in presets.items():
-        if settings == preset and settings != type(settings)():
-            return f"vkbloom.presets[{name!r}]".replace("'", '"')
-    changed = ", ".join(
+        if preset != type(preset)() and type(preset) is type(settings):
+            if settings == preset:
+                return f'vkbloom.presets["{name}"]'
+            if settings == preset.replace(**look):
+                return f'vkbloom.presets["{name}"].replace({_arguments(settings, preset)})'
+    return f"vkbloom.{type(settings).__name__}({_arguments(settings, type(settings)())})"
+
+
+def _arguments(settings: Settings, begun: Settings) -> str:
+    """Return the fields in which settings differ from others, as keywords."""
+    return ", ".join(
         f"{field.name}={_literal(getattr(settings, field.name))}"
         for field in dataclasses.fields(settings)
-        if getattr(settings, field.name) != field.default
+        if getattr(settings, field.name) != getattr(begun, field.name)
     )
-    return f"vkbloom.{type(settings).__name__}({changed})"
 
 
 def _literal(value: object) -> str:

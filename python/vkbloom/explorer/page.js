@@ -1,12 +1,14 @@
 // The explorer's page: a picture, and the controls that change it. `mount` puts it into an element;
-// a notebook's widget (the default export) and the page on its own (start.js) differ only in what
-// carries the messages. vkbloom/explorer/viewer.py says what those are.
+// a notebook's widget (the default export) and the page on its own (start.js) differ in what
+// carries the messages, and in that the page has its state in its address.
+// vkbloom/explorer/viewer.py says what the messages are.
 
 const TURNS_PER_SECOND = 0.25; // of the forward system's animation
 const HIGHEST = 0.72; // of the window, that a picture takes
+const HIGHEST_NARROW = 0.45; // of a window where the controls are below the picture
+const NARROW = 720; // CSS pixels, as in page.css
+const LARGEST_ZOOM = 64; // device pixels of a framebuffer's pixel
 const SIDES = ["a", "b"];
-// What stays when the method changes: how the picture is developed, not how it blooms.
-const CARRIED = ["bloom", "tonemap", "exposure", "encoding", "dither", "dither_seed"];
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
@@ -93,10 +95,24 @@ async function copy(text) {
   }
 }
 
-export function mount(parent, send) {
+function download(blob, name) {
+  const link = make("a", { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  // The browser needs the address until the download has begun.
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+// `send(message, files)` carries a message, with the contents of files. `store` keeps the page's
+// state: `read()` gives an object or null, `write(object)` keeps one, `watch(listener)` tells when
+// the user puts another in its place. `heading` is the tag of the title.
+export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   const view = Math.random().toString(36).slice(2);
   const root = make("div", { className: "vkbloom" });
+  const layout = make("div", { className: "vkb-layout" });
+  root.append(layout);
   root.dataset.lmSuppressShortcuts = "true"; // JupyterLab's: letters are for the inputs here
+  // An element of a notebook may else be as narrow as what it holds, which adapts to it.
+  parent.style.width = "100%";
   parent.append(root);
 
   let setup; // the answer to "setup": controls, presets, source
@@ -111,6 +127,10 @@ export function mount(parent, send) {
   let playing = 0; // the request of the next animation frame, 0: paused
   let stops = 0;
   let ownSize = false;
+  let shading = null; // of a scene
+  let glow = null;
+  let zoom = 1; // 1: the picture fits
+  let centre = [0.5, 0.5]; // of what is seen of the picture, 0..1 across and down
   let pointer = null; // its place, 0..1 across and down
 
   let drawn = 0;
@@ -121,9 +141,10 @@ export function mount(parent, send) {
   let probing = false;
   let probeAgain = false;
   let box = [0, 0]; // what the picture may take, in CSS pixels
+  let nextZoom = null; // what is done when the picture of another size is there
 
   // The parts that stay; what depends on the setup is filled in by `build`.
-  const canvas = make("canvas", { width: 1, height: 1, ariaLabel: "picture" });
+  const canvas = make("canvas", { width: 1, height: 1, role: "img", ariaLabel: "picture" });
   const divider = make("div", {
     className: "vkb-divider",
     tabIndex: 0,
@@ -133,19 +154,62 @@ export function mount(parent, send) {
     ariaValueMax: "100",
     hidden: true,
   });
-  const stage = make("div", { className: "vkb-stage" }, canvas, divider);
+  const stage = make(
+    "div",
+    {
+      className: "vkb-stage",
+      tabIndex: 0,
+      role: "group",
+      ariaLabel: "picture: plus and minus zoom, arrows move, 0 fits",
+    },
+    canvas,
+    divider,
+  );
+  const seen = make("div", { className: "vkb-view" }, stage);
   const readout = make("output", { className: "vkb-readout" });
   const bar = make("div", { className: "vkb-bar" });
   const status = make("div", { className: "vkb-status" });
-  const look = make("div", { className: "vkb-look" }, stage, readout, bar, status);
+  const below = make("div", { className: "vkb-below" }, readout, bar, status);
   const head = make("div", { className: "vkb-head" });
   const fields = make("div", { className: "vkb-fields" });
   const complaint = make("div", { className: "vkb-error", role: "alert" });
   const code = make("code");
-  const copying = make("button", { type: "button", textContent: "Copy as code" });
-  const foot = make("div", { className: "vkb-foot" }, complaint, make("pre", {}, code), copying);
-  const panel = make("div", { className: "vkb-panel" }, head, fields, foot);
-  root.append(look, panel);
+  const button = (text, listener, properties = {}) =>
+    make("button", { type: "button", textContent: text, ...properties, on: { click: listener } });
+  const copying = button("Copy as code", async () => {
+    await copy(code.textContent);
+    copying.textContent = "Copied";
+    setTimeout(() => (copying.textContent = "Copy as code"), 1500);
+  });
+  const picker = make("input", { type: "file", hidden: true, ariaLabel: "image or settings" });
+  picker.addEventListener("change", () => {
+    if (picker.files.length) openFile(picker.files[0]);
+    picker.value = "";
+  });
+  const files = make(
+    "div",
+    { className: "vkb-bar vkb-files" },
+    button("Open …", () => picker.click(), {
+      title: "An image, or settings that were saved here; files can be dropped on the page, too",
+    }),
+    button("Save picture", savePicture, { title: "As PNG, in the source's own size" }),
+    button("Save settings", () => {
+      const text = JSON.stringify(settings[editing], null, 2) + "\n";
+      download(new Blob([text], { type: "application/json" }), "settings.json");
+    }),
+    button("Reset", reset, { title: "Settings and view as they were at first" }),
+    picker,
+  );
+  const foot = make(
+    "div",
+    { className: "vkb-foot" },
+    complaint,
+    make("pre", {}, code),
+    make("div", { className: "vkb-bar" }, copying),
+  );
+  const title = make(heading, { className: "vkb-title", textContent: "vkbloom explorer" });
+  const panel = make("div", { className: "vkb-panel" }, title, head, files, fields, foot);
+  layout.append(seen, below, panel);
 
   const visible = () => (comparing ? SIDES : ["a"]);
 
@@ -163,7 +227,7 @@ export function mount(parent, send) {
     if (waiting || !sides.length || !setup || !box[0]) return;
     for (const side of sides) outdated.delete(side);
     waiting = ++asked;
-    sent.set(waiting, { when: performance.now(), pointer });
+    sent.set(waiting, { when: performance.now(), pointer, framebuffer });
     const ratio = window.devicePixelRatio || 1;
     send({
       kind: "frame",
@@ -172,10 +236,14 @@ export function mount(parent, send) {
       sides: Object.fromEntries(sides.map((side) => [side, settings[side]])),
       framebuffer,
       size: ownSize ? null : box.map((length) => Math.max(1, Math.round(length * ratio))),
-      time,
-      stops,
+      ...lookedAt(),
       at: pointer,
     });
+    keep();
+  }
+
+  function lookedAt() {
+    return setup.shadings.length ? { time, stops, shading, glow } : { time, stops };
   }
 
   function probe() {
@@ -192,6 +260,10 @@ export function mount(parent, send) {
     if (message.view && message.view !== view) return;
     if (message.kind === "setup") {
       if (!setup) build(message);
+    } else if (message.kind === "open") {
+      opened(message);
+    } else if (message.kind === "save") {
+      download(new Blob([buffers[0]], { type: "image/png" }), `${message.framebuffer}.png`);
     } else if (message.kind === "settings") {
       for (const side of Object.keys(message.sides)) settings[side] = message.sides[side];
       if (!setup) return;
@@ -210,9 +282,11 @@ export function mount(parent, send) {
       flush();
       await showFrame(message, buffers);
     } else {
-      waiting = 0;
+      // Of a frame that is under way, or of a file.
+      if (message.id) waiting = 0;
       probing = false;
-      fail(message.error);
+      pause();
+      complaint.textContent = message.error;
     }
   }
 
@@ -239,7 +313,9 @@ export function mount(parent, send) {
       shown[side] = { ...facts, picture: pictures[index] };
     });
     draw();
-    showFacts(performance.now() - began.when);
+    nextZoom?.();
+    nextZoom = null;
+    showFacts(performance.now() - began.when, began.framebuffer);
     // The values that came with it are of where the pointer was.
     if (pointer !== began.pointer) probe();
     root.dispatchEvent(new CustomEvent("vkbloom:drawn", { detail: { id: message.id } }));
@@ -267,23 +343,52 @@ export function mount(parent, send) {
     place();
   }
 
+  const ratioOf = () => window.devicePixelRatio || 1;
+  const fitting = () => Math.min(box[0] / canvas.width, box[1] / canvas.height);
+
   // Framebuffers keep their own aspect within the box, enlarged ones show their pixels.
   function place() {
-    const scale = Math.min(box[0] / canvas.width, box[1] / canvas.height);
-    const [width, height] = [canvas.width * scale, canvas.height * scale];
     stage.style.width = `${box[0]}px`;
     stage.style.height = `${box[1]}px`;
-    canvas.style.width = `${width}px`;
-    canvas.style.height = `${height}px`;
-    canvas.style.left = `${(box[0] - width) / 2}px`;
-    canvas.style.top = `${(box[1] - height) / 2}px`;
-    canvas.style.imageRendering = scale * (window.devicePixelRatio || 1) > 1.5 ? "pixelated" : "auto";
+    if (!shown.a) return;
+    const scale = fitting() * zoom;
+    const sides = [canvas.width * scale, canvas.height * scale];
+    // A picture that is larger than the box leaves none of it empty, a smaller one is in the middle.
+    const corner = sides.map((side, axis) => {
+      if (side <= box[axis]) {
+        centre[axis] = 0.5;
+        return (box[axis] - side) / 2;
+      }
+      const half = box[axis] / side / 2;
+      centre[axis] = clamp(centre[axis], half, 1 - half);
+      return box[axis] / 2 - centre[axis] * side;
+    });
+    canvas.style.width = `${sides[0]}px`;
+    canvas.style.height = `${sides[1]}px`;
+    canvas.style.left = `${corner[0]}px`;
+    canvas.style.top = `${corner[1]}px`;
+    canvas.style.imageRendering = scale * ratioOf() > 1.5 ? "pixelated" : "auto";
+    stage.classList.toggle("vkb-zoomed", zoom > 1);
     divider.hidden = !comparing;
-    divider.style.left = `${(box[0] - width) / 2 + wipe * width}px`;
+    divider.style.left = `${corner[0] + wipe * sides[0]}px`;
     divider.ariaValueNow = String(Math.round(100 * wipe));
+    const percent = 100 * scale * ratioOf();
+    zoomed.textContent = `${percent >= 10 ? percent.toFixed(0) : percent.toPrecision(2)} %`;
   }
 
-  function showFacts(roundTrip) {
+  // Show a part of the picture, so that a place of it (0..1) stays where it is on the screen.
+  function zoomTo(next, at = centre) {
+    const whole = 1 / ratioOf() / fitting(); // the zoom of 100 %
+    const before = zoom;
+    zoom = clamp(next, Math.min(1, whole), Math.max(1, LARGEST_ZOOM * whole));
+    centre = centre.map((middle, axis) => at[axis] + ((middle - at[axis]) * before) / zoom);
+    place();
+    keep();
+  }
+  const showWhole = () => ((centre = [0.5, 0.5]), zoomTo(1));
+  const showPixels = () => zoomTo(1 / ratioOf() / fitting());
+
+  function showFacts(roundTrip, wanted) {
     const { a } = shown;
     if (a) {
       const names = [...frameSelect.options].map((option) => option.value);
@@ -292,8 +397,11 @@ export function mount(parent, send) {
           ...a.names.map((name) => make("option", { value: name, textContent: name })),
         );
       }
-      // The settings may not have the framebuffer that was looked at.
-      framebuffer = frameSelect.value = a.framebuffer;
+      // The settings may not have the framebuffer that was looked at. Another may have been chosen
+      // since this one was asked for.
+      if (wanted === framebuffer) framebuffer = a.framebuffer;
+      frameSelect.value = framebuffer;
+      canvas.ariaLabel = `picture: ${a.framebuffer}, ${a.size[0]} × ${a.size[1]}`;
       const passes = Object.entries(a.passes);
       const device = passes.reduce((sum, [, seconds]) => sum + 1e3 * seconds, 0);
       const ran = passes.length
@@ -327,22 +435,76 @@ export function mount(parent, send) {
 
   // --- the pointer and the wipe ---------------------------------------------------------------
 
-  canvas.addEventListener("pointermove", (event) => {
+  function placeOf(event) {
     const area = canvas.getBoundingClientRect();
-    pointer = [
+    return [
       clamp((event.clientX - area.left) / area.width, 0, 1),
       clamp((event.clientY - area.top) / area.height, 0, 1),
     ];
+  }
+  const held = new Map(); // pointers that are down on the picture, by id: the latest event
+  const distance = () => {
+    const [one, other] = [...held.values()];
+    return Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
+  };
+  canvas.addEventListener("pointerdown", (event) => {
+    held.set(event.pointerId, event);
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const before = held.get(event.pointerId);
+    if (before && held.size === 2) {
+      const apart = distance();
+      held.set(event.pointerId, event);
+      zoomTo((zoom * distance()) / Math.max(apart, 1), placeOf(event));
+    } else if (before) {
+      const area = canvas.getBoundingClientRect();
+      centre[0] -= (event.clientX - before.clientX) / area.width;
+      centre[1] -= (event.clientY - before.clientY) / area.height;
+      held.set(event.pointerId, event);
+      place();
+      keep();
+    }
+    pointer = placeOf(event);
     probe();
   });
+  for (const name of ["pointerup", "pointercancel"]) {
+    canvas.addEventListener(name, (event) => held.delete(event.pointerId));
+  }
   canvas.addEventListener("pointerleave", () => {
     pointer = null;
     showReadout();
+  });
+  stage.addEventListener(
+    "wheel",
+    (event) => {
+      // In a notebook, the wheel alone is for the notebook.
+      if (!store && !event.ctrlKey) return;
+      event.preventDefault();
+      zoomTo(zoom * 2 ** (-clamp(event.deltaY, -120, 120) / 240), placeOf(event));
+    },
+    { passive: false },
+  );
+  canvas.addEventListener("dblclick", (event) => (zoom === 1 ? zoomTo(4, placeOf(event)) : showWhole()));
+  stage.addEventListener("keydown", (event) => {
+    if (event.target !== stage || event.ctrlKey || event.metaKey || event.altKey) return;
+    const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    if (event.key === "+" || event.key === "=") zoomTo(zoom * 1.5);
+    else if (event.key === "-") zoomTo(zoom / 1.5);
+    else if (event.key === "0") showWhole();
+    else if (event.key in moves && zoom > 1) {
+      centre = centre.map((middle, axis) => middle + (0.1 * moves[event.key][axis]) / zoom);
+      place();
+      keep();
+    } else return;
+    event.preventDefault();
+    event.stopPropagation();
   });
 
   function wipeTo(share) {
     wipe = clamp(share, 0, 1);
     draw();
+    keep();
   }
   divider.addEventListener("pointerdown", (event) => {
     divider.setPointerCapture(event.pointerId);
@@ -362,17 +524,135 @@ export function mount(parent, send) {
     wipeTo(wipe + step);
   });
 
-  copying.addEventListener("click", async () => {
-    await copy(code.textContent);
-    copying.textContent = "Copied";
-    setTimeout(() => (copying.textContent = "Copy as code"), 1500);
-  });
+  // --- files ----------------------------------------------------------------------------------
+
+  async function openFile(file) {
+    complaint.textContent = "";
+    try {
+      if (/\.json$/i.test(file.name)) use(await readSettings(file));
+      else send({ kind: "open", view, name: file.name }, [new Uint8Array(await file.arrayBuffer())]);
+    } catch (error) {
+      complaint.textContent = `${file.name}: ${error.message}`;
+    }
+  }
+
+  // The server says what is wrong with values; here the method alone must be known.
+  async function readSettings(file) {
+    const read = JSON.parse(await file.text());
+    const method = setup.methods[read?.method];
+    if (!method) throw new Error("no settings of a known method");
+    return { ...method.defaults, ...read };
+  }
+
+  // Another source is looked at. A scene's settings do not stay with an image.
+  function opened(source) {
+    Object.assign(setup, source);
+    for (const side of SIDES) settings[side] = setup.sides[side];
+    pause();
+    pointer = null;
+    zoom = 1;
+    centre = [0.5, 0.5];
+    buildBar();
+    buildFields();
+    for (const side of SIDES) outdated.add(side);
+    measure();
+    flush();
+  }
+
+  function savePicture() {
+    send({ kind: "save", view, settings: settings[editing], framebuffer, ...lookedAt() });
+  }
+
+  for (const name of ["dragover", "drop"]) {
+    root.addEventListener(name, (event) => {
+      if (![...event.dataTransfer.types].includes("Files")) return;
+      event.preventDefault();
+      root.classList.toggle("vkb-over", name === "dragover");
+      if (name === "drop" && event.dataTransfer.files.length) openFile(event.dataTransfer.files[0]);
+    });
+  }
+  root.addEventListener("dragleave", () => root.classList.remove("vkb-over"));
+
+  // --- state ----------------------------------------------------------------------------------
+
+  // What differs from how the page begins, so that an address stays short.
+  function state() {
+    const kept = {};
+    for (const side of SIDES) {
+      const { method } = settings[side];
+      const begun = setup.sides[side].method === method ? setup.sides[side] : setup.methods[method].defaults;
+      const changed = Object.entries(settings[side]).filter(
+        ([name, value]) => JSON.stringify(value) !== JSON.stringify(begun[name]),
+      );
+      if (changed.length || setup.sides[side].method !== method) {
+        kept[side] = { method, ...Object.fromEntries(changed) };
+      }
+    }
+    if (comparing) kept.wipe = Number(wipe.toFixed(3));
+    if (editing !== "a") kept.editing = editing;
+    if (framebuffer !== "final") kept.framebuffer = framebuffer;
+    if (ownSize) kept.size = "own";
+    if (stops) kept.stops = stops;
+    if (time && !playing) kept.time = Number(time.toFixed(3));
+    if (shading !== setup.shading) kept.shading = shading;
+    if (glow !== setup.glow) kept.glow = glow;
+    if (zoom !== 1) kept.zoom = [zoom, ...centre].map((number) => Number(number.toPrecision(5)));
+    return kept;
+  }
+
+  let keeping = 0;
+  function keep() {
+    if (!store || !setup || keeping || playing) return;
+    keeping = setTimeout(() => {
+      keeping = 0;
+      store.write(state());
+    }, 200);
+  }
+
+  const numberOf = (value, otherwise) => (Number.isFinite(value) ? value : otherwise);
+
+  // An address may be of anyone's making: what makes no sense in it is as if it were not there.
+  function restore(kept) {
+    kept ??= {};
+    for (const side of SIDES) {
+      const method = setup.methods[kept[side]?.method];
+      const begun =
+        setup.sides[side].method === kept[side]?.method ? setup.sides[side] : method?.defaults;
+      settings[side] = { ...(method ? { ...begun, ...kept[side] } : setup.sides[side]) };
+    }
+    comparing = Number.isFinite(kept.wipe);
+    wipe = clamp(numberOf(kept.wipe, 0.5), 0, 1);
+    editing = comparing && kept.editing === "b" ? "b" : "a";
+    framebuffer = typeof kept.framebuffer === "string" ? kept.framebuffer : "final";
+    ownSize = kept.size === "own";
+    stops = clamp(numberOf(kept.stops, 0), -16, 16);
+    time = clamp(numberOf(kept.time, 0), 0, 1);
+    shading = setup.shadings.includes(kept.shading) ? kept.shading : setup.shading;
+    glow = setup.glow === null ? null : Math.max(0, numberOf(kept.glow, setup.glow));
+    const [factor, x, y] = Array.isArray(kept.zoom) ? kept.zoom : [];
+    zoom = Math.max(1e-3, numberOf(factor, 1));
+    centre = [numberOf(x, 0.5), numberOf(y, 0.5)];
+    pause();
+    timeSlider.value = time;
+    buildBar();
+    buildHead();
+    buildFields();
+    if (shown.a) draw();
+    request(...SIDES);
+    keep();
+  }
+
+  function reset() {
+    complaint.textContent = "";
+    restore(null);
+    place();
+  }
 
   // --- time -----------------------------------------------------------------------------------
 
   const timeSlider = make("input", { type: "range", min: 0, max: 1, step: 0.001, value: 0 });
   timeSlider.ariaLabel = "time, in turns";
-  const playButton = make("button", { type: "button", textContent: "Play" });
+  const playButton = make("button", { type: "button", className: "vkb-play", textContent: "Play" });
 
   function goTo(moment) {
     time = moment;
@@ -395,7 +675,11 @@ export function mount(parent, send) {
     playButton.textContent = "Play";
   }
   timeSlider.addEventListener("input", () => goTo(Number(timeSlider.value)));
-  playButton.addEventListener("click", () => (playing ? pause() : play()));
+  playButton.addEventListener("click", () => {
+    if (playing) pause();
+    else play();
+    keep();
+  });
 
   // --- controls -------------------------------------------------------------------------------
 
@@ -405,21 +689,31 @@ export function mount(parent, send) {
   });
   let presetSelect, methodSelect, sideSelect;
 
+  const zoomed = make("output", { className: "vkb-zoom", ariaLabel: "zoom level" });
+
   function build(message) {
     setup = message;
-    for (const side of SIDES) settings[side] ??= setup.sides[side];
-    const size = setup.own_size.join(" × ");
+    restore(store?.read());
+    store?.watch(restore);
+    measure();
+  }
+
+  // The controls of the picture, as the source has them.
+  function buildBar() {
     const sizeSelect = choose(
       [
-        ["shown", "as shown"],
-        ["own", size],
+        ["shown", "as it fits"],
+        ["own", setup.own_size.join(" × ")],
       ],
       () => {
         ownSize = sizeSelect.value === "own";
+        // Its own size is that: a pixel of the screen for each of the picture.
+        nextZoom = ownSize ? showPixels : showWhole;
         request(...visible());
       },
     );
-    const exposure = make("input", { type: "number", min: -16, max: 16, step: 0.5, value: 0 });
+    sizeSelect.value = ownSize ? "own" : "shown";
+    const exposure = make("input", { type: "number", min: -16, max: 16, step: 0.5, value: stops });
     exposure.addEventListener("input", () => {
       if (Number.isNaN(exposure.valueAsNumber)) return;
       stops = clamp(exposure.valueAsNumber, -16, 16);
@@ -430,15 +724,56 @@ export function mount(parent, send) {
       make("label", {}, "framebuffer ", frameSelect),
       make("label", {}, "size ", sizeSelect),
       make("label", {}, "view exposure ", exposure),
+      make(
+        "span",
+        { className: "vkb-time", role: "group", ariaLabel: "zoom" },
+        button("−", () => zoomTo(zoom / 1.5), { ariaLabel: "zoom out" }),
+        zoomed,
+        button("+", () => zoomTo(zoom * 1.5), { ariaLabel: "zoom in" }),
+        button("Fit", showWhole, { ariaLabel: "fit the picture" }),
+        button("1:1", showPixels, { ariaLabel: "100 %" }),
+      ),
     );
     if (setup.animated) bar.append(make("span", { className: "vkb-time" }, playButton, timeSlider));
+    if (setup.glow !== null) bar.append(...sceneControls());
+  }
 
+  // What a scene is drawn with: the glow mesh's brightness is that of deferred shading.
+  function sceneControls() {
+    const field = { name: "glow", kind: "number", from: 0, to: 24, step: 0.5, low: 0, high: 1e4 };
+    const [parts, show, slider] = control(field, (value) => {
+      glow = value;
+      request(...visible());
+    });
+    const enable = () => parts.forEach((part) => (part.disabled = shading !== "deferred"));
+    const select = choose(plainly(setup.shadings), () => {
+      shading = select.value;
+      enable();
+      request(...visible());
+    });
+    select.value = shading;
+    show(glow);
+    slider.dataset.field = "glow";
+    enable();
+    const parted = make("span", { className: "vkb-parts" }, ...parts);
+    return [
+      make("label", {}, "shading ", select),
+      make("label", { className: "vkb-glow", title: "Brightness of the lights; white is 1" }, "glow ", parted),
+    ];
+  }
+
+  function buildHead() {
     presetSelect = choose([["", "preset …"], ...plainly(Object.keys(setup.presets))], () => {
-      if (presetSelect.value) use(setup.presets[presetSelect.value]);
+      const preset = setup.presets[presetSelect.value];
+      if (!preset) return;
+      // The picture is developed as before, but bloom that was chosen is seen.
+      const { defaults } = setup.methods[preset.method];
+      const look = setup.look.filter((name) => name !== "bloom" && preset[name] === defaults[name]);
+      use({ ...preset, ...Object.fromEntries(look.map((name) => [name, settings[editing][name]])) });
     });
     presetSelect.ariaLabel = "preset";
     methodSelect = choose(plainly(Object.keys(setup.methods)), () => {
-      const carried = CARRIED.map((name) => [name, settings[editing][name]]);
+      const carried = setup.look.map((name) => [name, settings[editing][name]]);
       presetSelect.value = "";
       use({ ...setup.methods[methodSelect.value].defaults, ...Object.fromEntries(carried) });
     });
@@ -464,9 +799,12 @@ export function mount(parent, send) {
       else if (editing === "b") edit("a");
       draw();
       request();
+      keep();
       showReadout();
     });
-    sideSelect.disabled = swap.disabled = true;
+    compareBox.checked = comparing;
+    sideSelect.value = editing;
+    sideSelect.disabled = swap.disabled = !comparing;
     head.replaceChildren(
       make("label", {}, "method ", methodSelect),
       presetSelect,
@@ -474,8 +812,6 @@ export function mount(parent, send) {
       sideSelect,
       swap,
     );
-    buildFields();
-    measure();
   }
 
   function use(fields) {
@@ -521,20 +857,24 @@ export function mount(parent, send) {
   function measure() {
     if (!setup) return;
     const [width, height] = setup.own_size;
-    const room = [look.clientWidth, Math.max(160, HIGHEST * window.innerHeight)];
+    const highest = layout.clientWidth < NARROW ? HIGHEST_NARROW : HIGHEST;
+    const room = [seen.clientWidth, Math.max(160, highest * window.innerHeight)];
     const scale = Math.min(room[0] / width, room[1] / height);
     const next = [Math.floor(width * scale), Math.floor(height * scale)].map((side) =>
       Math.max(1, side),
     );
     if (room[0] < 1 || (next[0] === box[0] && next[1] === box[1])) return;
+    // What is not fitted keeps its size on the screen.
+    const kept = zoom === 1 || !shown.a ? 0 : zoom * fitting();
     box = next;
+    if (kept) zoom = kept / fitting();
     place();
     if (!ownSize || !shown.a) {
       request(...visible());
     }
   }
   const observer = new ResizeObserver(measure);
-  observer.observe(look);
+  observer.observe(seen);
 
   send({ kind: "setup", view });
   showReadout();
@@ -552,7 +892,7 @@ export function mount(parent, send) {
 
 export default {
   render({ model, el }) {
-    const page = mount(el, (message) => model.send(message));
+    const page = mount(el, (message, files = []) => model.send(message, undefined, files));
     model.on("msg:custom", page.receive);
     return () => {
       model.off("msg:custom", page.receive);

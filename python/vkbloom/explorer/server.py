@@ -41,8 +41,9 @@ _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-# A page's messages are settings: longer ones are no page's.
+# A page's messages are settings, as text: longer ones are no page's. Files come as bytes.
 _LARGEST_MESSAGE: Final = 1 << 16
+_LARGEST_FILE: Final = 1 << 30
 
 
 class Server:
@@ -85,7 +86,7 @@ class Server:
                     (r"/([^/]+)/socket", _Socket, shared),
                     (r"/([^/]+)/([a-z.]*)", _File, {"server": self}),
                 ],
-                websocket_max_message_size=_LARGEST_MESSAGE,
+                websocket_max_message_size=_LARGEST_FILE,
                 log_function=lambda handler: None,
             )
         )
@@ -146,6 +147,7 @@ class _Socket(WebSocketHandler):
         self._new_viewer = new_viewer
         self._worker = worker
         self._waiting: dict[str, dict[str, Any]] = {}
+        self._files: list[bytes] = []
         self._answers: asyncio.Future[None] | None = None
 
     def check_origin(self, origin: str) -> bool:
@@ -163,12 +165,18 @@ class _Socket(WebSocketHandler):
         self._viewer = self._new_viewer()
 
     def on_message(self, message: str | bytes) -> None:
+        if isinstance(message, str) and len(message) > _LARGEST_MESSAGE:
+            self.close(1009, "the message is too long")
+            return
         try:
-            asked = json.loads(message)
+            text, files = (message, []) if isinstance(message, str) else _unpacked(message)
+            asked = json.loads(text)
             kind = str(asked["kind"])
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError, struct.error):
             self.close(1003, "a message with a kind is needed")
             return
+        if files:
+            self._files = files
         newest = dict(asked)
         older = self._waiting.get(kind, {}).get("sides")
         newer = newest.get("sides")
@@ -185,9 +193,12 @@ class _Socket(WebSocketHandler):
         try:
             while self._waiting:
                 asked = self._waiting.pop(next(iter(self._waiting)))
+                files = self._files if asked["kind"] == "open" else []
                 header, pictures = await loop.run_in_executor(
-                    self._worker, self._viewer.answer, asked
+                    self._worker, self._viewer.answer, asked, files
                 )
+                if files is self._files:
+                    self._files = []
                 await self.write_message(_packed(header, pictures), binary=True)
         except WebSocketClosedError:
             self._waiting.clear()
@@ -198,6 +209,14 @@ class _Socket(WebSocketHandler):
 
     def on_close(self) -> None:
         self._waiting.clear()
+
+
+def _unpacked(message: bytes) -> tuple[bytes, list[bytes]]:
+    """Return the header and the file of a message as `_packed` makes them."""
+    (length,) = struct.unpack_from("<I", message)
+    if length > _LARGEST_MESSAGE:
+        raise ValueError(f"message: its header has {length} bytes")
+    return message[4 : 4 + length], [message[4 + length :]]
 
 
 def _packed(header: dict[str, Any], buffers: list[bytes]) -> bytes:

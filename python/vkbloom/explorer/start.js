@@ -20,8 +20,39 @@ function unpack(data) {
   return [message, buffers];
 }
 
+// As the server packs its own messages: the header's length, the header, the file.
+function pack(message, [file]) {
+  const header = new TextEncoder().encode(JSON.stringify(message));
+  const packed = new Uint8Array(4 + header.length + file.length);
+  new DataView(packed.buffer).setUint32(0, header.length, true);
+  packed.set(header, 4);
+  packed.set(file, 4 + header.length);
+  return packed;
+}
+
+// The page's state is the fragment of its address, which is not sent to the server.
+const store = {
+  read() {
+    try {
+      return JSON.parse(decodeURIComponent(location.hash.slice(1)));
+    } catch {
+      return null;
+    }
+  },
+  write(state) {
+    const text = JSON.stringify(state);
+    const fragment = text === "{}" ? "" : `#${encodeURIComponent(text)}`;
+    history.replaceState(null, "", location.pathname + fragment);
+  },
+  watch(listener) {
+    window.addEventListener("hashchange", () => listener(store.read()));
+  },
+};
+
 socket.addEventListener("open", () => {
-  const page = mount(explorer, (message) => socket.send(JSON.stringify(message)));
+  const send = (message, files = []) =>
+    socket.send(files.length ? pack(message, files) : JSON.stringify(message));
+  const page = mount(explorer, send, { store, heading: "h1" });
   socket.addEventListener("message", (event) => page.receive(...unpack(event.data)));
   socket.addEventListener("close", () => page.fail("The server has stopped."));
 });

@@ -8,9 +8,11 @@ kind     asked                                         answered
 ======== ============================================= =========================================
 setup                                                  controls, both sides' settings, source
 frame    sides: settings of "a", "b" or both;          of each side: a picture (a buffer), the
-         framebuffer, size, time, stops; at            framebuffer's facts, settings as code, the
-                                                       values under the pointer; or an error
+         framebuffer, size, time, stops; at; of a      framebuffer's facts, settings as code, the
+         scene shading, glow                           values under the pointer; or an error
 probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
+open     name; the content of a file as a buffer       source, and the settings to begin with
+save     settings; all else as of frame                a picture of the source's own size
 ======== ============================================= =========================================
 
 ``view`` and ``id`` are returned as they were sent. A page asks for its next frame when it has
@@ -19,8 +21,11 @@ received the one before. Of the changes in between, only the newest one is rende
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -32,21 +37,27 @@ from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
-from vkbloom.settings import check_settings, check_shading
+from vkbloom.settings import SHADINGS, check_settings, check_shading
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
     from vkbloom.scene import Scene
     from vkbloom.settings import Settings, Shading
 
-__all__ = ["SIDES", "Viewer"]
+__all__ = ["GLOW", "SIDES", "Viewer"]
 
 SIDES: Final = ("a", "b")
+#: Of the scene that is shown where none is given: its lights are so bright that the blooms of all
+#: presets are told apart.
+GLOW: Final = 6.0
 
 _LARGEST_SIDE: Final = 8192
 # Views do not say when they are closed. The framebuffers of the oldest ones are dropped.
 _VIEWS_KEPT: Final = 8
-_FAILURES: Final = (_core.Error, TypeError, ValueError, MemoryError)
+_FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError)
+_LARGEST_GLOW: Final = 1e4
+# A deferred scene is light above white, which a screen shows by a tone map.
+_DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
 
 Answer = tuple[dict[str, Any], list[bytes]]
 
@@ -76,46 +87,35 @@ class Viewer:
 
     def __init__(
         self,
-        source: Scene | NDArray[Any],
+        source: Scene | NDArray[Any] | None = None,
         settings: Settings | None = None,
         *,
         mask: NDArray[Any] | None = None,
         emission: NDArray[Any] | None = None,
         against: Settings | None = None,
         size: tuple[int, int] = (1280, 720),
-        shading: Shading = "forward",
+        shading: Shading = "deferred",
         renderer: Renderer | None = None,
         adapter: str = "auto",
     ) -> None:
         from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
-        is_image = not isinstance(source, Scene)
-        begun = (
-            presets["bevy_natural"] if settings is None and is_image else check_settings(settings)
-        )
-        self.settings: dict[str, Settings] = {
-            "a": begun,
-            "b": begun.replace(bloom=False) if against is None else check_settings(against),
-        }
+        if source is None:
+            source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
         self._shading: Shading = check_shading(shading)
+        self._name = ""
+        self._scene = source if isinstance(source, Scene) else None
+        self.settings: dict[str, Settings] = {}
+        self._begin(settings)
+        if against is not None:
+            self.settings["b"] = check_settings(against)
         if isinstance(source, Scene):
-            self._scene: Scene | None = source
             self._own_size = check_size("size", size)
             for name, given in (("mask", mask), ("emission", emission)):
                 if given is not None:
                     raise ValueError(f"{name}: the source is a scene; leave the argument out")
         else:
-            self._scene = None
-            # Copies, since the caller may change the arrays while the page is open.
-            image = np.array(check_image(source), order="C")
-            self._own_size = (image.shape[1], image.shape[0])
-            self._image = {"image": image}
-            if emission is not None:
-                self._image["emission"] = np.array(check_emission(emission, image), order="C")
-            if mask is not None:
-                # One channel, since what is reduced has channels.
-                self._image["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
-            self._reduced = (self._own_size, self._image)
+            self._show_image(source, mask, emission)
         if renderer is not None and renderer.closed:
             raise ValueError("renderer: it is closed")
         self.renderer = Renderer(adapter) if renderer is None else renderer
@@ -128,13 +128,42 @@ class Viewer:
         if self._owned:
             self.renderer.close()
 
-    def answer(self, message: object) -> Answer:
+    def _begin(self, settings: Settings | None) -> None:
+        """Set A to settings or the source's own, and B to the same without bloom."""
+        if settings is None:
+            settings = presets["bevy_natural" if self._scene is None else "tutorial"]
+            if self._scene is not None and self._shading == "deferred":
+                settings = settings.replace(**_DEVELOPED)
+        begun = check_settings(settings)
+        self.settings = {"a": begun, "b": begun.replace(bloom=False)}
+
+    def _show_image(
+        self,
+        source: NDArray[Any],
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> None:
+        # Copies, since the caller may change the arrays while the page is open.
+        image = np.array(check_image(source), order="C")
+        given = {"image": image}
+        if emission is not None:
+            given["emission"] = np.array(check_emission(emission, image), order="C")
+        if mask is not None:
+            # One channel, since what is reduced has channels.
+            given["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
+        self._scene, self._image = None, given
+        self._own_size = (image.shape[1], image.shape[0])
+        self._reduced = (self._own_size, self._image)
+
+    def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
         """Return what a message asks for.
 
         Parameters
         ----------
         message : mapping of str to object
             See the table above.
+        files : sequence of bytes
+            Content of the file that the message is about.
 
         Returns
         -------
@@ -142,7 +171,13 @@ class Viewer:
             The answer and its pictures; ``{"kind": "error", "error": ...}`` if the message is
             invalid.
         """
-        kinds = {"setup": self._setup, "frame": self._frame, "probe": self._probe}
+        kinds = {
+            "setup": self._setup,
+            "frame": self._frame,
+            "probe": self._probe,
+            "open": lambda message: self._open(message, files),
+            "save": self._save,
+        }
         kind = message.get("kind") if isinstance(message, Mapping) else None
         if not isinstance(message, Mapping) or not isinstance(kind, str) or kind not in kinds:
             return {"kind": "error", "error": f"message: {message!r:.80} is not understood"}, []
@@ -153,13 +188,53 @@ class Viewer:
         return {"kind": kind, "view": message.get("view"), "id": message.get("id"), **body}, buffers
 
     def _setup(self, message: Mapping[str, Any]) -> Answer:
+        return {**controls(), **self._source(), "adapter": self.renderer.info.summary}, []
+
+    def _source(self) -> dict[str, Any]:
+        """Return what is looked at, and the settings to begin with."""
+        scene = self._scene
         return {
-            **controls(),
             "sides": {side: settings.to_dict() for side, settings in self.settings.items()},
-            "animated": self._scene is not None,
+            "name": self._name,
+            "animated": scene is not None,
             "own_size": self._own_size,
-            "adapter": self.renderer.info.summary,
-        }, []
+            "shadings": [] if scene is None else list(SHADINGS),
+            "shading": self._shading,
+            "glow": None if scene is None or scene.glow is None else scene.glow_intensity,
+        }
+
+    def _open(self, message: Mapping[str, Any], files: Sequence[bytes]) -> Answer:
+        """Look at an image file from now on."""
+        from vkbloom.io.array_files import read  # noqa: PLC0415  needs OpenImageIO
+
+        name = PurePath(str(message.get("name", ""))).name
+        if len(files) != 1:
+            raise ValueError("open: the content of one file is needed")
+        with tempfile.TemporaryDirectory() as folder:
+            # Of a name, which may be anything, the extension tells the format.
+            path = Path(folder, f"image{PurePath(name).suffix[:8]}")
+            path.write_bytes(files[0])
+            try:
+                image = read(path)
+            except (OSError, ValueError) as error:
+                raise ValueError(str(error).replace(str(path), name)) from error
+        was_scene = self._scene is not None
+        self._show_image(image)
+        self._name = name
+        self._shown.clear()
+        if was_scene:
+            # A scene's settings turn a photograph white.
+            self._begin(None)
+        return self._source(), []
+
+    def _save(self, message: Mapping[str, Any]) -> Answer:
+        settings = settings_from(message.get("settings"))
+        stops = check_number("stops", message.get("stops", 0.0), -32, 32)
+        frames, _ = self._render(settings, self._own_size, message)
+        (name,) = frames
+        is_encoded = settings.encoding != "none"
+        picture = picture_of(frames[name], name, is_encoded=is_encoded, stops=stops)
+        return {"framebuffer": name}, [picture]
 
     def _frame(self, message: Mapping[str, Any]) -> Answer:
         asked = message.get("sides")
@@ -168,10 +243,8 @@ class Viewer:
         size = message.get("size")
         size = self._own_size if size is None else check_size("size", size)
         size = (min(size[0], _LARGEST_SIDE), min(size[1], _LARGEST_SIDE))
-        name = message.get("framebuffer", "final")
-        time, stops = message.get("time", 0.0), message.get("stops", 0.0)
-        check_number("time", time, -1e9, 1e9)
-        check_number("stops", stops, -32, 32)
+        stops = check_number("stops", message.get("stops", 0.0), -32, 32)
+        self._looked_at(message)
         at = None if message.get("at") is None else _place(message["at"])
         arrays = self._arrays_of(message.get("view"))
         sides: dict[str, Any] = {}
@@ -181,13 +254,13 @@ class Viewer:
                 continue
             try:
                 settings = settings_from(asked[side])
-                frames, names = self._render(settings, size, name, float(time))
+                frames, names = self._render(settings, size, message)
                 (shown,) = frames
                 picture = picture_of(
                     frames[shown],
                     shown,
                     is_encoded=settings.encoding != "none",
-                    stops=float(stops),
+                    stops=stops,
                 )
             except _FAILURES as error:
                 # The other side is still shown.
@@ -214,10 +287,23 @@ class Viewer:
         arrays = self._arrays_of(message.get("view"))
         return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
 
+    def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float]:
+        """Return time, shading and glow as a message has them; what it leaves out stays."""
+        own = 1.0 if self._scene is None else self._scene.glow_intensity
+        time = check_number("time", message.get("time", 0.0), -1e9, 1e9)
+        shading, glow = message.get("shading"), message.get("glow")
+        return (
+            time,
+            self._shading if shading is None else check_shading(shading),
+            own if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
+        )
+
     def _render(
-        self, settings: Settings, size: tuple[int, int], name: object, time: float
+        self, settings: Settings, size: tuple[int, int], message: Mapping[str, Any]
     ) -> tuple[Frames, list[str]]:
-        """Return the framebuffer of that name, or `final` if there is none, and all names."""
+        """Return the framebuffer that is named, or `final` if there is none, and all names."""
+        name = message.get("framebuffer", "final")
+        time, self._shading, glow = self._looked_at(message)
         if self._scene is None:
             given: dict[str, Any] = dict(self._image_of(size))
             image = given.pop("image")
@@ -227,6 +313,8 @@ class Viewer:
             names = list(self.renderer.plan(image, settings).outputs)
             chosen = str(name) if name in names else "final"
             return self.renderer.apply(image, settings, attachments=[chosen], **given), names
+        if glow != self._scene.glow_intensity:
+            self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
         plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
         names = list(plan.outputs)
         chosen = str(name) if name in names else "final"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import resources
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import anywidget
 
@@ -42,8 +42,8 @@ class Explorer(anywidget.AnyWidget):
         self._viewer = viewer
         self.on_msg(self._received)
 
-    def _received(self, widget: object, message: object, buffers: object) -> None:
-        header, pictures = self._viewer.answer(message)
+    def _received(self, widget: object, message: object, buffers: list[Any]) -> None:
+        header, pictures = self._viewer.answer(message, [bytes(buffer) for buffer in buffers])
         self.send(header, pictures)
 
     @property

@@ -1,0 +1,44 @@
+"""The scripts in examples/cluster: that of one machine runs as it stands there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import vkbloom
+
+FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
+SCRIPTS = sorted(FOLDER.glob("on_*.py"))
+
+
+def test_on_this_machine(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    xarray = pytest.importorskip("xarray")
+    for script in FOLDER.glob("*.py"):
+        shutil.copy(script, tmp_path)
+    package = str(Path(vkbloom.__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, "on_this_machine.py"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": package},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    with xarray.open_zarr(tmp_path / "local.zarr", consolidated=False) as stored:
+        assert stored["final"].shape == (8, 4, 90, 160, 3)
+        assert bool(stored["done"].all())
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
+def test_scripts_start_nothing_when_they_are_imported(script: Path) -> None:
+    """As workers import them."""
+    code = script.read_text()
+    compile(code, script, "exec")
+    assert code.endswith('if __name__ == "__main__":\n    main()\n')
