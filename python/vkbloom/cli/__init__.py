@@ -7,9 +7,6 @@ import os
 import sys
 from importlib.util import find_spec
 
-#: The status after Ctrl-C, as shells report it.
-INTERRUPTED = 130
-
 
 def main() -> None:
     """Run the command line and exit with its status: 0, 1 (failed), 2 (wrong use) or 130."""
@@ -18,7 +15,7 @@ def main() -> None:
         needed = " and ".join(missing)
         sys.exit(f"vkbloom: the command line needs {needed}: pip install vkbloom[cli]")
     # Imported here because it needs the optional packages checked above.
-    from vkbloom.cli.program import program  # noqa: PLC0415
+    from vkbloom.cli.program import INTERRUPTED, program  # noqa: PLC0415
 
     # File names may hold characters that the terminal's encoding cannot represent.
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":

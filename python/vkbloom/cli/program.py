@@ -12,10 +12,12 @@ import click
 from click.core import ParameterSource
 
 import vkbloom
-from vkbloom.cli import INTERRUPTED
 
 #: Names of the modules of this package that have a click command called `command`.
 COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", "doctor")
+
+#: The status after Ctrl-C, as shells report it.
+INTERRUPTED: Final = 130
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
