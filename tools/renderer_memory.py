@@ -175,7 +175,7 @@ def measure(count: int) -> dict[str, dict[str, float]]:
 
     return {
         "renderer": renderer_growth(count),
-        "validated": renderer_growth(count // 5, validation=True),
+        "validated": renderer_growth(max(count // 5, 100), validation=True),
         "frame": growth(frame, count // 4),
         "open": frame_growth(scene, 2 * count),
     }

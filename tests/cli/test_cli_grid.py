@@ -88,7 +88,7 @@ class TestAxes:
             ("blur_scale=1,99", "blur_scale: 99.0 is out of range"),
             ("loops=1:2:4", "is not an integer"),
             ("blur_scale=1:2", "a range is FIRST:LAST:COUNT"),
-            ("preset=kino,non", "there is no preset 'non'"),
+            ("preset=kino,non", "unknown preset 'non'"),
         ],
     )
     def test_wrong_use_is_one_line(self, tmp_path: Path, word: str, told: str) -> None:

@@ -490,7 +490,7 @@ def test_a_submission_is_waited_for_once(renderer: Renderer) -> None:
     both = [Separable(), Separable(blur_strength=1.0)]
     submission, _ = submitted(renderer, source, both)
     assert len(submission.wait()[0]) == 2
-    with pytest.raises(RuntimeError, match="waited for once"):
+    with pytest.raises(RuntimeError, match="already waited for"):
         submission.wait()
 
 

@@ -263,7 +263,7 @@ class TestWholeSettings:
     @pytest.mark.parametrize(
         ("settings", "axes", "kind", "told"),
         [
-            (None, {"preset": ["non"]}, ValueError, "no preset 'non'; "),
+            (None, {"preset": ["non"]}, ValueError, "unknown preset 'non'; "),
             (None, {"preset": "kino"}, TypeError, "preset"),
             (None, {"preset": [[]]}, TypeError, "is not a name"),
             (None, {"settings": ["kino"]}, TypeError, "'kino' is not Settings"),
