@@ -178,6 +178,50 @@ def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> No
     assert findings["validation layer"]["status"] == "ok"
 
 
+# Prints what is raised where Ctrl-C and a message of the validation layer come in the same wait.
+INTERRUPTED = """
+import os
+import numpy as np
+import vkbloom
+
+exposures = iter(range(9))
+
+def frame():
+    renderer.apply(np.zeros((8, 8, 3), np.float32), vkbloom.Separable(exposure=next(exposures)))
+
+def attempt(call, lesser):
+    os.environ["VKBLOOM_LESSER"] = lesser
+    try:
+        call()
+    except BaseException as error:
+        print(type(error).__name__, error)
+    else:
+        print("nothing")
+
+renderer = vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True)
+attempt(frame, "")
+attempt(frame, "patience")
+attempt(frame, "")
+attempt(frame, "")
+attempt(frame, "patience")
+attempt(renderer.close, "patience")
+attempt(renderer.close, "")
+print(renderer.closed)
+"""
+
+
+def test_an_interruption_is_raised_before_what_validation_says(layer: Path, name: str) -> None:
+    """Once the ValidationError replaced the exception of the signal's handler: a SystemError."""
+    done = run(layer, name, "", ("-c", INTERRUPTED))
+    assert done.returncode == 0, done.stderr
+    lines = [line.split(" (")[0].strip() for line in done.stdout.splitlines()]
+    objection = "ValidationError an objection"
+    assert lines == [
+        *("nothing", "KeyboardInterrupt", objection, "nothing"),
+        *("KeyboardInterrupt", "KeyboardInterrupt", objection, "True"),
+    ]
+
+
 def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
     done = run(layer, name, "bindings")
     assert "ValidationError" in done.stderr

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, NoReturn
@@ -20,9 +18,6 @@ COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", 
 
 #: The status after Ctrl-C, as shells report it.
 INTERRUPTED: Final = 130
-
-#: Seconds after Ctrl-C after which the program is interrupted again, if it has not ended.
-_AGAIN: Final = 5.0
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
@@ -50,8 +45,7 @@ class Program(click.Group):
         """Run the program and exit: 0 done, 1 failed, 2 wrong use, 130 interrupted."""
         options["standalone_mode"] = False
         try:
-            with _interrupted_again():
-                status = super().main(args, prog_name, **options)
+            status = super().main(args, prog_name, **options)
         except click.UsageError as error:
             where = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
             _exit(2, error.format_message() + where)
@@ -66,36 +60,6 @@ class Program(click.Group):
                 _exit(1, _described(error))
             raise
         sys.exit(status)
-
-
-@contextmanager
-def _interrupted_again() -> Iterator[None]:
-    """Raise KeyboardInterrupt once more if the first one does not end the program.
-
-    Python drops an exception that is raised in a finalizer or a callback of the garbage collector.
-    If Ctrl-C comes at such a moment, the work would go on to its end.
-    """
-    is_main = threading.current_thread() is threading.main_thread()
-    if not (is_main and hasattr(signal, "setitimer")):
-        yield
-        return
-
-    def interrupt(number: int, _: object) -> NoReturn:
-        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
-        raise KeyboardInterrupt(signal.Signals(number).name)
-
-    before = {
-        number: signal.signal(number, interrupt)
-        for number in (signal.SIGINT, signal.SIGALRM)
-        # A handler of the caller stays.
-        if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL)
-    }
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _is_from_interrupt(error: BaseException | None) -> bool:
