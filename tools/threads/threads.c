@@ -191,7 +191,11 @@ static void close_renderer(struct renderer *renderer)
 static bool build_graph(const struct job *job, const struct vkb_settings *settings,
                         struct vkb_graph *graph, struct vkb_error *error)
 {
-    const struct vkb_image_source image = {VKB_FORMAT_RGBA32_FLOAT, sizes[job->size], FLOATS};
+    const struct vkb_image_source image = {
+        .format = VKB_FORMAT_RGBA32_FLOAT,
+        .size = sizes[job->size],
+        .channels = FLOATS,
+    };
     const struct vkb_scene_source scene = {
         .camera = {.position = {0, 0, 3}, .fov = 45, .near = 0.1, .far = 10},
         .size = sizes[job->size],
@@ -245,6 +249,7 @@ static void add_request(struct job *job, unsigned settings)
     const struct vkb_image_row *row = &plan->graph.images[plan->outputs[0]];
     const size_t size = (size_t)row->width * row->height * vkb_pixel_size(row->format);
     request->outputs[0].channels = vkb_graph_channels(&plan->graph, plan->outputs[0]);
+    request->outputs[0].row_count = row->height;
     pthread_mutex_lock(&gil);
     request->outputs[0].memory = array_of(job, size, &request->outputs[0].pages);
     pthread_mutex_unlock(&gil);
@@ -284,7 +289,7 @@ static bool submit(struct job *job)
     };
     const struct vkb_frame_source source = {
         .scene = job->source == SOURCE_IMAGE ? NULL : &scene_data,
-        .input = job->source == SOURCE_IMAGE ? &input : NULL,
+        .inputs = {[VKB_INPUT_IMAGE] = job->source == SOURCE_IMAGE ? &input : NULL},
     };
     struct vkb_error error = {0};
 
