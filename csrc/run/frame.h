@@ -7,6 +7,7 @@
 #include "run/image_cache.h"
 #include "run/pipeline.h"
 #include "run/resident.h"
+#include "run/screen.h"
 #include "run/submission.h"
 #include "scene/scene.h"
 
@@ -20,7 +21,8 @@ struct vkb_frame {
     struct vkb_image_cache cache;
     struct vkb_planner planner;
     uint64_t submitted;  // submissions so far
-    bool stale;          // something failed: the images are made anew before anything is recorded
+    struct vkb_screen *screens;
+    bool stale;  // something failed: the images are made anew before anything is recorded
 };
 
 // What graphs start from; what they do not use is NULL.
