@@ -219,17 +219,17 @@
 
 // Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line, and of a fused
 // bloom. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
-#define LINE_RADIUS            64
-#define LINE_SHORT_RADIUS      8
-#define LINE_OUTPUTS           8
-#define LINE_VEC4S             34
-#define STRIP_RADIUS           4
-#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
-#define STRIP_ROWS             135
-#define HALVE_COLUMNS          4
-#define HALVE_ROWS             16
-#define DOUBLE_COLUMNS         4
-#define DOUBLE_ROWS            32
+#define LINE_RADIUS       64
+#define LINE_SHORT_RADIUS 8
+#define LINE_OUTPUTS      8
+#define LINE_VEC4S        34
+#define STRIP_RADIUS      4
+#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
+#define STRIP_ROWS        135
+#define HALVE_COLUMNS     4
+#define HALVE_ROWS        16
+#define DOUBLE_COLUMNS    4
+#define DOUBLE_ROWS       32
 // Blocks of words, which pixels of three channels fill, too. CHANNEL is the bytes of a channel.
 #define HALVE_WORDS_COLUMNS           8
 #define HALVE_WORDS_ROWS              32
@@ -251,7 +251,8 @@
 // int, and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as
 // an image of that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for
 // loops that a compiler can unroll; with FROM_IMAGE, halving reads the image itself and applies the
-// threshold. FIRST is of an engine's first level, LEVELS the number that a pass gathers.
+// threshold; STORED is of the target (STORED_*). FIRST is of an engine's first level, LEVELS the
+// number that a pass gathers.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -275,7 +276,8 @@
     CONSTANT(19, KARIS_AVERAGE, karis_average) \
     CONSTANT(20, NODE, node) \
     CONSTANT(21, ALPHA, alpha) \
-    CONSTANT(22, MASKED, masked)
+    CONSTANT(22, MASKED, masked) \
+    CONSTANT(23, STORED, stored)
 
 // Names that a setting can take; each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
