@@ -1,6 +1,7 @@
 #include "run/pages.h"
 
-// So much stays idle at the most, the latest of it: three 4K images of half floats and some.
+// The most idle memory that is kept, the latest first: a little more than three 4K images of half
+// floats.
 #define KEPT_BYTES ((size_t)256 << 20)
 
 #define LARGE_PAGE ((size_t)2 << 20)
@@ -45,7 +46,7 @@ static struct vkb_page_run *create_run(const struct vkb_device *device, size_t s
 
 static void destroy_run(const struct vkb_device *device, struct vkb_page_run *run)
 {
-    // An array may go at any time, in any thread.
+    // An array may be freed at any time, in any thread.
     if (device) {
         const struct vkb_messages *before = vkb_messages_begin(&device->messages);
         vkb_buffer_destroy(device, &run->buffer);
@@ -74,7 +75,7 @@ static void unlink_run(struct vkb_page_run **list, struct vkb_page_run *run)
         run->next->previous = run->previous;
 }
 
-// An eighth more than is needed is still a fit: sizes that change a little share runs.
+// A run that is up to an eighth too large fits, so that sizes that vary a little share runs.
 static struct vkb_page_run *find_idle(const struct vkb_pages *pages, size_t size)
 {
     struct vkb_page_run *found = NULL;
@@ -111,7 +112,7 @@ static void drop_oldest(struct vkb_pages *pages)
     destroy_run(pages->device, oldest);
 }
 
-// Nobody asks a closed one for more.
+// A closed object is freed with its last run.
 static void free_closed(struct vkb_pages *pages)
 {
     if (!pages->device && !pages->taken)

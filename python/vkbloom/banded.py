@@ -1,4 +1,4 @@
-"""Large images by bands: rows go to the device, and come back from it, as they are read."""
+"""Large images in bands: rows are uploaded as they are read, and results are read back by rows."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ __all__ = ["BandedImage"]
 
 
 class BandedImage:
-    """An image on the device of which the host has a band at a time.
+    """An image on the device, of which the host has only one band at a time.
 
-    The device has all of it, and of the result; the bloom is the same as that of the image given at
-    once.
+    The device has the complete image and the complete result. The bloom is the same as for the
+    image in one array.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class BandedImage:
     rows : ndarray, shape (N, W, 3) or (N, W, 4)
         The first rows, as for `vkbloom.Renderer.apply`.
     height : int
-        Rows in all.
+        Height of the image in rows.
 
     Raises
     ------
@@ -42,12 +42,12 @@ class BandedImage:
         self._filled = len(rows)
 
     def add(self, rows: NDArray[Any]) -> None:
-        """Give it the next rows, of the same width, channels and dtype."""
+        """Add the next rows, which have the same width, channels and dtype."""
         self._core.fill(self._source, _core.image_source(rows), self._filled)
         self._filled += len(rows)
 
     def final(self, settings: Settings, first: int, count: int) -> NDArray[Any]:
-        """Return rows of the framebuffer `final`; the first call renders it."""
+        """Return rows of the framebuffer `final`. The first call renders it."""
         plan = self._core.plan(self._source, settings, ("final",))
         ((_, (_, *rest), dtype),) = plan.outputs
         array = np.empty((count, *rest), dtype)
