@@ -223,10 +223,10 @@ class _Window(NamedTuple):
 
 
 class ImageByBands:
-    """An image on the device of which the host has a band at a time.
+    """An image on the device, of which the host has only one band at a time.
 
-    The device has all of it, and of the result; the bloom is the same as that of the image given at
-    once.
+    The device has the complete image and the complete result. The bloom is the same as for the
+    image in one array.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ class ImageByBands:
     rows : Band
         The first rows.
     height : int
-        Rows in all.
+        Height of the image in rows.
 
     Raises
     ------

@@ -80,9 +80,9 @@ class TestControls:
                     assert 0 < field["step"] <= field["to"] - field["from"]
                     # Of 1, 2 and 5 times powers of ten, neighbours are 2.5 times apart at the most.
                     steps = (field["to"] - field["from"]) / field["step"]
-                    assert field["whole"] or 200 <= steps * (1 + 1e-9) <= 500
+                    assert field["integer"] or 200 <= steps * (1 + 1e-9) <= 500
                     assert value is None or field["low"] <= value <= field["high"]
-                    assert field["whole"] == (type(value) is int)
+                    assert field["integer"] == (type(value) is int)
                 elif field["kind"] == "choice":
                     assert value in field["choices"] or (value is None and field["optional"])
                 else:

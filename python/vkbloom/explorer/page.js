@@ -51,7 +51,7 @@ function control(field, changed) {
     type: "number",
     min: field.low,
     max: field.high,
-    step: field.whole ? 1 : "any",
+    step: field.integer ? 1 : "any",
     ariaLabel: `${field.name}, as a number`,
   });
   slider.addEventListener("input", () => {

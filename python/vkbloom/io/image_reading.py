@@ -48,7 +48,7 @@ _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
 # Red, green, blue, white.
 _REC_709: Final = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-# That are listed. Some files have thousands, and each takes time.
+# The most parts that are listed. Some files have thousands, and each takes time.
 _MOST_PARTS: Final = 100
 
 
@@ -115,10 +115,10 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
     path : str or path-like
         A file of any format that OpenImageIO reads.
     subimage : int, default 0
-        Which part of a file that has several (OpenEXR, TIFF, GIF), from 0 on.
+        The part of a file with several parts (OpenEXR, TIFF, GIF), from 0.
     layer : str, optional
-        Of an OpenEXR file: only the channels ``layer.NAME`` are taken, under the NAME. It is
-        looked for in `subimage` and the parts behind it.
+        For OpenEXR files: only the channels ``layer.NAME`` are read, with the name NAME. The layer
+        is searched in `subimage` and the parts after it.
 
     Returns
     -------
@@ -129,8 +129,8 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
     OSError
         The file does not exist or cannot be opened; the error names it.
     ValueError
-        The file is damaged or no image, has no such part or layer, is no flat image of 8 or 16
-        bit integers or floats, or its name is not UTF-8; it names the file.
+        The file is damaged or not an image; it has no such part or layer; it is not a flat image of
+        8 or 16 bit integers or floats; or its name is not UTF-8. The error names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
@@ -149,7 +149,7 @@ def _read(
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
-    # A truncated JPEG gives pixels and an error.
+    # A truncated JPEG has pixels and an error.
     reason = failure_of(reader)
     if data is None or reason:
         raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
@@ -238,7 +238,7 @@ def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None
 
 
 def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
-    """Return what a file says of its current part, without pixels; another may be current then.
+    """Return the description of a file's current part, without pixels. May change the current part.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
         From `opened`.
     """
     spec = reader.spec()
-    # Before the other parts are looked at.
+    # Before the reader goes to other parts.
     found = StoredImage(
         pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
         channels=tuple(spec.channelnames),
@@ -267,7 +267,7 @@ def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
 
 
 def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
-    """Return the layer of each channel: what is before its name, else the name of the part."""
+    """Return the layer of each channel: the prefix of its name, or else the name of the part."""
     part = spec.get_string_attribute("oiio:subimagename")
     return [name.rpartition(".")[0] or part for name in spec.channelnames]
 
@@ -311,24 +311,24 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
     ----------
     stored : StoredImage
     colour : str, optional
-        What the colours in the file are: "linear", "srgb" or a colour space of OpenColorIO's
-        built-in configuration, such as "ACEScg". By default floats are linear, and integers what
-        the file says by a cICP chunk, an ICC profile or a gamma, else sRGB.
+        The colour space of the file: "linear", "srgb" or a colour space of OpenColorIO's built-in
+        configuration, such as "ACEScg". Default: floats are linear; integers have the space that
+        the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
     raw : bool, default False
         Whether to keep 8-bit values without decoding.
 
     Returns
     -------
     Picture
-        Of float16 where the file has half, of float32 for all else; of uint8 if `raw`. Colours of
-        integer files, or with `colour`, are linear Rec. 709, not clipped. They are neither
-        multiplied nor divided by alpha.
+        float16 if the file has half, uint8 if `raw`, otherwise float32. Colours of integer files,
+        or with `colour`, are linear Rec. 709, not clipped. They are neither multiplied nor divided
+        by alpha.
 
     Raises
     ------
     ValueError
         The channels are neither RGB, RGBA, grey nor grey with alpha; there is no such `colour`;
-        `raw` and the file does not hold 8-bit integers, or `colour` is given as well.
+        `raw` and the file has no 8-bit integers, or `colour` is also given.
     """
     if raw and colour is not None:
         raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
@@ -339,7 +339,7 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
     if raw and numbers != "uint8":
         raise ValueError(f"raw: {numbers} is not an 8-bit integer type")
     if numbers == "half":
-        # OpenImageIO reads all channels as float if another channel is float.
+        # OpenImageIO reads all channels as float if one channel is float.
         values = values.astype(np.float16, copy=False)
     notes = [f"left out the channels {', '.join(left_out)}"] if left_out else []
     grey = len(chosen) < 3
@@ -362,9 +362,9 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
 
 
 def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
-    """Return the places of the colour and alpha, and the names of the channels left out."""
+    """Return the indices of the colour and alpha channels, and the names of the other channels."""
     layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
-    # One layer's name before every channel says nothing.
+    # If all channels have the same layer, its name is not needed.
     plain = [name.rpartition(".")[2] if len(layers) == 1 else name for name in names]
     places = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
     alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
@@ -387,7 +387,7 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
 def _linear(
     values: NDArray[Any], stored: StoredImage, colour: Colour | None
 ) -> tuple[str, NDArray[Any], list[str]]:
-    """Return what the colours were taken as, floats of linear ones, and notes; alpha is scaled."""
+    """Return the assumed colour space, the linear floats, and notes; alpha is only scaled."""
     if colour is not None:
         if colour not in ("linear", "srgb"):
             colours_of.check_space(colour)
@@ -426,7 +426,7 @@ def _by_profile(
 
 
 def _notes_of_floats(stored: StoredImage) -> list[str]:
-    """Say what a file of floats tells of its colours, which stay as they are."""
+    """Return notes about the colour space of a file of floats, which is not converted."""
     notes: list[str] = []
     if stored.space == SPACES["srgb"]:
         notes.append("the file says srgb of its colours, which as floats are taken as linear")
@@ -445,7 +445,7 @@ def _notes_of_floats(stored: StoredImage) -> list[str]:
 def _attributes_of_linear(
     stored: StoredImage, taken_as: str, colour: Colour | None
 ) -> dict[str, tuple[Any, Any]]:
-    """Return the attributes without those that tell of colours that were converted."""
+    """Return the attributes without those that describe the colours before the conversion."""
     lost = set()
     if taken_as != "srgb":
         lost.add("ICCProfile")
@@ -455,7 +455,7 @@ def _attributes_of_linear(
 
 
 def _decoded(values: NDArray[Any], space: str) -> NDArray[Any]:
-    """Return floats of linear colours out of a space; alpha is only scaled."""
+    """Return linear floats from colours of a space; alpha is only scaled."""
     if values.dtype.kind == "f":
         if space == "linear":
             return values

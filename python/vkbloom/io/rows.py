@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Rows", "opened_rows", "written_rows"]
 
-# Of a band, as four single floats a pixel.
+# The most bytes of a band, as four single floats for each pixel.
 _BAND_BYTES: Final = 64 << 20
 
 
