@@ -28,7 +28,16 @@ from vkbloom.io.srgb import decode_srgb
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["check_plausible", "decode", "load", "opened"]
+__all__ = [
+    "check_plausible",
+    "chosen_part",
+    "decode",
+    "describe",
+    "load",
+    "of_layer",
+    "opened",
+    "size_of",
+]
 
 _LARGEST_SIDE: Final = 65536
 # Pixels of the largest texture, 16384 x 16384. A damaged header may claim more.
@@ -132,32 +141,11 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
 def _read(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
 ) -> StoredImage:
-    if layer is not None:
-        subimage = _part_with(reader, name, subimage, layer)
-    if subimage < 0 or not reader.seek_subimage(subimage, 0):
-        count = 0
-        while reader.seek_subimage(count, 0):
-            count += 1
-        raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
-    spec = reader.spec()
-    if spec.deep or spec.depth > 1:
-        raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
+    subimage, spec = chosen_part(reader, name, subimage, layer)
     stored_as = str(spec.format)
-    if stored_as not in DTYPES:
-        raise ValueError(
-            f"{name}: numbers of {stored_as} are not supported; use unsigned integers of 8 or 16 "
-            "bits, or floats"
-        )
     display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     left, top = min(spec.x, display[0]), min(spec.y, display[1])
-    width = max(spec.x + spec.width, display[0] + display[2]) - left
-    height = max(spec.y + spec.height, display[1] + display[3]) - top
-    if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
-        raise ValueError(
-            f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
-            f"{_LARGEST_AREA} in all"
-        )
-    check_plausible(spec, name)
+    width, height = _covered(spec)
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
@@ -171,13 +159,8 @@ def _read(
         whole = np.zeros((height, width, spec.nchannels), dtype)
         whole[row : row + spec.height, column : column + spec.width] = pixels
         pixels = whole
-    described = describe(reader)
-    names, formats = described.channels, described.numbers
-    if layer is not None:
-        own = [index for index, of in enumerate(_layers(spec)) if of == layer]
-        pixels = pixels[:, :, own]
-        names = tuple(names[index].rpartition(".")[2] for index in own)
-        formats = tuple(formats[index] for index in own)
+    described = of_layer(replace(describe(reader), pixels=pixels), spec, layer)
+    pixels = described.pixels
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
         x, y = display[0] - left, display[1] - top
@@ -187,10 +170,70 @@ def _read(
     return replace(
         described,
         pixels=np.ascontiguousarray(pixels),
-        channels=names,
-        numbers=formats,
         origin=(left, top),
         display=display,
+    )
+
+
+def chosen_part(
+    reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
+) -> tuple[int, OpenImageIO.ImageSpec]:
+    """Make the part to read the current one, and return its number and what it is.
+
+    Raises
+    ------
+    ValueError
+        As `load`, but of a file that is damaged in its pixels.
+    """
+    if layer is not None:
+        subimage = _part_with(reader, name, subimage, layer)
+    if subimage < 0 or not reader.seek_subimage(subimage, 0):
+        count = 0
+        while reader.seek_subimage(count, 0):
+            count += 1
+        raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
+    spec = reader.spec()
+    if spec.deep or spec.depth > 1:
+        raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
+    if str(spec.format) not in DTYPES:
+        raise ValueError(
+            f"{name}: numbers of {spec.format} are not supported; use unsigned integers of 8 or 16 "
+            "bits, or floats"
+        )
+    width, height = _covered(spec)
+    if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
+        raise ValueError(
+            f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
+            f"{_LARGEST_AREA} in all"
+        )
+    check_plausible(spec, name)
+    return subimage, spec
+
+
+def _covered(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
+    """Return the size of the area of the data window and the display window."""
+    right = max(spec.x + spec.width, spec.full_x + spec.full_width)
+    bottom = max(spec.y + spec.height, spec.full_y + spec.full_height)
+    return right - min(spec.x, spec.full_x), bottom - min(spec.y, spec.full_y)
+
+
+def size_of(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
+    """Return the width and the height of what `load` returns, before it is turned."""
+    if spec.get_int_attribute("Orientation", 1) != 1:
+        return spec.full_width, spec.full_height
+    return _covered(spec)
+
+
+def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None) -> StoredImage:
+    """Return an image with a layer's channels alone, by their names in it; None: all."""
+    if layer is None:
+        return stored
+    own = [index for index, of in enumerate(_layers(spec)) if of == layer]
+    return replace(
+        stored,
+        pixels=stored.pixels[:, :, own],
+        channels=tuple(stored.channels[index].rpartition(".")[2] for index in own),
+        numbers=tuple(stored.numbers[index] for index in own),
     )
 
 
