@@ -1,5 +1,7 @@
 #include "run/image_cache.h"
 
+#include "vulkan/labels.h"
+
 #include <string.h>
 
 // Keys are compared byte by byte. All members have 64 bits, so there is no padding.
@@ -213,7 +215,12 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
         return true;
     destroy_image(device, cache, cached);
     cached->image_id = ++cache->clock;
-    return vkb_image_create_row(device, row, &cached->image, error);
+    if (!vkb_image_create_row(device, row, &cached->image, error))
+        return false;
+    vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
+    if (cached->image.buffer)
+        vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, row->name);
+    return true;
 }
 
 bool vkb_image_cache_framebuffer(const struct vkb_device *device, struct vkb_image_cache *cache,

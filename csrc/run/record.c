@@ -1,5 +1,7 @@
 #include "run/record.h"
 
+#include "vulkan/labels.h"
+
 #include <string.h>
 
 // Copies the pass's parameters to the uniform buffer; returns their offset.
@@ -305,14 +307,17 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
                         struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = &run->graph->passes[index];
+    VkCommandBuffer commands = run->submission->commands.buffer;
     VkPipeline pipeline;
 
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
                            error))
         return false;
-    run->device->vk.vkCmdBindPipeline(run->submission->commands.buffer, vkb_pass_bind_point(pass),
-                                      pipeline);
-    return draw(run, pass, write_params(run, pass), error);
+    vkb_label_begin(run->device, commands, pass->name);
+    run->device->vk.vkCmdBindPipeline(commands, vkb_pass_bind_point(pass), pipeline);
+    const bool done = draw(run, pass, write_params(run, pass), error);
+    vkb_label_end(run->device, commands);
+    return done;
 }
 
 static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)

@@ -1,6 +1,7 @@
 #include "run/screen.h"
 
 #include "run/frame.h"
+#include "vulkan/labels.h"
 
 struct vkb_screen *vkb_screen_create(const struct vkb_device *device, struct vkb_frame *frame,
                                      VkSurfaceKHR surface, const char *mode,
@@ -121,8 +122,11 @@ static bool submit_copy(struct vkb_device *device, struct vkb_frame *frame,
     // What its images' submission keeps, this one keeps, too.
     copy->number = image->used;
     bool done = vkb_commands_begin(device, &copy->commands, error);
-    if (done)
+    if (done) {
+        vkb_label_begin(device, copy->commands.buffer, "present");
         record(device, copy->commands.buffer, &image->image, final, swapchain, index);
+        vkb_label_end(device, copy->commands.buffer);
+    }
     done = done
         && vkb_submission_submit(device, copy,
                                  &(struct vkb_semaphores){

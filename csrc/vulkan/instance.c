@@ -136,6 +136,8 @@ static const struct wish {
     {"VK_KHR_wayland_surface", "WAYLAND_DISPLAY"},
     {"VK_KHR_win32_surface", NULL},
     {"VK_EXT_metal_surface", NULL},
+    // Names are for RenderDoc, which sets this for its layer.
+    {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, "ENABLE_VULKAN_RENDERDOC_CAPTURE"},
 };
 enum {
     WISH_COUNT = sizeof wishes / sizeof wishes[0],
@@ -158,7 +160,8 @@ static void add_wished(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr 
     for (const struct wish *wish = wishes; wish < wishes + WISH_COUNT; ++wish)
         for (uint32_t i = 0; i < found_count; ++i)
             if (strcmp(found[i].extensionName, wish->extension) == 0
-                && (!wish->variable || getenv(wish->variable))) {
+                && (!wish->variable || getenv(wish->variable))
+                && !(*count > 0 && strcmp(names[0], wish->extension) == 0)) {
                 names[(*count)++] = wish->extension;
                 instance->surfaces |= wish == wishes;
             }

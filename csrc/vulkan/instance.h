@@ -36,6 +36,9 @@ extern const char vkb_install_hint[];
     NAME(vkCreateHeadlessSurfaceEXT) \
     NAME(vkDestroySurfaceKHR) \
     NAME(vkCreateDebugUtilsMessengerEXT) \
+    NAME(vkCmdBeginDebugUtilsLabelEXT) \
+    NAME(vkCmdEndDebugUtilsLabelEXT) \
+    NAME(vkSetDebugUtilsObjectNameEXT) \
     NAME(vkDestroyDebugUtilsMessengerEXT)
 
 struct vkb_instance_table {

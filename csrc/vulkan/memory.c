@@ -2,6 +2,8 @@
 #define _DEFAULT_SOURCE
 #include "vulkan/memory.h"
 
+#include "vulkan/labels.h"
+
 #ifdef __linux__
 #include <sys/mman.h>
 #endif
@@ -71,6 +73,16 @@ static bool allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
                                           NULL, memory));
 }
 
+// What a buffer is for, as captures name it.
+static const char *buffer_name(VkBufferUsageFlags usage)
+{
+    return usage & VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT ? "uniforms"
+         : usage & VK_BUFFER_USAGE_VERTEX_BUFFER_BIT  ? "vertices"
+         : usage & VK_BUFFER_USAGE_INDEX_BUFFER_BIT   ? "indices"
+         : usage & VK_BUFFER_USAGE_TRANSFER_SRC_BIT   ? "upload"
+                                                      : "readback";
+}
+
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
                        VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
                        struct vkb_error *error)
@@ -97,6 +109,7 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
         vkb_buffer_destroy(device, buffer);
         return false;
     }
+    vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)buffer->handle, buffer_name(usage));
     // Only a complete buffer has a size; vkb_buffer_reserve relies on that.
     buffer->size = size;
     buffer->coherent = flags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;

@@ -1,5 +1,7 @@
 #include "vulkan/staging.h"
 
+#include "vulkan/labels.h"
+
 #include <string.h>
 
 // Offsets of image copies must be multiples of the pixel size, which is at most 16.
@@ -81,6 +83,8 @@ bool vkb_staging_load_picture(const struct vkb_device *device, VkCommandBuffer c
                           },
                           image, error))
         return false;
+    vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)image->handle,
+                     data->layers == 6 ? "skybox" : "texture");
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_TARGET);
     for (uint32_t level = 0; level < data->level_count; ++level) {
         const size_t size = level_bytes(data, level);

@@ -216,6 +216,48 @@ class Renderer:
         """
         self._core.close()
 
+    def capture(self, path: str | os.PathLike[str]) -> contextlib.AbstractContextManager[None]:
+        """Capture what the device does meanwhile as one frame of RenderDoc.
+
+        A program without a window has no frames of which RenderDoc could tell where they end.
+
+        Parameters
+        ----------
+        path : str or path-like
+            The file to write, ``name.rdc``; one that exists is replaced.
+
+        Returns
+        -------
+        context manager
+            The file is there when it ends; where it ends by an exception, there is none.
+
+        Raises
+        ------
+        Error
+            RenderDoc is not loaded; says how to load it. Or it captured nothing.
+        ValueError
+            The renderer is closed.
+
+        Notes
+        -----
+        Passes have their names as labels, images and buffers as objects, as in `plan`. The names
+        are also in messages of the validation layer. RenderDoc hides VK_EXT_external_memory_host,
+        so that results take the way through staging memory.
+
+        Examples
+        --------
+        Run by ``renderdoccmd capture -w python program.py``:
+
+        >>> def program(scene):
+        ...     with vkbloom.Renderer() as renderer, renderer.capture("bloom.rdc"):
+        ...         renderer.render(scene)
+        """
+        from vkbloom.capture import capture  # noqa: PLC0415  rarely used
+
+        if self.closed:
+            raise ValueError("the renderer is closed")
+        return capture(self._core.instance, path)
+
     def __reduce__(self) -> NoReturn:
         # For copy.copy, copy.deepcopy and pickle: two objects would share one device.
         raise TypeError("a Renderer cannot be copied or pickled; create another one")
