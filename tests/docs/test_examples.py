@@ -68,9 +68,22 @@ def public() -> Iterator[Any]:
     yield pytest.param(pytest_vkbloom.frame_regression, id="frame_regression")
 
 
-@pytest.mark.parametrize("member", list(public()))
+def with_methods() -> Iterator[Any]:
+    """The public objects, and the public methods of their classes."""
+    for parameters in public():
+        yield parameters
+        member = parameters.values[0]
+        for name in vars(member) if inspect.isclass(member) else ():
+            method = getattr(member, name)
+            if not name.startswith("_") and (
+                inspect.isfunction(method) or inspect.ismethod(method)
+            ):
+                yield pytest.param(method, id=f"{parameters.id}.{name}")
+
+
+@pytest.mark.parametrize("member", list(with_methods()))
 def test_public_objects_have_an_example(member: Any) -> None:
-    """And name what else to look at."""
+    """They also name related objects."""
     text = inspect.getdoc(member) or ""
     for section in ("Examples", "See Also"):
         assert f"{section}\n{'-' * len(section)}" in text, section
