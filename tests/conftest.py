@@ -27,8 +27,8 @@ def pytest_configure(config: pytest.Config) -> None:
     # that.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # A slow machine must not fail a test.
-    hypothesis.settings.register_profile("untimed", deadline=None)
+    # A slow machine must not fail a test. Where more examples find more, a test asks for them.
+    hypothesis.settings.register_profile("untimed", deadline=None, max_examples=30)
     hypothesis.settings.load_profile("untimed")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
 
