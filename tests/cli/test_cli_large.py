@@ -1,4 +1,4 @@
-"""``vkbloom apply`` of large pictures: by bands of rows, as if they were taken as a whole."""
+"""``vkbloom apply`` of large pictures: the same result in bands of rows as in one piece."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def light(height: int, width: int, channels: int, dtype: str) -> Any:
 
 @pytest.fixture
 def by_rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Take every picture by bands of a few rows; what is returned has the rows of each band."""
+    """Read every picture in bands of a few rows; return the number of rows of each band."""
     monkeypatch.setattr(large, "LARGE", 1)
     monkeypatch.setattr(rows, "_BAND_BYTES", 16 * 41 * 7)
     counts: list[int] = []

@@ -30,7 +30,7 @@ EXAMPLES = [
 
 
 def ask(viewer: Viewer, **message: Any) -> tuple[dict[str, Any], list[bytes]]:
-    """Ask as a page does: what goes through JSON comes out the same."""
+    """Send a message as a page does. JSON must not change it or the answer."""
     answer, buffers = viewer.answer(json.loads(json.dumps(message, allow_nan=False)))
     return json.loads(json.dumps(answer, allow_nan=False)), buffers
 
