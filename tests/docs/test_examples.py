@@ -26,6 +26,19 @@ WITHOUT_EXAMPLE = {
     "ShaderError",
     "ValidationError",
 }
+# Classes whose methods have examples, too.
+METHODS_OF = (
+    vkbloom.Frames,
+    vkbloom.Plan,
+    vkbloom.Renderer,
+    vkbloom.Scene,
+    vkbloom.Settings,
+    vkbloom.Surface,
+    psf.PSF,
+    testing.FrameRegression,
+    testing.Probe,
+    testing.Tolerances,
+)
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
@@ -69,11 +82,11 @@ def public() -> Iterator[Any]:
 
 
 def with_methods() -> Iterator[Any]:
-    """The public objects, and the public methods of their classes."""
+    """The public objects, and the public methods of some classes."""
     for parameters in public():
         yield parameters
         member = parameters.values[0]
-        for name in vars(member) if inspect.isclass(member) else ():
+        for name in vars(member) if member in METHODS_OF else ():
             method = getattr(member, name)
             if not name.startswith("_") and (
                 inspect.isfunction(method) or inspect.ismethod(method)
