@@ -16,15 +16,16 @@ import pytest
 
 from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
 
-#: What the tests run on; a GPU is tested by hand, with VKBLOOM_TEST_ADAPTER=hardware.
+#: The adapter of the tests. For a GPU, set VKBLOOM_TEST_ADAPTER=hardware.
 ADAPTER = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # A shell starts background jobs with SIGINT ignored, which the tests' processes would inherit.
+    # A shell starts background jobs with SIGINT ignored, and the tests' processes would inherit
+    # that.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # A slow machine is no failure.
+    # A slow machine must not fail a test.
     hypothesis.settings.register_profile("untimed", deadline=None)
     hypothesis.settings.load_profile("untimed")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
@@ -89,14 +90,15 @@ def modules_stay(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def renderer(environment: None) -> Iterator[Renderer]:
-    """A renderer whose first validation message raises, at the latest when it is closed."""
+    """A renderer whose first validation message raises an exception, at the latest when it is
+    closed."""
     with Renderer(validation=True) as opened:
         yield opened
 
 
 @pytest.fixture
 def new_renderer() -> Iterator[Callable[[], Renderer]]:
-    """Opens renderers as `renderer` is one, and closes them after the test."""
+    """Opens renderers like `renderer`, and closes them after the test."""
     opened: list[Renderer] = []
 
     def open_one() -> Renderer:
@@ -110,7 +112,7 @@ def new_renderer() -> Iterator[Callable[[], Renderer]]:
 
 @pytest.fixture(scope="session")
 def software(environment: None) -> AdapterInfo:
-    """The software adapter, for tests of it; they are skipped where there is none."""
+    """The software adapter. A test that uses this is skipped if there is none."""
     for adapter in adapters():
         if adapter.type == "cpu":
             return adapter
@@ -124,7 +126,7 @@ def scene() -> Scene:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Meshes and frames of the original program, which lie beside the repository."""
+    """Meshes and frames of the original program, which are stored beside the repository."""
     folder = Path(__file__).resolve().parents[2] / "shared" / "data"
     if not folder.is_dir():
         pytest.skip("the original's meshes and frames (../shared/data) are not here")

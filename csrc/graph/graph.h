@@ -19,13 +19,15 @@ enum {
 #define VKB_NO_IMAGE UINT32_MAX
 
 // What the host fills an image with, if it does: the image that a source is of, what takes its
-// place as the source of the bloom, and the mask of what glows.
+// place as the source of the bloom, the mask of what glows, and images that another part of the
+// graph has made.
 enum vkb_input_kind {
     VKB_INPUT_NONE,
     VKB_INPUT_IMAGE,
     VKB_INPUT_EMISSION,
     VKB_INPUT_MASK,
-    VKB_INPUT_COUNT,
+    VKB_INPUT_LEVEL,
+    VKB_INPUT_COUNT = VKB_INPUT_LEVEL + GATHERED_LEVELS,
 };
 
 // An image is either an input, or written by one sequence of consecutive passes. So its content

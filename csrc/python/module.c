@@ -94,7 +94,8 @@ static PyMethodDef functions[] = {
     {"adapters", adapters, METH_VARARGS,
      "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
     {"image_source", vkb_image_source, METH_VARARGS,
-     "image_source(image, emission=None, mask=None) -> Source"},
+     "image_source(image, emission=None, mask=None, levels=()) -> Source. The levels are images "
+     "that another part of a graph has made."},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
     {"plan", vkb_any_plan, METH_VARARGS,

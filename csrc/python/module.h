@@ -5,6 +5,7 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
+#include "graph/bands.h"
 #include "methods/source.h"
 #include "run/frame.h"
 #include "variants/variants.h"
@@ -173,6 +174,17 @@ struct vkb_plan_object {
 // Size in bytes of an output in the caller's array.
 size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 
+// A tuple of the names of images.
+PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count);
+
+// The part of a graph that makes the names, from (rows of the image, names of the levels that the
+// source brings, whether it is a band of the image).
+bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyObject *names,
+                   struct vkb_part *part);
+bool vkb_build_part(const struct vkb_device *device, const struct vkb_source *source,
+                    const struct vkb_settings *settings, const struct vkb_part *part,
+                    struct vkb_graph *graph, struct vkb_error *error);
+
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
@@ -181,6 +193,7 @@ PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 
 // Methods of the Renderer.
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_renderer_bands(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);

@@ -360,7 +360,13 @@ static PyObject *get_cached(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Releases the device; may be called twice."},
     {"plan", vkb_renderer_plan, METH_VARARGS,
-     "plan(source, settings, names) -> Plan. Makes no device call; names None: all framebuffers."},
+     "plan(source, settings, names, part=None) -> Plan. Makes no device call; names None: all "
+     "framebuffers. A part is (rows of the image, names of the levels that the source has, whether "
+     "it is a band of the image): of that part of the graph, and names are any images."},
+    {"bands", vkb_renderer_bands, METH_VARARGS,
+     "bands(source, settings, height) -> (head, levels, step, reach) or None. How the final of an "
+     "image of so many rows, of which the source has some, can be made of bands: see "
+     "graph/bands.h."},
     {"run", vkb_renderer_run, METH_VARARGS,
      "run(source, plans, arrays[, first, count]) -> Submission. Submits plans with the same "
      "images; "

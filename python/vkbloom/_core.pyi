@@ -39,6 +39,7 @@ def image_source(
     image: _Array,
     emission: _Array | None = None,
     mask: NDArray[np.float32] | None = None,
+    levels: tuple[_Array, ...] = (),
     /,
 ) -> Source: ...
 def scene_source(
@@ -76,7 +77,17 @@ class Renderer:
     def cached(self) -> tuple[int, int, int]: ...
     def close(self) -> None: ...
     def pipeline_cache(self) -> bytes: ...
-    def plan(self, source: Source, settings: object, names: tuple[str, ...] | None, /) -> Plan: ...
+    def plan(
+        self,
+        source: Source,
+        settings: object,
+        names: tuple[str, ...] | None,
+        part: tuple[int, tuple[str, ...], bool] = ...,
+        /,
+    ) -> Plan: ...
+    def bands(
+        self, source: Source, settings: object, height: int, /
+    ) -> tuple[str | None, tuple[str, ...], int, int] | None: ...
     def run(
         self,
         source: Source,

@@ -1,4 +1,4 @@
-"""The settings and formats that every way through the core is tried with."""
+"""The settings and formats with which all paths through the core are tested."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from vkbloom import DualKawase, Pyramid, Separable, Settings, gaussian_weights
 
 DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
 
-# No level of an 8-bit image has this luminance: a sum of whole multiples of 1e-4 / 255 never
-# meets it, so that rounding cannot lift a pixel over it.
+# No colour of an 8-bit image has this luminance, since it is not a multiple of 1e-4 / 255. So
+# rounding cannot move a pixel across the threshold.
 HARD_THRESHOLD = 0.30001
 
 METHODS: dict[str, Settings] = {

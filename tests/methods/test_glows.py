@@ -1,4 +1,4 @@
-"""Godot's glow, Blender's bloom and pygfx' bloom: the formulas by hand, and what each refuses."""
+"""Godot's glow, Blender's bloom and pygfx' bloom: formulas worked out by hand, and errors."""
 
 from __future__ import annotations
 
@@ -269,8 +269,8 @@ def test_all_variants_give_the_same(
 ) -> None:
     image = lights((75, 46), dtype)
     results = []
-    for form in ("fragment", "cpu", "gpu"):
-        monkeypatch.setenv("VKBLOOM_FORM", form)
+    for variant in ("fragment", "cpu", "gpu"):
+        monkeypatch.setenv("VKBLOOM_FORM", variant)
         with Renderer(validation=True) as renderer:
             results.append(renderer.apply(image, settings))
     for name, values in results[0].items():
