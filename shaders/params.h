@@ -223,7 +223,7 @@
 #define LINE_OUTPUTS           8
 #define LINE_VEC4S             34
 #define STRIP_RADIUS           4
-#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
+#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
 #define STRIP_ROWS             135
 #define HALVE_COLUMNS          4
 #define HALVE_ROWS             16
@@ -251,8 +251,8 @@
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
-// applies the threshold. FIRST marks an engine's first level. LEVELS is the number of levels that a
-// pass adds up.
+// applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
+// first level. LEVELS is the number of levels that a pass adds up.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -276,7 +276,8 @@
     CONSTANT(19, KARIS_AVERAGE, karis_average) \
     CONSTANT(20, NODE, node) \
     CONSTANT(21, ALPHA, alpha) \
-    CONSTANT(22, MASKED, masked)
+    CONSTANT(22, MASKED, masked) \
+    CONSTANT(23, STORED, stored)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -108,8 +108,12 @@ void vkb_graph_destroy(struct vkb_graph *graph);
 // Adds a copy of the row; *index (may be NULL) gets its index.
 bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *row, uint32_t *index,
                          struct vkb_error *error);
+// The copy's constant `stored` is that of its first target.
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error);
+
+// How shaders round what they store to an image of that format: of STORED_*.
+enum vkb_mode vkb_storage_mode(enum vkb_format format);
 
 // Checks all rules for rows, so that only a valid graph reaches Vulkan.
 bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error);

@@ -17,6 +17,7 @@ import vkbloom
 COMMANDS: Final = (
     "render",
     "apply",
+    "view",
     "explore",
     "grid",
     "fit",
