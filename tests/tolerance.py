@@ -95,7 +95,8 @@ def _slope(image: NDArray[Any], settings: Settings) -> Limit:
     if not isinstance(settings, GodotBloom) or settings.composite != "screen":
         return 1.0
     scene = real(image) * 2.0**settings.exposure
-    return np.maximum(1.0, np.abs(1.0 - scene / settings.white))
+    slope: NDArray[np.float64] = np.maximum(1.0, np.abs(1.0 - scene / settings.white))
+    return slope
 
 
 def assert_matches_reference(
