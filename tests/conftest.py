@@ -6,7 +6,9 @@ import ctypes
 import dataclasses
 import gc
 import os
+import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -25,8 +27,8 @@ def pytest_configure(config: pytest.Config) -> None:
     # that.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # A slow machine must not fail a test.
-    hypothesis.settings.register_profile("untimed", deadline=None)
+    # A slow machine must not fail a test. Where more examples find more, a test asks for them.
+    hypothesis.settings.register_profile("untimed", deadline=None, max_examples=30)
     hypothesis.settings.load_profile("untimed")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
 
@@ -117,6 +119,24 @@ def software(environment: None) -> AdapterInfo:
         if adapter.type == "cpu":
             return adapter
     pytest.skip("there is no software adapter here, such as Mesa's lavapipe")
+
+
+@pytest.fixture(scope="session")
+def display(environment: None) -> Iterator[dict[str, str]]:
+    """The environment of processes that open windows: an X server without a screen."""
+    for module in ("glfw", "PIL.ImageGrab"):
+        pytest.importorskip(module)
+    if shutil.which("Xvfb") is None:
+        pytest.skip("Xvfb is not here, whose windows no screen shows (Debian: xvfb)")
+    read, write = os.pipe()
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
+    with subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL) as server:
+        os.close(write)
+        with os.fdopen(read) as pipe:
+            number = pipe.readline().strip()
+        # A bundled driver has no windows.
+        yield {**os.environ, "DISPLAY": f":{number}", "VKBLOOM_DRIVER": "system"}
+        server.terminate()
 
 
 @pytest.fixture(scope="session")

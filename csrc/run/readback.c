@@ -70,6 +70,8 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     output->width = width;
     output->imported = VK_NULL_HANDLE;
     output->stored = false;
+    if (!output->memory)
+        return true;
     const size_t size = row_size(output) * output->row_count;
     const size_t output_size = output_row_size(output) * output->row_count;
     if (output_size >= VKB_IMPORTED_BYTES) {
@@ -115,7 +117,7 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
         .imageExtent = {image->width, output->row_count, 1},
     };
 
-    if (output->stored)
+    if (output->stored || !output->memory)
         return;
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
     device->vk.vkCmdCopyImageToBuffer(
@@ -143,7 +145,7 @@ void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_ou
 {
     const size_t pixels = (size_t)output->width * output->row_count;
 
-    if (output->stored || (output->imported && vkb_readback_is_complete(output)))
+    if (output->stored || !output->memory || (output->imported && vkb_readback_is_complete(output)))
         return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
     if (vkb_readback_is_complete(output)) {

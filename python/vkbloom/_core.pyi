@@ -92,7 +92,7 @@ class Renderer:
         self,
         source: Source,
         plans: tuple[Plan, ...],
-        arrays: tuple[tuple[_Array, ...], ...],
+        arrays: tuple[tuple[_Array | None, ...], ...],
         first: int = ...,
         count: int = ...,
         /,
@@ -101,6 +101,19 @@ class Renderer:
         self, source: Source, spare: Source | None, recycled: bool, height: int = 0, /
     ) -> Source: ...
     def fill(self, source: Source, rows: Source, first: int, /) -> None: ...
+    @property
+    def instance(self) -> int: ...
+    def screen(self, surface: int, mode: str, /) -> Screen: ...
+    def show(
+        self,
+        source: Source,
+        plan: Plan,
+        screen: Screen,
+        width: int,
+        height: int,
+        linear: bool,
+        /,
+    ) -> tuple[Submission, bool]: ...
     def pages(self, size: int, /) -> Pages: ...
 
 class Source:
@@ -120,6 +133,9 @@ class Plan:
 
 class Submission:
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, int]]: ...
+
+class Screen:
+    def close(self) -> None: ...
 
 class Pages:
     def __len__(self) -> int: ...

@@ -681,6 +681,8 @@ class Renderer:
         settings: Settings | None = None,
         axes: Mapping[str, Iterable[Any]] | None = None,
         *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
         size: tuple[int, int] | None = None,
         shading: Shading = "forward",
         time: float = 0.0,
@@ -702,6 +704,8 @@ class Renderer:
             `vkbloom.presets`, the axis "settings" a list of Settings of any methods. These two axes
             exclude each other and the argument `settings`. Other axes change each of their
             settings.
+        mask, emission : ndarray, optional
+            Of all images, as for `apply`.
         size : (int, int), optional
             Width and height of a scene's frames. Default: (1280, 720).
         shading, time
@@ -766,6 +770,8 @@ class Renderer:
             source,
             settings,
             axes,
+            mask=mask,
+            emission=emission,
             size=size,
             shading=shading,
             time=time,

@@ -107,6 +107,28 @@ def handles(renderer: Renderer) -> Arrays:
     return arrays
 
 
+def presented(renderer: Renderer) -> Arrays:
+    """Frames on two surfaces, of which one changes its size and is left to the renderer."""
+    shown = []
+    with vkbloom.Surface(renderer, size=SIZE) as closed:
+        shown += [closed.present(UFO, time=step / 9) for step in range(3)]
+    left = vkbloom.Surface(renderer, size=SIZE)
+    shown += [left.present(UFO, size=(16, 16)) for _ in range(2)]
+    left.size = (32, 16)
+    shown += [left.present(UFO) for _ in range(4)]
+    return {"shown": np.array(shown), "final": renderer.render(UFO, size=SIZE)["final"]}
+
+
+def presents() -> bool:
+    """Return whether there is a surface without a window."""
+    with open_renderer() as renderer:
+        try:
+            vkbloom.Surface(renderer).close()
+        except vkbloom.Error:
+            return False
+    return True
+
+
 def variables(dataset: Any) -> Arrays:
     return {str(name): variable.values for name, variable in dataset.variables.items()}
 
@@ -153,6 +175,7 @@ WORK: dict[str, Work] = {
     "grid to Zarr": grid_to_zarr,
     "readback": readback,
     "handles": handles,
+    "present": presented,
     **{
         f"apply {preset} {variant}": method(settings)
         for preset, settings in vkbloom.presets.items()
@@ -333,6 +356,8 @@ def workloads(stride: int) -> list[str]:
     """Return the names of the workloads that are walked by default."""
     methods = [name for name in WORK if name.startswith("apply ")]
     others = [name for name in WORK if name not in methods]
+    if not presents():
+        others.remove("present")
     # Three for each preset: of the first preset the first, of the next one the second.
     some = [name for i, name in enumerate(methods) if i % 3 == i // 3 % 3]
     return ["create", "close", *others, *(methods if stride == 1 else some)]

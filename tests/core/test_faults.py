@@ -82,7 +82,8 @@ def test_points_of_every_workload(
     expected = names(stride)
     rows = walk(faulty, stride)
     show(rows, capsys)
-    assert set(rows) == set(expected)
+    # Not every driver has a surface without a window.
+    assert set(rows) - {"present"} == set(expected)
     assert sum(row["raised"] for row in rows.values()) > 60
     for name, row in rows.items():
         if stride == 1:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
+from typing import Any
+
 from vkbloom import DualKawase, Pyramid, Separable, Settings, gaussian_weights
 
 DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
@@ -41,3 +45,17 @@ METHODS: dict[str, Settings] = {
 }
 
 DTYPES = ("uint8", "float16", "float32")
+
+
+def by_turns(*columns: Iterable[Any], turns: Iterable[Any]) -> list[tuple[Any, ...]]:
+    """Return the product of the columns; each row ends with one of `turns`.
+
+    Every two values of two columns, or of a column and of `turns`, meet in some row. The product
+    with all turns finds little more, and takes as many times as long as there are turns.
+    """
+    last = list(turns)
+    rows = itertools.product(*(enumerate(column) for column in columns))
+    return [
+        (*(value for _, value in row), last[sum(index for index, _ in row) % len(last)])
+        for row in rows
+    ]

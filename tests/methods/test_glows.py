@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.methods.cases import DTYPES, by_turns
 from vkbloom import (
     BlenderGlare,
     GodotBloom,
@@ -262,8 +263,7 @@ NEW: list[Settings] = [
 ]
 
 
-@pytest.mark.parametrize("settings", NEW)
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+@pytest.mark.parametrize(("settings", "dtype"), by_turns(NEW, turns=DTYPES))
 def test_all_variants_give_the_same(
     settings: Settings, dtype: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, METHODS
+from tests.methods.cases import DTYPES, METHODS, by_turns
 from tests.tolerance import assert_matches_reference, real, tolerance
 from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, gaussian_weights, presets
 from vkbloom.reference import apply as reference_apply
@@ -64,9 +64,7 @@ def varied(variant: str) -> Iterator[Renderer]:
         yield opened
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("method", TWO_PASSES)
+@pytest.mark.parametrize(("method", "size", "dtype"), by_turns(TWO_PASSES, SIZES, turns=DTYPES))
 def test_every_variant_against_the_reference(
     varied: Renderer, method: str, dtype: str, size: tuple[int, int]
 ) -> None:
@@ -81,9 +79,10 @@ def test_presets_in_every_variant(varied: Renderer, name: str) -> None:
     assert_matches_reference(varied.apply(image, presets[name]), image, presets[name])
 
 
-@pytest.mark.parametrize("size", [(1, 1), (61, 97), (520, 48)], ids=str)
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize(
+    ("name", "dtype", "size"),
+    by_turns(WHOLE, DTYPES, turns=[(1, 1), (61, 97), (520, 48)]),
+)
 def test_final_alone_is_the_final_of_all(
     varied: Renderer, name: str, dtype: str, size: tuple[int, int]
 ) -> None:
@@ -109,9 +108,10 @@ def unfused() -> Iterator[Renderer]:
             yield renderer
 
 
-@pytest.mark.parametrize("size", [(256, 160), (61, 97), (1, 1)], ids=str)
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("name", BIT_EQUAL)
+@pytest.mark.parametrize(
+    ("name", "dtype", "size"),
+    by_turns(BIT_EQUAL, DTYPES, turns=[(256, 160), (61, 97), (1, 1)]),
+)
 def test_every_variant_gives_the_same_bits(
     varied: Renderer, unfused: Renderer, name: str, dtype: str, size: tuple[int, int]
 ) -> None:
@@ -125,9 +125,14 @@ def test_every_variant_gives_the_same_bits(
         np.testing.assert_array_equal(frames[framebuffer], expected[framebuffer], framebuffer)
 
 
-@pytest.mark.parametrize("size", [(256, 160), (61, 97), (33, 5), (1, 1)], ids=str)
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("name", ["tutorial", "threshold", "outline", "pyramid", "long"])
+@pytest.mark.parametrize(
+    ("name", "size", "dtype"),
+    by_turns(
+        ["tutorial", "threshold", "outline", "pyramid", "long"],
+        [(256, 160), (61, 97), (33, 5), (1, 1)],
+        turns=DTYPES,
+    ),
+)
 def test_three_channels_have_the_bits_of_four(
     varied: Renderer, unfused: Renderer, name: str, dtype: str, size: tuple[int, int]
 ) -> None:
