@@ -147,6 +147,49 @@
     COMPOSITE_ROWS(B, READS, INPUT) \
     READS(B, white)
 
+// A Fourier transform along one axis (fft.comp). All of it is parameters, so that every transform
+// is one pipeline: lavapipe takes seconds to compile one. The axis; whether it is the way back;
+// what is read (FFT_LOAD_*), from beyond which boundary, whether by one grey kernel; whether a part
+// is rotated before the other one, and whether the result is a bloom; whether the lines of a
+// workgroup are parts of one line. The lines of a workgroup, their length and the radices of its
+// stages. Where they lie: elements are `element_step` apart, the first ones of two parts of a line
+// `part_step`, and lines have `padded` elements; there are `across` lines. What the first pass
+// reads: `extent` texels along the axis; the place from which on the line goes on before its first
+// texel (`turn`); of a kernel its centre, the offsets that count and the period; the lengths of
+// both axes' parts, by which it finds the frequency of the other sign.
+#define FFT_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, horizontal) \
+    INPUT(B, int, inverse) \
+    INPUT(B, int, reads) \
+    INPUT(B, int, boundary) \
+    INPUT(B, int, grey) \
+    INPUT(B, int, rotates) \
+    INPUT(B, int, stores) \
+    INPUT(B, int, parts_together) \
+    INPUT(B, int, elements) \
+    INPUT(B, int, lines) \
+    INPUT(B, int, radices) \
+    INPUT(B, int, stages) \
+    INPUT(B, int, padded) \
+    INPUT(B, int, across) \
+    INPUT(B, int, part_step) \
+    INPUT(B, int, element_step) \
+    INPUT(B, int, extent) \
+    INPUT(B, int, turn) \
+    INPUT(B, int, centre) \
+    INPUT(B, int, period) \
+    INPUT(B, int, reach_before) \
+    INPUT(B, int, reach_after) \
+    INPUT(B, int, long_x) \
+    INPUT(B, int, short_x) \
+    INPUT(B, int, long_y) \
+    INPUT(B, int, short_y) \
+    INPUT(B, float, gain) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, prefilter_min) \
+    INPUT(B, float, prefilter_max) \
+    INPUT(B, float, prefilter_factor)
+
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
     BLOCK(threshold, THRESHOLD_BLOCK) \
@@ -158,6 +201,7 @@
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
+    BLOCK(fft, FFT_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
@@ -238,6 +282,14 @@
 #define TILE_RADIUS       16
 #define FUSED_VEC4S       5
 
+// Of a Fourier transform: the invocations of a workgroup, the elements that its shared memory
+// holds, which every device has, and the most lines that it takes. Brighter values than FFT_LIMIT
+// would overflow in sums.
+#define FFT_INVOCATIONS 128
+#define FFT_ELEMENTS    2048
+#define FFT_MOST_LINES  16
+#define FFT_LIMIT       1e28
+
 // The most levels that one pass gathers, and the most of a chain.
 #define GATHERED_LEVELS 7
 #define MAX_LEVELS      16
@@ -302,12 +354,19 @@
     NAME(TEXEL_OWN, 0, own) \
     NAME(TEXEL_X, 1, x)
 
+#define BOUNDARY_NAMES(NAME) \
+    NAME(BOUNDARY_ZERO, 0, zero) \
+    NAME(BOUNDARY_EDGE, 1, edge) \
+    NAME(BOUNDARY_WRAP, 2, wrap) \
+    NAME(BOUNDARY_WRAP_X, 3, wrap_x)
+
 #define CHOICES(CHOICE) \
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
     CHOICE(encoding, ENCODING_NAMES) \
     CHOICE(alpha, ALPHA_NAMES) \
-    CHOICE(texel, TEXEL_NAMES)
+    CHOICE(texel, TEXEL_NAMES) \
+    CHOICE(boundary, BOUNDARY_NAMES)
 
 // Modes that the core chooses, named in both languages.
 #define MODE_NAMES(NAME) \
@@ -332,4 +391,9 @@
     NAME(UPSAMPLE_LINEAR, 1, linear) \
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
-    NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic)
+    NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
+    NAME(FFT_LOAD_PART, 0, part) \
+    NAME(FFT_LOAD_GLOW, 1, glow) \
+    NAME(FFT_LOAD_SPECTRUM, 2, spectrum) \
+    NAME(FFT_LOAD_KERNEL, 3, kernel) \
+    NAME(FFT_LOAD_PRODUCT, 4, product)

@@ -51,6 +51,8 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     PACK(fused);
     PACK(block_width);
     PACK(block_height);
+    PACK(groups_width);
+    PACK(groups_height);
     PACK(targets);
     PACK(target_count);
     PACK(depth);
@@ -68,7 +70,7 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
     for (uint32_t i = 0; i < a->image_count; ++i) {
         const struct vkb_image_row *x = &a->images[i], *y = &b->images[i];
         if (x->format != y->format || x->width != y->width || x->height != y->height
-            || strcmp(x->name, y->name) != 0)
+            || x->serial != y->serial || strcmp(x->name, y->name) != 0)
             return false;
     }
     return true;
@@ -191,13 +193,13 @@ uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
     return row->channels ? row->channels : vkb_formats[row->format].channels;
 }
 
-// Whether the image is an input, or written before pass `pass_index`.
+// Whether the image is given, or written before pass `pass_index`.
 static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
 {
     for (uint32_t i = 0; i < pass_index; ++i)
         if (vkb_pass_writes(&graph->passes[i], image))
             return true;
-    return graph->images[image].input != VKB_INPUT_NONE;
+    return vkb_is_given(&graph->images[image]);
 }
 
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,

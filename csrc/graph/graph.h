@@ -28,8 +28,8 @@ enum vkb_input_kind {
     VKB_INPUT_COUNT,
 };
 
-// An image is either an input, or written by one sequence of consecutive passes. So its content
-// stays valid until this sequence is out of date.
+// An image is either given by the host, or written by one sequence of consecutive passes. So its
+// content stays valid until this sequence is out of date.
 struct vkb_image_row {
     char name[VKB_NAME_SIZE];
     enum vkb_format format;
@@ -37,7 +37,16 @@ struct vkb_image_row {
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
     enum vkb_input_kind input;
+    // Filled by the host once: the pixels, without gaps, and their number; 0: it is not.
+    const void *pixels;
+    uint64_t serial;
 };
+
+// Whether the host fills the image, not a pass.
+static inline bool vkb_is_given(const struct vkb_image_row *row)
+{
+    return row->input || row->serial;
+}
 
 // What a pass draws; depth test and culling are derived from it. A dispatch draws nothing: its
 // compute shader writes one target, and each workgroup writes one block of pixels.
@@ -76,7 +85,8 @@ struct vkb_pass_row {
     uint32_t read_count;
     bool loads;  // a dispatch that reads storage images instead of sampled ones
     bool fused;  // a fused pass: may replace the pass before it, with the same target
-    uint32_t block_width, block_height;  // of a dispatch: pixels of a workgroup
+    uint32_t block_width, block_height;    // of a dispatch: pixels of a workgroup
+    uint32_t groups_width, groups_height;  // number of workgroups; 0: what covers the target
     uint32_t targets[VKB_MAX_TARGETS];
     uint32_t target_count;
     uint32_t depth;  // VKB_NO_IMAGE: none

@@ -68,12 +68,12 @@ static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step
     return true;
 }
 
-// Whether the image exists and holds the result of a current pass before `end`, or is the input.
+// Whether the image exists and holds the result of a current pass before `end`, or is given.
 static bool is_current(const struct vkb_planner *planner, const struct vkb_plan_step *step,
                        uint32_t image, uint32_t end)
 {
     const struct vkb_graph *graph = &step->plan->graph;
-    bool current = graph->images[image].input != VKB_INPUT_NONE;
+    bool current = vkb_is_given(&graph->images[image]);
 
     for (uint32_t i = 0; i < end; ++i)
         current = current || (planner->current[i] && vkb_pass_writes(&graph->passes[i], image));

@@ -143,6 +143,17 @@ bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *im
 bool vkb_read_mask(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
 
+// The kernel of a convolution, held until vkb_release_kernel, which may be called on a zeroed one.
+struct vkb_held_kernel {
+    Py_buffer view;
+    bool held;
+};
+
+// Asks a convolution's settings for the kernel of these sizes.
+bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                     struct vkb_held_kernel *held, struct vkb_kernel_data *kernel);
+void vkb_release_kernel(struct vkb_held_kernel *held);
+
 struct vkb_source_object {
     PyObject_HEAD
     struct vkb_source source;
@@ -156,6 +167,7 @@ struct vkb_plan_object {
     struct vkb_plan plan;
     uint64_t renderer;  // whose plan it is; 0: nobody's, to be looked at
     PyObject *outputs;  // ((name, shape, dtype), ...)
+    struct vkb_held_kernel kernel;
 };
 
 // Bytes of an output in the caller's array.

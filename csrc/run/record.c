@@ -151,10 +151,12 @@ static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
 
+    const uint32_t columns = (target->width + pass->block_width - 1) / pass->block_width;
+    const uint32_t rows = (target->height + pass->block_height - 1) / pass->block_height;
+
     run->device->vk.vkCmdDispatch(run->submission->commands.buffer,
-                                  (target->width + pass->block_width - 1) / pass->block_width,
-                                  (target->height + pass->block_height - 1) / pass->block_height,
-                                  1);
+                                  pass->groups_width ? pass->groups_width : columns,
+                                  pass->groups_height ? pass->groups_height : rows, 1);
 }
 
 static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceSize params,

@@ -15,6 +15,7 @@ struct vkb_run {
     struct vkb_content **contents;                     // of the cache
     struct vkb_cached_image *inputs[VKB_INPUT_COUNT];  // by kind; NULL: none
     bool send_input[VKB_INPUT_COUNT];                  // the device does not have it yet
+    struct vkb_cached_image *constant;  // to be filled by this submission; NULL: none
 };
 
 // What a planner calls for each group of passes that has to run; `run` is a struct vkb_run.
