@@ -78,8 +78,7 @@ static bool add_placing(const struct convolution *convolution, uint32_t kernel, 
                         struct vkb_error *error)
 {
     const struct vkb_fft_axis *x = &convolution->x, *y = &convolution->y;
-    struct vkb_pass_row row =
-        vkb_fullscreen_row("kernel", VKB_SHADER_fft_kernel_comp, spectrum);
+    struct vkb_pass_row row = vkb_fullscreen_row("kernel", VKB_SHADER_fft_kernel_comp, spectrum);
     struct vkb_fft_kernel_params *params = &row.params.fft_kernel;
 
     row.geometry = VKB_GEOMETRY_DISPATCH;
@@ -186,8 +185,8 @@ static bool add_columns(const struct convolution *convolution, uint32_t rows, ui
         stage.from = columns;
     }
     struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
-    vkb_fft_multiply(&convolution->x, &convolution->y, spectrum,
-                     convolution->settings->kernel.grey, &row);
+    vkb_fft_multiply(&convolution->x, &convolution->y, spectrum, convolution->settings->kernel.grey,
+                     &row);
     if (!vkb_graph_add_pass(convolution->graph, &row, error))
         return false;
     stage.inverse = true;
@@ -243,12 +242,12 @@ bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_b
     const enum vkb_format single = VKB_FORMAT_RGBA32_FLOAT;
     uint32_t kernel, spectrum, rows, columns, target;
 
-    convolution.x = make_axis(DIRECTION_HORIZONTAL,
-                              wrap_x ? BOUNDARY_WRAP : (enum vkb_boundary)boundary, size.width,
-                              &convolution.reach_x);
-    convolution.y = make_axis(DIRECTION_VERTICAL,
-                              wrap_x ? BOUNDARY_EDGE : (enum vkb_boundary)boundary, size.height,
-                              &convolution.reach_y);
+    convolution.x =
+        make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : (enum vkb_boundary)boundary,
+                  size.width, &convolution.reach_x);
+    convolution.y =
+        make_axis(DIRECTION_VERTICAL, wrap_x ? BOUNDARY_EDGE : (enum vkb_boundary)boundary,
+                  size.height, &convolution.reach_y);
     const struct vkb_size padded = {convolution.x.line.length, convolution.y.line.length};
     const struct vkb_size lines = {padded.width, size.height};
     if (!add_kernel(&settings->kernel, graph, &kernel, error)

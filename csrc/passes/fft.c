@@ -25,8 +25,16 @@ static bool is_smooth(uint32_t length)
     return length == 1;
 }
 
-// Splits the length into the fewest stages, the longest first, whose radices have the least sum:
-// registers for many elements are slow.
+// The largest radix for a length. Compilers take long for large ones (lavapipe 0.8 seconds for 64,
+// 0.3 for 32), so that they are used where they save a stage of a long line. Short lines share the
+// pipelines of a few small radices.
+static uint32_t most_radix(uint32_t length)
+{
+    return length <= 64 ? 8 : length <= 1024 || length > 4096 ? 32 : FFT_MOST_RADIX;
+}
+
+// Splits the length into so many stages, the longest first, whose radices have the least sum:
+// registers for many elements are slow. `first` is the index of the largest radix.
 static bool split(uint32_t length, uint32_t first, uint32_t stages, uint32_t *found)
 {
     uint32_t least = UINT32_MAX, rest[VKB_FFT_STAGES];
@@ -56,9 +64,12 @@ struct vkb_fft_line vkb_fft_line(uint32_t least)
     // A power of two is among these.
     for (uint32_t length = least; length <= 2 * least; ++length) {
         struct vkb_fft_line line = {.length = length, .radices = {1, 1, 1, 1}};
+        uint32_t first = 0;
         bool found = false;
+        while (radix_of(first) > most_radix(length))
+            ++first;
         while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES)
-            found = split(length, 0, ++line.stage_count, line.radices);
+            found = split(length, first, ++line.stage_count, line.radices);
         // Each stage loads and stores all elements.
         const uint64_t cost = (uint64_t)length * (line.stage_count + 1);
         if (found && cost < best_cost) {
@@ -92,8 +103,8 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     const uint32_t radix = axis->line.radices[stage->number];
     const uint32_t count = axis->line.length / radix;
     const struct vkb_image_row *target = &graph->images[stage->to];
-    struct vkb_pass_row row = vkb_fullscreen_row(
-        stage->name, shaders[graph->images[stage->from].format], stage->to);
+    struct vkb_pass_row row =
+        vkb_fullscreen_row(stage->name, shaders[graph->images[stage->from].format], stage->to);
     struct vkb_fft_params *params = &row.params.fft;
 
     row.geometry = VKB_GEOMETRY_DISPATCH;

@@ -228,9 +228,9 @@ static void record_constant(struct vkb_run *run)
 
     vkb_image_transition(run->device, run->submission->commands.buffer, image,
                          VKB_ACCESS_COPY_TARGET);
-    run->device->vk.vkCmdCopyBufferToImage(run->submission->commands.buffer,
-                                           run->frame->constants.handle, image->handle,
-                                           vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1, &copy);
+    run->device->vk.vkCmdCopyBufferToImage(
+        run->submission->commands.buffer, run->frame->constants.handle, image->handle,
+        vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1, &copy);
     run->constant->content.valid = true;
 }
 

@@ -16,7 +16,7 @@ struct vkb_run {
     struct vkb_cached_image *inputs[VKB_INPUT_COUNT];   // by kind; NULL: none
     const struct vkb_upload *uploads[VKB_INPUT_COUNT];  // that their pixels come from
     bool send_input[VKB_INPUT_COUNT];                   // the device does not have it yet
-    struct vkb_cached_image *constant;                  // to be filled by this submission; NULL: none
+    struct vkb_cached_image *constant;  // to be filled by this submission; NULL: none
 };
 
 // The most descriptor sets that the graph's passes take, without those of surfaces.

@@ -167,8 +167,7 @@ static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb
 }
 
 static const enum vkb_shader fft_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft);
-static const enum vkb_shader fft_stored_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(fft_stored);
+static const enum vkb_shader fft_stored_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft_stored);
 
 // A storage buffer must reach the complete target: an invocation stores to places far apart.
 static bool reaches(const struct vkb_device *device, const struct vkb_image_row *row)
@@ -191,7 +190,7 @@ static bool add_transform(const struct vkb_variant_choice *choice, const struct 
     memcpy(&row, pass, sizeof row);
     row.reading = VKB_READING_WORDS;
     row.shader = pass->constants.stage == STAGE_LAST ? fft_stored_shaders[target->format]
-                                      : fft_shaders[from->format];
+                                                     : fft_shaders[from->format];
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
