@@ -66,7 +66,8 @@ format: build/stamp/lint
 # Tests of the core with ASan, UBSan and LeakSanitizer; beside them, threads with ThreadSanitizer.
 sanitize: build/stamp/core build/stamp/test
 	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10 & threads=$$!; \
-	    PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh; tests=$$?; wait $$threads && exit $$tests
+	    PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh; tests=$$?; \
+	    wait $$threads || { echo "tools/threads/run.sh failed: see above"; exit 1; }; exit $$tests
 
 clean:
 	rm -rf build out docs/api docs/examples $(VENV) python/vkbloom/_core*.so

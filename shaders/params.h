@@ -2,15 +2,15 @@
 //
 // SETTING_ROWS, COUNT_ROWS and REAL_ROWS are the numbers that a user sets: C makes struct
 // vkb_values of them and the table of names, defaults and ranges that Python builds its settings
-// from (csrc/graph/params.c). Each pass has a block of parameters: GLSL expands its rows into a
-// std140 uniform block (block.glsl), C into the matching struct. A row names its block B and is one
-// of
+// from (csrc/graph/params.c). Each pass has a block of parameters. GLSL expands its rows into a
+// std140 uniform block (block.glsl), C into the matching struct. A row names its block B and is
+// one of
 //
-//   READS(B, name)         a setting of SETTING_ROWS, which the pass is out of date without
+//   READS(B, name)         a setting of SETTING_ROWS; when it changes, the pass is out of date
 //   INPUT(B, type, name)   a float or int that the core fills in for each pass
 //   VEC4S(B, name, count)  an array of vec4 that the core fills in for each pass
 //
-// A block of a fused pass has the rows of the passes that it stands for.
+// The block of a fused pass has the rows of the passes that it replaces.
 
 // The settings that shaders read, and `radius`: floats, SETTING(name, default, min, max).
 #define SETTING_ROWS(SETTING) \
@@ -31,14 +31,14 @@
     SETTING(intensity, 1.0, 0.0, 65504.0) \
     SETTING(exposure, 0.0, -32.0, 32.0)
 
-// Of a pass that reads an image of another size: the size of its own target, and the largest value
-// that the target's format holds.
+// For a pass that reads an image of another size: the size of its target, and the largest value of
+// the target's format.
 #define SAMPLING_ROWS(B, INPUT) \
     INPUT(B, int, target_width) \
     INPUT(B, int, target_height) \
     INPUT(B, float, limit)
 
-// Of a pass with a threshold, and of one that makes the finished picture.
+// For passes with a threshold, and for passes that write the finished picture.
 #define THRESHOLD_ROWS(B, READS) \
     READS(B, threshold) \
     READS(B, knee)
@@ -48,8 +48,8 @@
     INPUT(B, float, limit) \
     INPUT(B, int, noise_seed)
 
-// The matrices of a mesh or skybox draw, and the largest value that the colour targets hold; the
-// glow mesh's colours, times their intensity, pass the threshold.
+// The matrices of a mesh or skybox draw, and the largest value of the colour targets. The glow
+// mesh's colours are multiplied by the intensity before the threshold.
 #define MESH_BLOCK(B, READS, INPUT, VEC4S) \
     VEC4S(B, projection, 4) \
     VEC4S(B, view, 4) \
@@ -58,8 +58,8 @@
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, READS)
 
-// A blur pass: the distances of its taps in texels of the source, and the half-kernel w0.. of what
-// a texel at each tap counts, four to a vec4. `gain` is of a blur in both directions.
+// A blur pass: the distances of its taps in texels of the source, and its half-kernel w0.., four
+// weights in a vec4. `gain` is for a blur in both directions.
 #define BLUR_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
@@ -67,17 +67,16 @@
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, weights, BLUR_VEC4S)
 
-// The same blur where the source's pixels are the target's: one symmetric kernel on integer texels,
-// from the first tap to the last, then zeros. `origin` is the place of the target's first pixel
-// along the line, in the source's.
+// The same blur on integer texels: a symmetric kernel from the first tap to the last, then zeros.
+// `origin` is the position of the target's first pixel in the source, along the line.
 #define LINE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, radius) \
     INPUT(B, int, origin) \
     INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 
-// The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as
-// above.
+// The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as in
+// LINE_BLOCK.
 #define FUSED_BLOOM_BLOCK(B, READS, INPUT, VEC4S) \
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
@@ -86,15 +85,15 @@
     VEC4S(B, vertical, FUSED_VEC4S) \
     VEC4S(B, horizontal, FUSED_VEC4S)
 
-// The reduction of an image to the bloom buffer, with the threshold.
+// The threshold pass, which also reduces an image to the size of the bloom buffers.
 #define THRESHOLD_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
-// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the one below,
-// the steps the distance of the taps in texels of the image that is read. `taps` are the same
-// weights on integer texels, where a level is exactly twice as large as the one below; the
-// threshold is of a first level that starts from the image itself.
+// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the smaller
+// one. The steps are the distances of the taps in texels of the image that is read. If a level is
+// exactly twice as large as the smaller one, `taps` has the same weights on integer texels. The
+// threshold is for a first level that reads the image itself.
 #define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, own) \
@@ -104,14 +103,14 @@
     THRESHOLD_ROWS(B, READS) \
     VEC4S(B, taps, 1)
 
-// The end of a pyramid together with the composite.
+// The last upsampling of a pyramid, fused with the composite.
 #define DOUBLE_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, coarse) \
     COMPOSITE_ROWS(B, READS, INPUT) \
     VEC4S(B, taps, 1)
 
-// The first pass of a published method, from the frame. The steps are the distance of taps in
-// texels of the frame.
+// The first pass of a published method, which reads the frame. The steps are the distances of its
+// taps in texels of the frame.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, step_x) \
@@ -128,7 +127,7 @@
     READS(B, maximum) \
     INPUT(B, float, exposure)
 
-// Levels of several sizes into one image, with their weights.
+// A pass that adds up levels of several sizes, and their weights.
 #define GATHER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, shares, 2)
@@ -149,9 +148,10 @@
 
 // A stage of a Fourier transform along one axis (fft.comp): `count` butterflies in each of `across`
 // lines of `padded` elements; the elements of a butterfly are `step` apart, and those before `kept`
-// are stored. Where it pads: `extent` texels are there, and from the place `turn` on the line goes on
-// before the first of them. With a product with colours: the radices of rows, of so many elements,
-// and those of columns without the last one, by which it finds the frequency of the other sign.
+// are stored. Where it pads: `extent` texels are there, and from the place `turn` on the line goes
+// on before the first of them. With a product with colours: the radices of rows, of so many
+// elements, and those of columns without the last one, by which it finds the frequency of the other
+// sign.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -174,8 +174,8 @@
     INPUT(B, float, prefilter_max) \
     INPUT(B, float, prefilter_factor)
 
-// The kernel at its places in the padded lines (fft_kernel.comp): for each axis the kernel's extent,
-// the offsets that count, and the period; `grey` if all channels are equal.
+// The kernel at its places in the padded lines (fft_kernel.comp): for each axis the kernel's
+// extent, the offsets that count, and the period; `grey` if all channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -209,8 +209,8 @@
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
-// Settings that no shader reads, for they shape the graph.
-// Integers: COUNT(name, default, min, max); a flag is one of 0 and 1.
+// Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,
+// max); a flag is one of 0 and 1.
 #define COUNT_ROWS(COUNT) \
     COUNT(bloom, 1, 0, 1) \
     COUNT(dither, 0, 0, 1) \
@@ -229,7 +229,7 @@
     COUNT(bicubic, 1, 0, 1) \
     COUNT(karis_average, 0, 0, 1)
 
-// Real numbers, in double so that sizes come out as they do in Python.
+// Real numbers. They are doubles, so that sizes are computed as in Python.
 #define REAL_ROWS(REAL) \
     REAL(blur_scale, 1.0, 0.0, 16.0) \
     REAL(blur_strength, 1.5, 0.0, 16.0) \
@@ -259,13 +259,13 @@
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
 
-// Invocations of a workgroup: in a row, of shaders that write several pixels each; a side, of those
-// that write one.
+// Invocations of a workgroup: in a row, for shaders in which each invocation writes several pixels;
+// on each side, for shaders in which it writes one.
 #define ROW_INVOCATIONS   8
 #define PIXEL_INVOCATIONS 8
 
-// Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line, and of a fused
-// bloom. Up to LINE_SHORT_RADIUS a line is compiled for its radius.
+// Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line and of a fused bloom.
+// A line up to LINE_SHORT_RADIUS is compiled for its radius.
 #define LINE_RADIUS            64
 #define LINE_SHORT_RADIUS      8
 #define LINE_OUTPUTS           8
@@ -277,7 +277,8 @@
 #define HALVE_ROWS             16
 #define DOUBLE_COLUMNS         4
 #define DOUBLE_ROWS            32
-// Blocks of words, which pixels of three channels fill, too. CHANNEL is the bytes of a channel.
+// Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
+// channel in bytes.
 #define HALVE_WORDS_COLUMNS           8
 #define HALVE_WORDS_ROWS              32
 #define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
@@ -295,18 +296,18 @@
 #define FFT_COLUMNS    8
 #define FFT_ROWS       8
 #define FFT_MOST_RADIX 64
-#define FFT_LIMIT       1e28
+#define FFT_LIMIT      1e28
 
-// The most levels that one pass gathers, and the most of a chain.
+// The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
 #define MAX_LEVELS      16
 
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
-// int, and 0 where a pass does not set it. SAMPLING is of the taps, FORMAT of what a pass keeps as
-// an image of that format would (STORED_*); RADIUS is 0 in a line whose kernel is too long for
-// loops that a compiler can unroll; with FROM_IMAGE, halving reads the image itself and applies the
-// threshold. FIRST is of an engine's first level, LEVELS the number that a pass gathers. RADIX_A to
-// STAGE are of Fourier transforms (fft.comp).
+// int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
+// that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
+// to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
+// applies the threshold. FIRST marks an engine's first level. LEVELS is the number of levels that a
+// pass adds up. RADIX_A to STAGE are of Fourier transforms (fft.comp).
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -338,7 +339,7 @@
     CONSTANT(27, PADDED, padded) \
     CONSTANT(28, STAGE, stage)
 
-// Names that a setting can take; each list is a setting and a specialization constant.
+// The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
     NAME(COMPOSITE_ADD, 0, add) \
     NAME(COMPOSITE_MIX, 1, mix) \
@@ -382,7 +383,7 @@
     CHOICE(texel, TEXEL_NAMES) \
     CHOICE(boundary, BOUNDARY_NAMES)
 
-// Modes that the core chooses, named in both languages.
+// Modes that the core chooses, with the same names in C and GLSL.
 #define MODE_NAMES(NAME) \
     NAME(COMPOSITE_OFF, -1, off) \
     NAME(THRESHOLD_NONE, 0, none) \

@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-// The share of the smaller level in level - 1; of level 0, in the frame.
+// The share of `level` in the next larger level; of level 0 in the frame.
 static double blend_factor(const struct vkb_settings *settings, uint32_t level, uint32_t count)
 {
     const struct vkb_values *values = &settings->values;
@@ -31,7 +31,7 @@ static void choose_sizes(struct vkb_levels *levels)
         levels->sizes[levels->count++] = size;
 }
 
-// The first level, from the frame.
+// The pass from the frame to the first level.
 static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t from)
 {
     struct vkb_pass_row row =
@@ -49,7 +49,7 @@ static struct vkb_pass_row further_row(const struct vkb_levels *levels, uint32_t
     struct vkb_pass_row row = vkb_down_row(levels, false, from, to);
 
     if (values->scale_x != 1.0 || values->scale_y != 1.0) {
-        // The taps no longer lie in the middle between texels.
+        // With these sizes the taps are not in the middle between texels.
         row.constants.sampling = SAMPLING_FETCH;
         row.params.pyramid.step_x = (float)values->scale_x;
         row.params.pyramid.step_y = (float)values->scale_y;

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-// As many levels as halve the glare's share of the shorter side, one at least.
+// The number of halvings of the glare's share of the shorter side; at least 1.
 static uint32_t level_count(const struct vkb_settings *settings, struct vkb_size frame)
 {
     const uint32_t shorter = frame.width < frame.height ? frame.width : frame.height;

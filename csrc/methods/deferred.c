@@ -1,5 +1,5 @@
-// The deferred HDR system: surfaces into a G-buffer, what they emit blurred, light from the
-// G-buffer.
+// The deferred HDR system: draws surfaces into a G-buffer, blurs their emission, and shades from
+// the G-buffer.
 #include "methods/methods.h"
 
 #include <float.h>
@@ -31,7 +31,7 @@ static bool add_images(struct vkb_size size, struct vkb_graph *graph, struct gbu
                           error);
 }
 
-// Makes all of the G-buffer the row's targets.
+// Sets all images of the G-buffer as targets of the row.
 static void set_targets(const struct gbuffer *gbuffer, struct vkb_pass_row *row)
 {
     for (int i = 0; i < GBUFFER_COLOURS; ++i)
@@ -40,9 +40,8 @@ static void set_targets(const struct gbuffer *gbuffer, struct vkb_pass_row *row)
     row->depth = gbuffer->depth;
 }
 
-// `glow` (VKB_NO_IMAGE: none) is the glow mesh alone, as in the forward system. It is drawn before
-// the G-buffer and not into it, for a glow mesh repeats the surfaces of the body: tested against
-// the body's depth, the two would flicker.
+// `glow` (VKB_NO_IMAGE: none) gets only the glow mesh, as in the forward system. It has its own
+// depth: a glow mesh repeats surfaces of the body, which would flicker in a common depth buffer.
 static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_mesh_params *params,
                         uint32_t glow, struct gbuffer *gbuffer, struct vkb_graph *graph,
                         struct vkb_error *error)

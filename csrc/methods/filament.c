@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-// Sides of level 0 are multiples of this.
+// The sides of level 0 are multiples of this.
 enum { FILAMENT_STEP = 16 };
 
 static uint32_t stepped(double side)
@@ -28,8 +28,8 @@ static void choose_sizes(struct vkb_levels *levels)
         levels->sizes[levels->count++] = size;
 }
 
-// A 3 x 3 binomial of `from` at the target's pixels; the first one of a frame has the threshold and
-// the mask.
+// A 3 x 3 binomial filter of `from` at the target's pixels. The first one of a frame applies the
+// threshold and the mask.
 static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32_t to,
                           struct vkb_error *error)
 {
@@ -43,7 +43,8 @@ static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
-// Halves the frame until level 0 is more than half of it; *image is what level 0 reads.
+// Halves the frame until level 0 is larger than half of the result. *image is the image that level
+// 0 reads.
 static bool add_halvings(const struct vkb_levels *levels, uint32_t *image, struct vkb_error *error)
 {
     const struct vkb_size least = levels->sizes[0];

@@ -1,8 +1,9 @@
-// The forward system: the glow mesh into a buffer of its own, blurred, added to the lit scene.
+// The forward system: draws the glow mesh into its own buffer, blurs it, and adds it to the lit
+// scene.
 #include "methods/methods.h"
 
-// The bloom buffers of the forward system, whatever the frame's size. Published methods have rules
-// of their own, which start from the frame.
+// The bloom buffers of the forward system have this size for every frame size. Published methods
+// derive the sizes from the frame.
 static const struct vkb_size FORWARD_BUFFERS = {256, 256};
 
 struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct vkb_size frame)
@@ -49,7 +50,7 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
             .format = settings->format ? settings->format : VKB_FORMAT_RGBA8_UNORM,
         };
         struct vkb_mesh_params lamp = params;
-        // 8 bits have no room for radiance: the intensity is the deferred system's.
+        // The intensity applies to the deferred system only: 8 bits cannot hold radiance.
         lamp.glow_intensity = 1.0f;
         if (!vkb_add_glow(settings, source, &lamp, vkb_end_format(settings, glow.format),
                           glow.buffers, true, vkb_threshold_mode(settings), graph, &glow.glow,

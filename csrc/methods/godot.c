@@ -5,7 +5,7 @@
 
 #include <stdio.h>
 
-// Weights up to this one count as none.
+// Levels with a weight up to this one are left out.
 static const float LEAST_WEIGHT = 1e-4f;
 
 static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
@@ -21,8 +21,8 @@ static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, b
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
-// What is between the blurs is no buffer of the engine's, and the threshold magnifies what it would
-// be rounded by: single floats in any case.
+// Always single floats: the engine stores nothing between the blurs, and the threshold would
+// magnify a rounding error.
 static bool add_step(const struct vkb_levels *levels, uint32_t level, uint32_t *image,
                      struct vkb_error *error)
 {

@@ -1,5 +1,6 @@
-// An image from the host: reduced to the bloom buffers, past the threshold, blurred, added to
-// itself. An emission takes its place up to the blur.
+// The graph of an image from the host: it is reduced to the size of the bloom buffers, thresholded
+// and blurred, and the result is added to it. If there is an emission, the bloom is made from that
+// instead.
 #include "methods/methods.h"
 
 #include <stdio.h>

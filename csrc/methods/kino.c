@@ -5,8 +5,8 @@
 
 #include <math.h>
 
-// The number of levels and the tent's step both follow from the frame's height and the radius, so
-// that a blur is as wide in a small frame as in a large one.
+// Sets the sizes of the levels, and returns the step of the tent filter. Both depend on the frame's
+// height and the radius, so that the blur covers the same part of small and large frames.
 static double choose_sizes(struct vkb_levels *levels)
 {
     const double radius = levels->settings->values.radius;

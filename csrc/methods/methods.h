@@ -1,4 +1,4 @@
-// Builds graphs as rows: for a source (a scene or an image) and a method that blurs its glow.
+// Builds the graph of a source (a scene or an image) and a method that blurs its glow.
 #ifndef VKB_METHODS_H
 #define VKB_METHODS_H
 
@@ -6,8 +6,7 @@
 #include "passes/scene.h"
 #include "passes/threshold.h"
 
-// An image from the host, with an emission of its size and format and a mask of its size, or
-// without.
+// An image from the host. An emission has its size and format, a mask its size; both are optional.
 struct vkb_image_source {
     enum vkb_format format;
     struct vkb_size size;

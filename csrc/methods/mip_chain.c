@@ -1,5 +1,5 @@
-// The contract's own chains: the pyramid, which adds each level on the way up, and dual Kawase,
-// which does not.
+// This package's own chains of levels: the pyramid, which adds each level while it upsamples, and
+// dual Kawase, which does not.
 #include "methods/methods.h"
 #include "passes/levels.h"
 

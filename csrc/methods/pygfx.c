@@ -3,7 +3,7 @@
 #include "methods/methods.h"
 #include "passes/levels.h"
 
-// A level for each halving of the longer side to 1, that of level 0 counted.
+// The number of levels until the longer side is 1, including level 0.
 static uint32_t most_levels(struct vkb_size first)
 {
     uint32_t longer = first.width > first.height ? first.width : first.height, count = 0;

@@ -1,12 +1,12 @@
-// The separable blur: loops of a vertical and a horizontal pass, in layers that are added; or the
-// same kernel as one N x N pass.
+// The separable blur: layers that are added, each of them loops of a vertical and a horizontal
+// pass; or the same kernel as one N x N pass.
 #include "methods/methods.h"
 #include "passes/blur.h"
 
 #include <stdio.h>
 
-// Taps between texels: the sampler's filter is good enough for 8 bits; float formats are filtered
-// by hand, for the filters of some adapters keep 8 bits of the position.
+// Taps between texels use the sampler's filter in 8 bits. Float formats are filtered in the shader,
+// since the samplers of some adapters keep only 8 bits of the position.
 static struct vkb_pass_row blur_row(const struct vkb_settings *settings,
                                     const struct vkb_bloom_source *source, const char *name,
                                     enum vkb_mode direction, uint32_t layer, double strength,
@@ -14,10 +14,10 @@ static struct vkb_pass_row blur_row(const struct vkb_settings *settings,
 {
     const struct vkb_image_row *read = &graph->images[from];
     const double scale = settings->values.blur_scale * settings->layers[layer].scale;
-    // In texels of the height, one texel of the width is height / width.
+    // A step of one texel in x is height / width texels in y.
     const bool width_steps = settings->choices[VKB_CHOICE_texel] == TEXEL_X;
-    // The strength does not touch the centre, unless the taps start at 0, which adds it twice more
-    // (the outline's loop).
+    // The strength does not change the centre tap. If the taps start at 0, the centre is added
+    // twice more, with the strength (as in the loop of the forward system's outline).
     const double side = settings->values.blur_strength;
     const double centre = settings->values.first_tap ? 1.0 : 1.0 + 2.0 * side;
     struct vkb_blur blur = {
@@ -34,7 +34,7 @@ static struct vkb_pass_row blur_row(const struct vkb_settings *settings,
     return vkb_blur_row(graph, name, &blur, from, to);
 }
 
-// A blur image between the glow and the bloom, in a pass of its own.
+// Adds a pass to an intermediate image between the glow and the bloom.
 static bool add_step(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                      const char *name, bool framebuffer, enum vkb_mode direction, uint32_t layer,
                      uint32_t *image, struct vkb_graph *graph, struct vkb_error *error)
@@ -48,7 +48,7 @@ static bool add_step(const struct vkb_settings *settings, const struct vkb_bloom
     return vkb_graph_add_pass(graph, &row, error);
 }
 
-// All of a layer but its last pass; *image is what that pass reads.
+// Adds all passes of a layer except the last one. *image is the image that the last one reads.
 static bool add_layer(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                       uint32_t layer, uint32_t *image, struct vkb_graph *graph,
                       struct vkb_error *error)
@@ -62,7 +62,7 @@ static bool add_layer(const struct vkb_settings *settings, const struct vkb_bloo
     for (int loop = 0; loop < loops; ++loop) {
         const bool last = loop + 1 == loops;
         const bool shown = last && last_layer;
-        const uint8_t l = (uint8_t)layer, k = (uint8_t)loop;  // both far below 256
+        const uint8_t l = (uint8_t)layer, k = (uint8_t)loop;  // both are far below 256
         snprintf(name, sizeof name, shown ? "blur_vertical" : "blur_vertical_%u_%u", l, k);
         if (!direct
             && !add_step(settings, source, name, shown, DIRECTION_VERTICAL, layer, image, graph,
@@ -78,7 +78,7 @@ static bool add_layer(const struct vkb_settings *settings, const struct vkb_bloo
     return true;
 }
 
-// A pass that stores one image in the other's format.
+// Adds a pass that copies `from` to `to`, which has another format.
 static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
                          struct vkb_error *error)
 {
@@ -100,7 +100,7 @@ static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
 bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                        struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
-    // Blending does not round to R11G11B10: there the layers add up in an image of their own.
+    // Blending does not round to R11G11B10, so layers in this format are added in a separate image.
     const bool apart = source->format == VKB_FORMAT_RG11B10_UFLOAT && settings->layer_count > 1;
     const enum vkb_format format = apart ? VKB_FORMAT_RGBA32_FLOAT : source->format;
     uint32_t ends[MAX_LAYERS], sum;
@@ -112,14 +112,15 @@ bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_blo
     if (!vkb_add_target(graph, apart ? "layers" : "bloom", format, source->final, !apart, &sum,
                         error))
         return false;
-    // The layers' last passes follow each other, so they share a render pass and add up in it.
+    // The last passes of the layers are consecutive, so they share a render pass, in which blending
+    // adds them.
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer) {
         snprintf(name, sizeof name, settings->layer_count == 1 ? "bloom" : "bloom_%u", layer);
         struct vkb_pass_row row = blur_row(
             settings, source, name, settings->values.direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
             layer, settings->layers[layer].strength, ends[layer], sum, graph);
-        // Blending does not clamp: sums of the largest floats must not overflow. (Half floats keep
-        // their complete range; what overflows there, the composite clamps.)
+        // Blending does not clamp, and sums of the largest single floats must not overflow. (Half
+        // floats have their complete range: the composite clamps a sum that overflows.)
         if (format == VKB_FORMAT_RGBA32_FLOAT)
             row.params.blur.limit /= (float)settings->layer_count;
         row.blend = layer == 0          ? VKB_BLEND_NONE

@@ -1,11 +1,11 @@
-// What a graph starts from: a source without its data. Another kind of source takes a struct here,
-// a case in each function of source.c, and the data that run/frame.c brings to the device.
+// A source without its data: all that a graph depends on. A new kind of source needs a struct here,
+// a case in each function of source.c, and its data in struct vkb_frame_source.
 #ifndef VKB_SOURCE_H
 #define VKB_SOURCE_H
 
 #include "methods/methods.h"
 
-// Of the first kind there is nothing.
+// A zeroed source has the kind NONE.
 enum vkb_source_kind { VKB_SOURCE_NONE, VKB_SOURCE_IMAGE, VKB_SOURCE_SCENE };
 
 struct vkb_source {
@@ -17,7 +17,7 @@ struct vkb_source {
     };
 };
 
-// The graph of the source with those settings, as its method has it.
+// Builds the graph of the source with the passes of the method, before variants are chosen.
 bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings *settings,
                       uint32_t max_side, struct vkb_graph *graph, struct vkb_error *error);
 
@@ -27,8 +27,9 @@ bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings
                       uint32_t max_side, struct vkb_size *frame, struct vkb_size *buffers,
                       struct vkb_error *error);
 
-// Whether a graph of `planned` can run on the data of `given`: what has to be there is. What
-// parameters hold, such as the camera and the time, is the graph's.
+// Whether a graph of `planned` can run with the data of `given`: both need the same kind and the
+// same optional parts, images also the same size and format. Camera and time may differ, since the
+// graph has them as parameters.
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given);
 
 #endif

@@ -7,23 +7,23 @@
 
 #include <math.h>
 
-// URP's half-kernel: a binomial of 12 without its outer terms.
+// URP's half-kernel: the binomial coefficients of 12 without the outer ones.
 static const float urp_weights[] = {0.22702703f, 0.19459459f, 0.12162162f, 0.05405405f,
                                     0.01621622f};
 
 enum { WEIGHT_COUNT = 5 };
 
-// Frames smaller than this are "small" to HDRP.
+// HDRP treats frames below this size as small.
 enum { HDRP_LEAST_WIDTH = 800, HDRP_LEAST_HEIGHT = 450 };
 
-// u_k = lerp(d_k, U(u_k+1), s): both pipelines squeeze the scatter into 0.05 to 0.95.
+// u_k = lerp(d_k, U(u_k+1), s): both pipelines map the scatter to the range 0.05 to 0.95.
 static struct vkb_combination scattered(const struct vkb_settings *settings, enum vkb_mode kernel)
 {
     const double share = 0.05 + 0.9 * settings->values.scatter;
     return vkb_combine(kernel, 1.0 - share, share);
 }
 
-// As many levels as halve `side`, less `spared`, from 1 to `most`.
+// The number of halvings of the longer side, less `spared`; from 1 to `most`.
 static uint32_t level_count(uint32_t width, uint32_t height, double spared, int most)
 {
     const double count = floor(log2(fmax(width, height)) - spared);
@@ -54,7 +54,7 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }
 
-// scale * W / 2^(k + 1), rounded, halves to even.
+// scale * W / 2^(k + 1), rounded half to even.
 static uint32_t rounded(uint32_t side, double scale, uint32_t level)
 {
     const double size = rint(ldexp(side * scale, -(int)level - 1));
@@ -71,7 +71,8 @@ static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode directi
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
-// A level from the image above it: blurred along the rows, which are as many as above, then down.
+// A level from the image above it: a horizontal blur at the height of that image, then a vertical
+// one.
 static bool add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
                            struct vkb_error *error)
 {
@@ -90,13 +91,13 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
 {
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     const struct vkb_size frame = source->buffers;
-    // In small frames the cubic filter is too wide for the last levels.
+    // In small frames the bicubic filter is too wide for the last levels.
     const bool cubic = settings->values.high_quality_filtering && frame.width >= HDRP_LEAST_WIDTH
                     && frame.height >= HDRP_LEAST_HEIGHT;
     struct vkb_combination combination =
         scattered(settings, cubic ? UPSAMPLE_INSET_CUBIC : UPSAMPLE_INSET_LINEAR);
     const uint32_t count = level_count(frame.width, frame.height, 2.0, MAX_LEVELS);
-    // Narrow levels stretch the bloom along x, low ones along y.
+    // Levels of smaller width stretch the bloom along x, levels of smaller height along y.
     const double anamorphism = 0.5 * settings->values.anamorphism;
     const double across = 1.0 + fmin(anamorphism, 0.0), down = 1.0 - fmax(anamorphism, 0.0);
     uint32_t from;

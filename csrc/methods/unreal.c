@@ -7,13 +7,13 @@
 
 enum { UNREAL_LEVELS = 5, UNREAL_LONGEST = 22 };
 
-// Taps of each level's half-kernel, the centre counted; a third of it is the deviation.
+// The taps of each level's half-kernel, with the centre. The standard deviation is a third of this.
 static const uint32_t tap_counts[UNREAL_LEVELS] = {6, 10, 14, 18, UNREAL_LONGEST};
 
-// The levels' shares for a radius of 0; one of 1 mirrors them at 0.6.
+// The factors of the levels for a radius of 0. A radius of 1 mirrors them at 0.6.
 static const double bloom_factors[UNREAL_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
 
-// Of the pass rounded, of the node floored.
+// The pass rounds the half size, the node floors it.
 static struct vkb_size half_of(const struct vkb_settings *settings, struct vkb_size size)
 {
     return settings->values.node ? vkb_halved(size)
@@ -47,7 +47,8 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
         shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
         total += shares[levels.count];
     }
-    // An image that ends at 1 holds the mean, and the bloom is multiplied by `total`.
+    // A format whose largest value is 1 holds the mean of the levels, and the bloom is multiplied
+    // by `total`.
     if (!vkb_ends_at_one(source->format))
         total = 1.0;
     for (uint32_t level = 0; level < UNREAL_LEVELS; ++level)

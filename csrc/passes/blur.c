@@ -8,8 +8,8 @@ static bool is_integer(double number)
     return floor(number) == number;
 }
 
-// Distributes each tap to the texels on both sides of it. False if the kernel is longer than that
-// of a line.
+// Distributes each tap to the texels on both sides of it. False if the result is longer than
+// LINE_RADIUS.
 static bool move_to_texels(const struct vkb_blur *blur, double step, double weights[MAX_WEIGHTS],
                            uint32_t *count)
 {
@@ -44,7 +44,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     struct vkb_blur_params *params = &row.params.blur;
     struct vkb_blur moved = *blur;
 
-    // With a step of 0 all taps are one tap, for all sizes.
+    // With a step of 0 all taps are at the same place, so all sizes fit.
     if (blur->direction != DIRECTION_BOTH && (step == 0.0 || (same_size && !is_integer(step)))
         && move_to_texels(blur, step, moved.weights, &moved.count))
         moved.step_x = moved.step_y = 1.0;

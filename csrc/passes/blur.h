@@ -1,4 +1,4 @@
-// Blur passes: a symmetric kernel, in one direction or in both at once.
+// Blur passes with a symmetric kernel, in one direction or in both.
 #ifndef VKB_BLUR_H
 #define VKB_BLUR_H
 
@@ -19,16 +19,16 @@ struct vkb_blur {
     bool filter;            // the sampler filters taps between texels; otherwise the shader does
 };
 
-// The row of a blur from one image to another. If all pixels of the target lie on texels, taps
-// between texels are distributed to the two neighbours, so that no variant of the pass has to
+// The row of a blur from one image to another. If all pixels of the target are on texel centres,
+// taps between texels are distributed to the two neighbours. Then no variant of the pass has to
 // filter.
 struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
                                  const struct vkb_blur *blur, uint32_t from, uint32_t to);
 
-// Accessors of a row that vkb_blur_row made.
+// Accessors of a row from vkb_blur_row.
 bool vkb_is_line_blur(const struct vkb_pass_row *pass);  // in one direction
 enum vkb_mode vkb_blur_direction(const struct vkb_pass_row *pass);
-// Its kernel on texels; false where taps lie between them, or where it is longer than `limit`.
+// The kernel on texels. False if taps are between texels, or if it is longer than `limit`.
 bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texel_kernel *kernel);
 
 #endif

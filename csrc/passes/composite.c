@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-// The same as Godot blends, which no variant stands for.
+// The composite with Godot's blend modes. It has no other variant.
 static struct vkb_pass_row godots(const struct vkb_settings *settings,
                                   const struct vkb_pass_row *composite)
 {
@@ -16,7 +16,8 @@ static struct vkb_pass_row godots(const struct vkb_settings *settings,
     return row;
 }
 
-// The formula of the composite. What a bloom from another image adds was not in the scene before.
+// The formula of the composite. The light of a bloom from another image is not in the scene, so the
+// scene does not lose it.
 static int composite_of(const struct vkb_settings *settings,
                         const struct vkb_composite_source *source)
 {
@@ -46,7 +47,7 @@ bool vkb_add_composite(const struct vkb_settings *settings,
         return false;
     struct vkb_pass_row row = vkb_fullscreen_row("final", VKB_SHADER_composite_frag, final);
     const bool off = source->bloom == VKB_NO_IMAGE;
-    // Floats have no levels to round to.
+    // Float formats have no quantization levels to dither.
     const bool dither = settings->values.dither && format == VKB_FORMAT_RGBA8_UNORM;
     row.constants.composite = composite_of(settings, source);
     row.constants.tonemap = settings->choices[VKB_CHOICE_tonemap];

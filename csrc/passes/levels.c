@@ -80,7 +80,8 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_s
 
     row.reads[0] = from;
     row.read_count = 1;
-    // The sampler's filter is not used: lavapipe's has 8 bits, and the errors of a chain add up.
+    // Filtered in the shader: lavapipe's sampler keeps 8 bits of the position, and the errors of a
+    // chain add up.
     row.constants.sampling = SAMPLING_FETCH;
     return row;
 }
@@ -186,9 +187,9 @@ bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
         && add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, levels->downs[level], error);
 }
 
-// The weights of four integer texels for an upsampling to twice the size, for a pixel that is a
-// quarter of a texel after a texel's centre. The first texel is the one before. The outer taps of
-// the tent are up to one texel away; a bilinear sample is a tent with a radius of 0.
+// The weights of four texels for an upsampling to twice the size, for a pixel a quarter of a texel
+// after the centre of the second one. The outer taps of the tent are up to one texel away. A
+// bilinear sample is a tent with a radius of 0.
 static void find_up_taps(double radius, float taps[4])
 {
     static const double shares[3] = {0.25, 0.5, 0.25};
@@ -205,7 +206,7 @@ static void find_up_taps(double radius, float taps[4])
         taps[i] = (float)sums[i];
 }
 
-// From the smaller level `from` to `to`, to which the level `own` is added, if there is one.
+// Upsamples the smaller level `from` to `to`, and adds the level `own`, if there is one.
 static bool add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
                    enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
                    double coarse_share, struct vkb_error *error)
@@ -239,9 +240,9 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
-// Sums of levels where the format holds them. In rgba8unorm, which ends at 1, each image holds its
-// sum divided by what a flat 1 becomes there (`flat`; negative shares count as positive ones), and
-// the bloom is multiplied by it.
+// Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
+// sum for a constant image of 1 (`flat`; negative shares count as positive), and the bloom is
+// multiplied by this.
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
                         uint32_t *bloom, struct vkb_error *error)
 {

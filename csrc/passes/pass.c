@@ -7,7 +7,7 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragmen
 {
     struct vkb_pass_row row;
 
-    // memset, since an initializer would set only the first member of the union of parameters.
+    // memset, since an initializer sets only the first member of the union of parameters.
     memset(&row, 0, sizeof row);
     snprintf(row.name, sizeof row.name, "%s", name);
     row.geometry = VKB_GEOMETRY_FULLSCREEN;

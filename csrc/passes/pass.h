@@ -9,17 +9,17 @@ struct vkb_size {
     uint32_t width, height;
 };
 
-// What a method's rows start from: the glow image and the format of the bloom buffers; they end in
-// an image "bloom" of the final size.
+// The input of a method: the glow image, and sizes and format of the bloom buffers. The method's
+// last image is "bloom" with the final size.
 struct vkb_bloom_source {
     uint32_t glow;
-    uint32_t mask;     // of what the threshold lets through; VKB_NO_IMAGE: none
+    uint32_t mask;     // multiplies the thresholded image; VKB_NO_IMAGE: none
     bool blurs_alpha;  // alpha is a fourth channel of the bloom
     struct vkb_size buffers, final;
     enum vkb_format format;
 };
 
-// A shader that is compiled for each format that it loads from.
+// A shader that is compiled once for each format that it loads.
 #define VKB_BY_FORMAT(shader) \
     { \
         [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
@@ -28,13 +28,13 @@ struct vkb_bloom_source {
         [VKB_FORMAT_RG11B10_UFLOAT] = VKB_SHADER_##shader##_rgba32float, \
     }
 
-// An image that a pass will write.
+// Adds an image that a pass will write.
 bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
                     struct vkb_size size, bool framebuffer, uint32_t *index,
                     struct vkb_error *error);
 
-// The format of the first image of a method and of its bloom, for bloom buffers of that format.
-// With R11G11B10, published methods store only their levels in it.
+// The format of a method's first image and of its bloom, for bloom buffers of this format.
+// Published methods store only their levels in R11G11B10.
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers);
 
 // The values of SAMPLING_ROWS for a pass that writes `target`.
@@ -49,7 +49,7 @@ bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 // A row with the defaults of a fullscreen pass; the caller fills in the rest.
 struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target);
 
-// Gives a pass that reads one image the mask to read after it; VKB_NO_IMAGE: none.
+// Makes a pass that reads one image read the mask after it; VKB_NO_IMAGE: no mask.
 void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask);
 
 #endif

@@ -15,23 +15,23 @@ struct vkb_scene_source {
     bool body_textured, glow_textured;     // some of the mesh's triangles have textures
 };
 
-// What every draw of a frame of the scene has in its parameters.
+// The parameters that all draws of a frame have.
 struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source);
 
-// The glow mesh into the images "glow" and "glow_depth"; the colours pass the threshold of that
+// Adds the pass that draws the glow mesh into "glow" and "glow_depth", with a threshold of this
 // mode.
 bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_source *source,
                   const struct vkb_mesh_params *params, enum vkb_format format,
                   struct vkb_size size, bool framebuffer, enum vkb_mode threshold,
                   struct vkb_graph *graph, uint32_t *glow, struct vkb_error *error);
 
-// A row that draws a mesh or the sky, with a depth test; the caller fills in further targets.
+// A row that draws a mesh or the sky with a depth test. The caller may add targets.
 struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
                                   enum vkb_shader fragment, uint32_t target, uint32_t depth,
                                   const struct vkb_mesh_params *params);
 
-// The row, which draws a mesh, and where some of its triangles have textures a second one, which
-// draws those with that fragment shader.
+// Adds the row, which draws a mesh. If some triangles have textures, adds a second row that draws
+// these with the fragment shader `textured`.
 bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_shader textured,
                   struct vkb_graph *graph, struct vkb_error *error);
 

@@ -10,12 +10,12 @@ enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
 }
 
 // The luminances of 8-bit colours, (2126 r + 7152 g + 722 b) / 10000 / 255, are integer multiples
-// of 1 / 1275000. Half way between two of them, the threshold is out of reach of the rounding of
-// samplers and shaders, which else lift some colours over it that are no brighter than it.
+// of 1 / 1275000. The threshold is moved to the middle between two of them. Otherwise rounding in
+// samplers and shaders lets colours pass whose luminance is equal to the threshold.
 static float between_levels(float threshold)
 {
     const double steps = 1275000.0;
-    // What a float makes of a decimal number up to 1 is less than a tenth of a step away from it.
+    // A decimal number up to 1 and its float differ by less than a tenth of a step.
     return (float)((floor(threshold * steps + 0.1) + 0.5) / steps);
 }
 
@@ -28,12 +28,12 @@ bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint
     const enum vkb_mode mode = vkb_threshold_mode(settings);
 
     row.constants.threshold_mode = mode;
-    // Never the sampler's filter: it would spread NaN, and a threshold magnifies what it rounds.
+    // Not the sampler's filter: it would spread NaN, and a threshold magnifies its rounding errors.
     row.constants.sampling = vkb_same_size(graph, image, glow) ? SAMPLING_TEXEL : SAMPLING_FETCH;
     row.reads[0] = image;
     vkb_apply_mask(&row, vkb_is_published(settings) ? VKB_NO_IMAGE : mask);
     row.block = VKB_BLOCK_threshold;
-    // Where there is no threshold its settings stay 0: the pass does not depend on them.
+    // Without a threshold its settings stay 0, so that the pass does not depend on them.
     if (mode != THRESHOLD_NONE)
         vkb_params_read(row.block, &settings->values, &row.params);
     if (mode == THRESHOLD_HARD && graph->images[image].format == VKB_FORMAT_RGBA8_UNORM)

@@ -6,17 +6,16 @@
 
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
 
-// A pass that reduces `image` to the size of `glow` and keeps what the threshold lets through,
-// times the mask (VKB_NO_IMAGE: none). A published method has its threshold and the mask later.
+// Adds a pass that reduces `image` to the size of `glow`, applies the threshold, and multiplies by
+// the mask (VKB_NO_IMAGE: none). Published methods apply their threshold and the mask later.
 bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
                        uint32_t glow, struct vkb_graph *graph, struct vkb_error *error);
 
-// Whether a row is of that pass, and needs the colours of the image's texels at each pixel's own
-// place alone.
+// Whether the row is a threshold pass that reads only the texel at each pixel's own position.
 bool vkb_is_threshold(const struct vkb_pass_row *pass);
 
-// Gives the row of a fused pass, whose block is B, all that the threshold pass has. A block without
-// THRESHOLD_ROWS does not compile.
+// Copies all parameters and constants of the threshold pass to the row of a fused pass with block
+// B. A block without THRESHOLD_ROWS does not compile.
 #define VKB_TAKE_THRESHOLD(row, B, threshold_pass) \
     do { \
         struct vkb_pass_row *const to = (row); \

@@ -57,7 +57,7 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
     return true;
 }
 
-// Room for all that the requests can need.
+// Reserves the memory that the requests can need.
 static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
                     struct vkb_error *error)
 {
@@ -92,8 +92,9 @@ static void set_cached(struct vkb_run *run, uint32_t image, struct vkb_cached_im
     run->contents[image] = cached ? &cached->content : NULL;
 }
 
-// The cached of the graph's image. One that other commands may still use is replaced only when
-// those have run; the requests of this submission have the same images.
+// Finds or creates the cached image of the graph's image. A cached image of another size is
+// replaced only after all pending commands, which may use it. The requests of one submission have
+// the same images.
 static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
 {
     const struct vkb_image_row *row = &run->graph->images[image];
@@ -130,7 +131,7 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
-// Stages an image and finds out whether the device has it already.
+// Stages an image if the device does not have it yet.
 static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
                         const struct vkb_input *input, struct vkb_error *error)
 {
@@ -140,7 +141,7 @@ static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
 
     run->uploads[kind] = upload;
 
-    // An image that its last writing did not reach holds nothing to compare with.
+    // If the last write did not reach the image, there is no content to compare with.
     if (image->image.mapped && !image->content.valid)
         vkb_upload_forget(upload);
     if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, input, &image->image,
@@ -234,7 +235,7 @@ static void record_constant(struct vkb_run *run)
     run->constant->content.valid = true;
 }
 
-// That of the scene, or of the input that was written last.
+// The version of the scene, or of the input that was written last.
 static uint64_t source_version(const struct vkb_run *run)
 {
     uint64_t version = 0;
@@ -245,7 +246,7 @@ static uint64_t source_version(const struct vkb_run *run)
     return version ? version : run->frame->scene.serial;
 }
 
-// `next` is the request after it, NULL after the last.
+// `next` is the following request; NULL: `request` is the last one.
 static bool record_request(struct vkb_run *run, struct vkb_request *request,
                            const struct vkb_request *next, struct vkb_error *error)
 {
@@ -280,7 +281,7 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
         struct vkb_cached_image *cached = run->images[request->plan->outputs[i]];
         vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
                             &cached->image, &request->outputs[i]);
-        // What was stored to the caller's memory is not in the image.
+        // A pass that stored to the caller's memory did not write the image.
         cached->content.valid = cached->content.valid && !request->outputs[i].stored;
     }
     return true;
@@ -318,8 +319,9 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
         && record_and_submit(run, requests, request_count, error);
 }
 
-// After a failure nothing is known of what the device did: images and commands are made anew. The
-// images later, when nothing is pending: a wait here could not be interrupted.
+// After a failure it is unknown what the device did, so images and commands are created again. The
+// images are created later, when no submission is pending, since a wait here could not be
+// interrupted.
 static void fail_frame(struct vkb_device *device, struct vkb_frame *frame,
                        struct vkb_submission *submission, const struct vkb_error *error)
 {
@@ -340,7 +342,7 @@ static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb
     return true;
 }
 
-// Begins a submission: what no submission has used for long, and none may still use, goes.
+// Begins a submission: destroys cached objects that are old and that no pending submission uses.
 static void trim(const struct vkb_device *device, struct vkb_frame *frame,
                  struct vkb_submission *submission)
 {
@@ -393,7 +395,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         if (source->resident)
             source->resident->staged = false;
     } else {
-        // What was recorded of it does not run.
+        // The recorded commands do not run, so the images keep their last access.
         for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
             source->resident->inputs[kind].cached.image.access = accesses[kind];
         fail_frame(device, frame, run.submission, error);
@@ -402,7 +404,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     return done;
 }
 
-// Times of the same name are of steps of one thing: they become one.
+// Adds up timings with the same name: they are steps of one pass.
 static void merge_timings(struct vkb_request *request)
 {
     uint32_t count = 0;
@@ -419,7 +421,7 @@ static void merge_timings(struct vkb_request *request)
     request->timing_count = count;
 }
 
-// What the device has left for the requests of a submission that is over.
+// Reads timings and outputs of a submission that the device has finished.
 static void fetch(const struct vkb_device *device, const struct vkb_submission *submission)
 {
     for (uint32_t i = 0; i < submission->request_count; ++i) {

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-// Compared byte by byte: 64 bits each, so that there is no padding.
+// Keys are compared byte by byte. All members have 64 bits, so there is no padding.
 struct framebuffer_key {
     VkRenderPass render_pass;
     uint64_t images[VKB_MAX_TARGETS + 1];
@@ -15,7 +15,7 @@ struct vkb_framebuffer_entry {
     VkFramebuffer handle;
 };
 
-// Destroys the framebuffers of an image that goes; 0 is the id of no image.
+// Destroys the framebuffers of an image that will be destroyed. No image has the id 0.
 static void destroy_framebuffers(const struct vkb_device *device, struct vkb_image_cache *cache,
                                  uint64_t image_id)
 {
@@ -42,11 +42,11 @@ void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_c
     }
     vkb_free(cache->images);
     vkb_free(cache->framebuffers);
-    // The clock goes on: nothing made later may be taken for something made before.
+    // The clock continues, so that ids and versions stay unique.
     *cache = (struct vkb_image_cache){.clock = cache->clock, .now = cache->now};
 }
 
-// The image goes, the cached stays: of names there are a few.
+// Destroys the image and keeps its entry, since there are only a few names.
 static void destroy_image(const struct vkb_device *device, struct vkb_image_cache *cache,
                           struct vkb_cached_image *cached)
 {

@@ -1,10 +1,11 @@
 #include "run/pages.h"
 
-// So much stays idle at the most, the latest of it: three 4K images of half floats and some.
+// The most idle memory that is kept, the latest first: a little more than three 4K images of half
+// floats.
 #define KEPT_BYTES ((size_t)256 << 20)
 
-// From so much on, memory starts where the system's large pages do, of which fewer have to be
-// given, zeroed and pinned.
+// Memory of this size or more is aligned to the system's large pages: fewer pages have to be
+// mapped, zeroed and pinned.
 #define LARGE_BYTES ((size_t)4 << 20)
 #define LARGE_PAGE  ((size_t)2 << 20)
 #define SMALL_PAGE  ((size_t)4096)
@@ -31,7 +32,7 @@ struct vkb_pages *vkb_pages_create(const struct vkb_device *device, struct vkb_e
 static void advise(const struct vkb_page_run *run)
 {
 #ifdef MADV_HUGEPAGE
-    // Where the system has none, nothing is lost.
+    // A system without large pages ignores this.
     if (run->size >= LARGE_BYTES)
         (void)madvise(run->memory, run->size, MADV_HUGEPAGE);
 #else
@@ -63,7 +64,7 @@ static struct vkb_page_run *create_run(const struct vkb_device *device, size_t s
 
 static void destroy_run(const struct vkb_device *device, struct vkb_page_run *run)
 {
-    // An array may go at any time, in any thread.
+    // An array may be freed at any time, in any thread.
     if (device) {
         const struct vkb_messages *before = vkb_messages_begin(&device->messages);
         vkb_buffer_destroy(device, &run->buffer);
@@ -92,7 +93,7 @@ static void unlink_run(struct vkb_page_run **list, struct vkb_page_run *run)
         run->next->previous = run->previous;
 }
 
-// An eighth more than is needed is still a fit: sizes that change a little share runs.
+// A run that is up to an eighth too large fits, so that sizes that vary a little share runs.
 static struct vkb_page_run *find_idle(const struct vkb_pages *pages, size_t size)
 {
     struct vkb_page_run *found = NULL;
@@ -129,7 +130,7 @@ static void drop_oldest(struct vkb_pages *pages)
     destroy_run(pages->device, oldest);
 }
 
-// Nobody asks a closed one for more.
+// A closed object is freed with its last run.
 static void free_closed(struct vkb_pages *pages)
 {
     if (!pages->device && !pages->taken)

@@ -25,8 +25,8 @@ struct vkb_render_pass_entry {
 
 struct pipeline_key {
     VkRenderPass render_pass;
-    uint32_t vertex, shader;      // enum vkb_shader
-    uint32_t geometry, bindings;  // enum vkb_geometry, enum vkb_binding_kind
+    uint32_t vertex, shader;     // enum vkb_shader
+    uint32_t geometry, reading;  // enum vkb_geometry, enum vkb_reading
     uint32_t textured;
     uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
@@ -39,139 +39,26 @@ _Static_assert(sizeof(struct pipeline_key)
 struct vkb_pipeline_entry {
     struct pipeline_key key;
     VkPipeline handle;
-    uint64_t used;  // by which submission last
+    uint64_t used;  // the last submission that used it
 };
-
-static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
-                           struct vkb_error *error)
-{
-    return VK(error,
-              device->vk.vkCreateSampler(device->handle,
-                                         &(VkSamplerCreateInfo){
-                                             .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
-                                             .magFilter = filter,
-                                             .minFilter = filter,
-                                             .mipmapMode = filter == VK_FILTER_LINEAR
-                                                             ? VK_SAMPLER_MIPMAP_MODE_LINEAR
-                                                             : VK_SAMPLER_MIPMAP_MODE_NEAREST,
-                                             .addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                                             .addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                                             .addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                                             .maxLod = VK_LOD_CLAMP_NONE,
-                                         },
-                                         NULL, sampler));
-}
-
-static const struct binding_kind {
-    struct vkb_binding_types types;
-    uint32_t most_reads;
-    bool stores;
-    VkShaderStageFlags parameter_stages, image_stages;
-} binding_kinds[VKB_BINDING_KINDS] = {
-    [VKB_BINDINGS_DRAW] =
-        {
-            .types.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-            .most_reads = VKB_MAX_READS,
-            .parameter_stages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT,
-            .image_stages = VK_SHADER_STAGE_FRAGMENT_BIT,
-        },
-    [VKB_BINDINGS_DISPATCH] =
-        {
-            .types.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-            .types.target = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-            .most_reads = VKB_MAX_READS,
-            .stores = true,
-            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
-            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
-        },
-    [VKB_BINDINGS_LOAD] =
-        {
-            .types.read = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-            .types.target = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-            .most_reads = VKB_MAX_LOADS,
-            .stores = true,
-            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
-            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
-        },
-    [VKB_BINDINGS_WORDS] =
-        {
-            .types.read = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
-            .types.target = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-            .most_reads = VKB_MAX_LOADS,
-            .stores = true,
-            .parameter_stages = VK_SHADER_STAGE_COMPUTE_BIT,
-            .image_stages = VK_SHADER_STAGE_COMPUTE_BIT,
-        },
-};
-
-static bool create_layouts(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                           enum vkb_binding_kind kind, uint32_t images, struct vkb_error *error)
-{
-    const struct VolkDeviceTable *vk = &device->vk;
-    const struct binding_kind *bound = &binding_kinds[kind];
-    VkDescriptorSetLayoutBinding bindings[VKB_MAX_READS + 2] = {
-        {
-            .binding = 0,
-            .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
-            .descriptorCount = 1,
-            .stageFlags = bound->parameter_stages,
-        },
-    };
-    const uint32_t count = 1 + images + bound->stores;
-
-    for (uint32_t i = 1; i < count; ++i)
-        bindings[i] = (VkDescriptorSetLayoutBinding){
-            .binding = i,
-            .descriptorType = i <= images ? bound->types.read : bound->types.target,
-            .descriptorCount = 1,
-            .stageFlags = bound->image_stages,
-        };
-    return VK(error, vk->vkCreateDescriptorSetLayout(
-                         device->handle,
-                         &(VkDescriptorSetLayoutCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-                             .bindingCount = count,
-                             .pBindings = bindings,
-                         },
-                         NULL, &pipelines->set_layouts[kind][images]))
-        && VK(error,
-              vk->vkCreatePipelineLayout(device->handle,
-                                         &(VkPipelineLayoutCreateInfo){
-                                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
-                                             .setLayoutCount = 1,
-                                             .pSetLayouts = &pipelines->set_layouts[kind][images],
-                                             .pushConstantRangeCount = kind == VKB_BINDINGS_WORDS,
-                                             .pPushConstantRanges =
-                                                 &(VkPushConstantRange){
-                                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
-                                                     .size = sizeof(struct vkb_words),
-                                                 },
-                                         },
-                                         NULL, &pipelines->layouts[kind][images]));
-}
 
 bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_data,
                           size_t cache_size, struct vkb_pipelines *pipelines,
                           struct vkb_error *error)
 {
     *pipelines = (struct vkb_pipelines){0};
-    bool done = VK(error, device->vk.vkCreatePipelineCache(
-                              device->handle,
-                              &(VkPipelineCacheCreateInfo){
-                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
-                                  .initialDataSize = cache_size,
-                                  .pInitialData = cache_data,
-                              },
-                              NULL, &pipelines->cache))
-             && create_sampler(device, VK_FILTER_LINEAR, &pipelines->filter, error)
-             && create_sampler(device, VK_FILTER_NEAREST, &pipelines->nearest, error);
-
-    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
-        for (uint32_t images = 0; done && images <= binding_kinds[kind].most_reads; ++images)
-            done = create_layouts(device, pipelines, (enum vkb_binding_kind)kind, images, error);
-    if (!done)
-        vkb_pipelines_destroy(device, pipelines);
-    return done;
+    if (VK(error, device->vk.vkCreatePipelineCache(
+                      device->handle,
+                      &(VkPipelineCacheCreateInfo){
+                          .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
+                          .initialDataSize = cache_size,
+                          .pInitialData = cache_data,
+                      },
+                      NULL, &pipelines->cache))
+        && vkb_bindings_create(device, &pipelines->bindings, error))
+        return true;
+    vkb_pipelines_destroy(device, pipelines);
+    return false;
 }
 
 void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines *pipelines)
@@ -182,15 +69,9 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
         vk->vkDestroyPipeline(device->handle, pipelines->entries[i].handle, NULL);
     for (size_t i = 0; i < pipelines->render_pass_count; ++i)
         vk->vkDestroyRenderPass(device->handle, pipelines->render_passes[i].handle, NULL);
-    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
-        for (uint32_t i = 0; i <= VKB_MAX_READS; ++i) {
-            vk->vkDestroyPipelineLayout(device->handle, pipelines->layouts[kind][i], NULL);
-            vk->vkDestroyDescriptorSetLayout(device->handle, pipelines->set_layouts[kind][i], NULL);
-        }
+    vkb_bindings_destroy(device, &pipelines->bindings);
     for (uint32_t i = 0; i < VKB_SHADER_COUNT; ++i)
         vk->vkDestroyShaderModule(device->handle, pipelines->modules[i], NULL);
-    vk->vkDestroySampler(device->handle, pipelines->filter, NULL);
-    vk->vkDestroySampler(device->handle, pipelines->nearest, NULL);
     vk->vkDestroyPipelineCache(device->handle, pipelines->cache, NULL);
     vkb_free(pipelines->entries);
     vkb_free(pipelines->render_passes);
@@ -253,7 +134,7 @@ static bool get_module(const struct vkb_device *device, struct vkb_pipelines *pi
     return true;
 }
 
-// Colour images that are buffers, too, stay in the general layout.
+// Colour images whose memory is also a buffer stay in the general layout.
 static VkImageLayout attachment_layout(const struct vkb_device *device, enum vkb_format format,
                                        enum vkb_access access)
 {
@@ -272,8 +153,7 @@ static VkAttachmentDescription describe_attachment(const struct vkb_device *devi
         .samples = VK_SAMPLE_COUNT_1_BIT,
         .loadOp =
             load == VKB_LOAD_CLEAR ? VK_ATTACHMENT_LOAD_OP_CLEAR : VK_ATTACHMENT_LOAD_OP_DONT_CARE,
-        // Depth is stored too, where the forward system's source drops it: it is a framebuffer
-        // here.
+        // Depth is stored, since it is a framebuffer. (The forward system's source discards it.)
         .storeOp = VK_ATTACHMENT_STORE_OP_STORE,
         .stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE,
         .stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE,
@@ -289,7 +169,7 @@ static bool create_render_pass(const struct vkb_device *device, const struct ren
     VkAttachmentReference references[VKB_MAX_TARGETS];
     VkSubpassDependency dependencies[VKB_MAX_DEPENDENCIES];
     const bool depth = key->depth_format != VKB_FORMAT_NONE;
-    // Uses name the depth first, attachments the colours.
+    // In `uses` the depth comes first, in `attachments` the colours.
     const struct vkb_target_use *colour_uses = key->uses + depth;
 
     for (uint32_t i = 0; i < key->target_count; ++i) {
@@ -357,7 +237,7 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
     return true;
 }
 
-// The fixed state that each kind of geometry asks for.
+// The fixed state of each kind of geometry.
 static const struct geometry_state {
     VkCullModeFlags cull;
     bool depth_test, depth_write;
@@ -378,8 +258,8 @@ static const struct geometry_state {
         },
 };
 
-// Colours are added, the target keeps its alpha: the forward system's SRC_ALPHA, DST_ALPHA comes to
-// the same for an alpha of 1 in rgba8unorm, and would make it 2 in a float format.
+// Colours are added, the target keeps its alpha. The forward system's SRC_ALPHA, DST_ALPHA does the
+// same for an alpha of 1 in rgba8unorm, but gives an alpha of 2 in a float format.
 static const VkPipelineColorBlendAttachmentState blend_states[] = {
     [VKB_BLEND_NONE] = {.colorWriteMask = 0xf},
     [VKB_BLEND_ADD] =
@@ -425,7 +305,7 @@ static bool create_compute(const struct vkb_device *device, struct vkb_pipelines
                                      .pName = "main",
                                      .pSpecializationInfo = constants,
                                  },
-                             .layout = vkb_pipelines_layout(pipelines, pass),
+                             .layout = vkb_bindings_layout(&pipelines->bindings, pass),
                          },
                          NULL, pipeline));
 }
@@ -521,7 +401,7 @@ static bool create_graphics(const struct vkb_device *device, struct vkb_pipeline
                               .pDynamicStates = (VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT,
                                                                    VK_DYNAMIC_STATE_SCISSOR},
                           },
-                      .layout = vkb_pipelines_layout(pipelines, pass),
+                      .layout = vkb_bindings_layout(&pipelines->bindings, pass),
                       .renderPass = render_pass,
                   },
                   NULL, pipeline));
@@ -533,7 +413,7 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
 {
     VkSpecializationMapEntry map[VKB_CONSTANT_COUNT];
 
-    // Those that a shader does not have are ignored.
+    // Vulkan ignores constants that the shader does not declare.
     for (uint32_t i = 0; i < VKB_CONSTANT_COUNT; ++i)
         map[i] = (VkSpecializationMapEntry){vkb_constant_rows[i].id, vkb_constant_rows[i].offset,
                                             sizeof(int32_t)};
@@ -558,7 +438,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     key.vertex = pass->vertex;
     key.shader = pass->shader;
     key.geometry = pass->geometry;
-    key.bindings = vkb_pass_binding_kind(pass);
+    key.reading = pass->reading;
     key.textured = pass->textured;
     key.blend = pass->blend;
     key.target_count = pass->target_count;
@@ -581,49 +461,4 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     entry->used = pipelines->now;
     ++pipelines->created;
     return true;
-}
-
-VkSampler vkb_pipelines_sampler(const struct vkb_device *device,
-                                const struct vkb_pipelines *pipelines, enum vkb_format format)
-{
-    return vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT)
-             ? pipelines->filter
-             : pipelines->nearest;
-}
-
-uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
-{
-    return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
-}
-
-enum vkb_binding_kind vkb_pass_binding_kind(const struct vkb_pass_row *pass)
-{
-    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
-        return VKB_BINDINGS_DRAW;
-    return pass->reading == VKB_READING_SAMPLED ? VKB_BINDINGS_DISPATCH
-         : pass->reading == VKB_READING_LOADED  ? VKB_BINDINGS_LOAD
-                                                : VKB_BINDINGS_WORDS;
-}
-
-struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)
-{
-    return binding_kinds[vkb_pass_binding_kind(pass)].types;
-}
-
-VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
-{
-    return pass->geometry == VKB_GEOMETRY_DISPATCH ? VK_PIPELINE_BIND_POINT_COMPUTE
-                                                   : VK_PIPELINE_BIND_POINT_GRAPHICS;
-}
-
-VkDescriptorSetLayout vkb_pipelines_set_layout(const struct vkb_pipelines *pipelines,
-                                               const struct vkb_pass_row *pass)
-{
-    return pipelines->set_layouts[vkb_pass_binding_kind(pass)][vkb_pass_descriptor_images(pass)];
-}
-
-VkPipelineLayout vkb_pipelines_layout(const struct vkb_pipelines *pipelines,
-                                      const struct vkb_pass_row *pass)
-{
-    return pipelines->layouts[vkb_pass_binding_kind(pass)][vkb_pass_descriptor_images(pass)];
 }

@@ -16,7 +16,7 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
     *readback = (struct vkb_readback){0};
 }
 
-// They are a buffer from its first use on.
+// Imports the complete run of pages at its first use, and keeps the buffer.
 static bool import_pages(const struct vkb_device *device, struct vkb_output *output)
 {
     struct vkb_page_run *run = output->pages;
@@ -37,7 +37,7 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
     const size_t pixel_size = vkb_pixel_size(output->format);
     struct vkb_buffer *buffer = &readback->imports[readback->import_count];
 
-    // The device writes complete pixels, to multiples of their size.
+    // The device writes complete pixels, to addresses that are multiples of their size.
     if (output->channels != vkb_formats[output->format].channels
         || (uintptr_t)output->memory % pixel_size != 0)
         return false;
@@ -68,7 +68,7 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
             return true;
     }
     output->offset = readback->used;
-    // Offsets of image copies must be multiples of the pixel size, 16 at the most.
+    // Offsets of image copies must be multiples of the pixel size, which is at most 16.
     readback->used += (size + 15) & ~(size_t)15;
     return true;
 }
@@ -114,12 +114,12 @@ bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback
     return readback->used == 0 || vkb_buffer_invalidate(device, &readback->staging, error);
 }
 
-// The first three of four channels of each pixel; compiled once for each size of a channel, so that
-// no copy has a variable size.
+// Copies the first three of four channels of each pixel. It is compiled once for each channel size,
+// so that no memcpy has a variable size.
 static inline void drop_alpha(unsigned char *to, const unsigned char *from, size_t pixels,
                               size_t size)
 {
-    // The alpha goes where the next pixel's red comes after it, so that a pixel is one move.
+    // One move for each pixel: the next pixel's red overwrites the alpha.
     for (size_t i = 1; i < pixels; ++i, to += 3 * size, from += 4 * size)
         memcpy(to, from, 4 * size);
     memcpy(to, from, 3 * size);

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-// Copies the pass's parameters to the uniform buffer; returns where they lie in it.
+// Copies the pass's parameters to the uniform buffer; returns their offset.
 static VkDeviceSize write_params(struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
@@ -14,7 +14,8 @@ static VkDeviceSize write_params(struct vkb_run *run, const struct vkb_pass_row 
     return offset;
 }
 
-// What the pass reads at binding index + 1; `surface` is whose textures those are, if any.
+// The image that the pass reads at binding index + 1. `surface` has the textures, if the pass reads
+// textures.
 static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct vkb_pass_row *pass,
                                         const struct vkb_surface *surface, uint32_t index)
 {
@@ -31,23 +32,23 @@ static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct 
         image = &run->images[pass->reads[index]]->image;
     }
     return (VkDescriptorImageInfo){
-        .sampler = texture
-                     ? texture->sampler
-                     : vkb_pipelines_sampler(run->device, &run->frame->pipelines, image->format),
+        .sampler = texture ? texture->sampler
+                           : vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings,
+                                                  image->format),
         .imageView = image->view,
         .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
     };
 }
 
-// Rows of a dispatch's target that one descriptor reaches, and where they are stored.
+// Rows of a dispatch's target that one storage buffer descriptor covers, and their place.
 struct band {
     VkDescriptorBufferInfo buffer;
     size_t row_pitch;
     uint32_t first, rows;
 };
 
-// What a set describes: the pass with its parameters at that offset of the uniform buffer, the
-// surface whose textures it reads, the band that it stores. The last two may be NULL.
+// The content of a descriptor set: the pass, the offset of its parameters in the uniform buffer,
+// the surface whose textures it reads, and the band that it stores. The last two may be NULL.
 struct binding {
     const struct vkb_pass_row *pass;
     VkDeviceSize params;
@@ -113,8 +114,8 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
 {
     const struct vkb_pass_row *pass = binding->pass;
     const struct VolkDeviceTable *vk = &run->device->vk;
-    const struct vkb_pipelines *pipelines = &run->frame->pipelines;
-    const VkDescriptorSetLayout layout = vkb_pipelines_set_layout(pipelines, pass);
+    const struct vkb_bindings *bindings = &run->frame->pipelines.bindings;
+    const VkDescriptorSetLayout layout = vkb_bindings_set_layout(bindings, pass);
     VkDescriptorSet set;
 
     if (!VK(error, vk->vkAllocateDescriptorSets(
@@ -129,7 +130,7 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
         return false;
     write_descriptors(run, binding, set);
     vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
-                                vkb_pipelines_layout(pipelines, pass), 0, 1, &set, 0, NULL);
+                                vkb_bindings_layout(bindings, pass), 0, 1, &set, 0, NULL);
     return true;
 }
 
@@ -144,7 +145,7 @@ static void bind_mesh(const struct vkb_run *run, const struct vkb_mesh *mesh, bo
     vk->vkCmdBindIndexBuffer(commands, mesh->indices.handle, 0, VK_INDEX_TYPE_UINT32);
 }
 
-// A draw for each surface, with its textures.
+// Draws each surface with its textures.
 static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
                           const struct vkb_mesh *mesh, VkDeviceSize params, struct vkb_error *error)
 {
@@ -163,7 +164,7 @@ static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
     return true;
 }
 
-// Workgroups for so many rows of the target.
+// Dispatches the workgroups for `rows` rows of the target.
 static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass, uint32_t rows)
 {
     const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
@@ -175,7 +176,8 @@ static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass,
                                   pass->groups_height ? pass->groups_height : height, 1);
 }
 
-// As many rows as a storage buffer can have: whole blocks, that end where a buffer can begin.
+// The most rows that one storage buffer descriptor can cover. They are a multiple of the block's
+// rows, and end at an offset at which the next buffer can begin.
 static uint32_t band_rows(const struct vkb_device *device, const struct vkb_pass_row *pass,
                           size_t row_pitch)
 {
@@ -203,8 +205,9 @@ uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph
     return sets;
 }
 
-// The output that the pass can store to, past the image: one that no other pass reads, and whose
-// content would not have been there anyway. Of a request that comes again the image keeps it.
+// The output whose memory the pass can store to instead of its image; NULL: none. No other pass may
+// read the image. If the request comes again, the pass stores to the image, so that a third time
+// nothing has to run.
 static struct vkb_output *find_stored(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct vkb_plan *plan = run->request->plan;
@@ -243,7 +246,7 @@ static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pas
         describe_words(image, image->row_pitch, words.reads[i]);
     }
     run->device->vk.vkCmdPushConstants(run->submission->commands.buffer,
-                                       vkb_pipelines_layout(&run->frame->pipelines, pass),
+                                       vkb_bindings_layout(&run->frame->pipelines.bindings, pass),
                                        VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
 }
 
@@ -327,8 +330,8 @@ static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
     }
 }
 
-// What the passes read, and the targets in the state that the render pass's dependencies go on
-// from.
+// Transitions the images that the passes read, and the targets to the access from which the render
+// pass's dependencies start.
 static void transition_images(struct vkb_run *run, uint32_t first, uint32_t end)
 {
     VkCommandBuffer commands = run->submission->commands.buffer;
@@ -341,7 +344,7 @@ static void transition_images(struct vkb_run *run, uint32_t first, uint32_t end)
     for (uint32_t i = 0; i < use_count; ++i) {
         uint32_t target = i < depth_uses ? pass->depth : pass->targets[i - depth_uses];
         struct vkb_image *image = &run->images[target]->image;
-        // A new image has nothing to wait for; any other must be where its graph lets it rest.
+        // A new image needs no barrier. Any other must have the access that its graph leaves it in.
         if (image->access != VKB_ACCESS_NONE && image->access != uses[i].before)
             vkb_image_transition(run->device, commands, image, uses[i].before);
         image->access = uses[i].after == VKB_ACCESS_NONE ? uses[i].during : uses[i].after;
@@ -392,7 +395,7 @@ static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_erro
     const struct vkb_pass_row *pass = &run->graph->passes[index];
     VkCommandBuffer commands = submission->commands.buffer;
 
-    // Started before the barriers: on lavapipe a timestamp is taken at the next barrier.
+    // The timer starts before the barriers, since lavapipe takes a timestamp at the next barrier.
     vkb_timer_start(device, commands, &submission->timer);
     transition_reads(run, index, index + 1);
     vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
@@ -416,8 +419,8 @@ static uint32_t target_images(const struct vkb_run *run, const struct vkb_pass_r
     return count;
 }
 
-// Passes first..end-1 in one render pass, timed as one: within a render pass tiling devices and
-// lavapipe do not keep the order that single draws could be timed by.
+// Records passes first..end-1 as one render pass with one timing. Within a render pass, tiling
+// devices and lavapipe do not keep the order of draws, so single draws cannot be timed.
 static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end,
                                struct vkb_error *error)
 {

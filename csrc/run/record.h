@@ -14,15 +14,15 @@ struct vkb_run {
     struct vkb_cached_image **images;                   // by the graph's image index
     struct vkb_content **contents;                      // of the cache
     struct vkb_cached_image *inputs[VKB_INPUT_COUNT];   // by kind; NULL: none
-    const struct vkb_upload *uploads[VKB_INPUT_COUNT];  // that their pixels come from
-    bool send_input[VKB_INPUT_COUNT];                   // the device does not have it yet
+    const struct vkb_upload *uploads[VKB_INPUT_COUNT];  // the sources of their pixels
+    bool send_input[VKB_INPUT_COUNT];                   // the device does not have these pixels yet
     struct vkb_cached_image *constant;  // to be filled by this submission; NULL: none
 };
 
-// The most descriptor sets that the graph's passes take, without those of surfaces.
+// The most descriptor sets that the graph's passes need, without those of surfaces.
 uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph *graph);
 
-// What a planner calls for each group of passes that has to run; `run` is a struct vkb_run.
+// The planner calls this for each group of passes that has to run. `context` is a struct vkb_run.
 vkb_record vkb_record_group;
 
 #endif

@@ -14,7 +14,7 @@ struct vkb_residents *vkb_residents_create(const struct vkb_device *device, stru
     return residents;
 }
 
-// A handle may go at any time, in any thread.
+// A handle may be freed at any time, in any thread.
 static void destroy_images(const struct vkb_device *device, struct vkb_resident *resident)
 {
     const struct vkb_messages *before = vkb_messages_begin(&device->messages);
@@ -26,7 +26,7 @@ static void destroy_images(const struct vkb_device *device, struct vkb_resident 
     vkb_messages_end(before);
 }
 
-// Nobody asks a closed one for more.
+// A closed object is freed with its last image.
 static void free_closed(struct vkb_residents *residents)
 {
     if (!residents->device && !residents->first)

@@ -1,6 +1,6 @@
 #include "run/submission.h"
 
-enum { KEPT_SUBMISSIONS = 3 };  // that nobody uses; more were needed by more threads at once
+enum { KEPT_SUBMISSIONS = 3 };  // unused ones; several threads at once may have needed more
 
 static void destroy_submission(const struct vkb_device *device, struct vkb_submission *submission)
 {
@@ -99,7 +99,8 @@ bool vkb_submission_over(const struct vkb_device *device, const struct vkb_submi
     return !submission->pending || vkb_commands_over(device, &submission->commands);
 }
 
-// All that is pending may come before the submission; one without requests loads a scene.
+// All pending submissions may run before this one. A submission without requests loads a scene, and
+// counts as a frame.
 static uint32_t count_frames(const struct vkb_submissions *submissions)
 {
     uint32_t count = 0;
@@ -140,8 +141,8 @@ bool vkb_submissions_end(struct vkb_device *device, struct vkb_submissions *subm
             continue;
         if (error->kind == VKB_ERROR_INTERRUPTED || error->result == VK_TIMEOUT)
             return false;
-        // A wait for which there was no memory tells nothing; one that says twice that the device
-        // is lost does, and what is on a lost device can be destroyed.
+        // The first wait may have failed for lack of memory, so wait again. If the device is lost,
+        // its objects can be destroyed.
         if (!vkb_submission_wait(device, submissions, submission, error)
             && error->result != VK_ERROR_DEVICE_LOST)
             return false;

@@ -1,5 +1,5 @@
 // A submission, with everything that its commands use until the device has run them. Several can be
-// pending at once, so that the device works on one while the host reads another.
+// pending, so that the device runs one while the host reads the results of another.
 #ifndef VKB_SUBMISSION_H
 #define VKB_SUBMISSION_H
 
@@ -15,48 +15,49 @@ struct vkb_submission {
     uint32_t descriptor_capacity;  // in sets
     struct vkb_timer timer;
     struct vkb_readback readback;
-    uint64_t number;               // of the submission; they count up
-    struct vkb_request *requests;  // what it runs; the submitter's
+    uint64_t number;               // submissions are numbered from 1
+    struct vkb_request *requests;  // owned by the caller
     uint32_t request_count;
-    bool taken;    // by a submitter that has not given it back
-    bool pending;  // the device may still be at work on it, also where nobody waits any more
+    bool taken;    // in use: not given back yet
+    bool pending;  // the device may still run it, even if it was abandoned
 };
 
 struct vkb_submissions {
-    struct vkb_submission **submissions;  // pointers, so that they stay where they are
+    struct vkb_submission **submissions;  // pointers, since the elements must not move
     size_t count, capacity;
 };
 
-// Destroys all submissions, those taken too. After vkb_submissions_end, where some were submitted.
+// Destroys all submissions, also those in use. If there were submissions, call vkb_submissions_end
+// first.
 void vkb_submissions_destroy(const struct vkb_device *device, struct vkb_submissions *submissions);
 
-// A submission that nobody uses, ready for vkb_commands_begin.
+// Takes an unused submission. It is ready for vkb_commands_begin.
 bool vkb_submissions_take(const struct vkb_device *device, struct vkb_submissions *submissions,
                           struct vkb_submission **submission, struct vkb_error *error);
-// One that is pending can be taken again when it has finished.
+// A pending submission can be taken again when the device has finished it.
 void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submissions *submissions,
                                struct vkb_submission *submission);
 
-// The number of the first submission pending; `now` where there is none.
+// The number of the first pending submission; `now` if there is none.
 uint64_t vkb_submissions_pending(const struct vkb_submissions *submissions, uint64_t now);
 
-// Whether the device has run the submission, without a wait.
+// Whether the device has finished the submission; does not wait.
 bool vkb_submission_over(const struct vkb_device *device, const struct vkb_submission *submission);
 
-// Ends the recording and hands it to the device.
+// Ends the recording and submits it.
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
                            struct vkb_error *error);
-// Waits until the device has run the submission, whatever is before it included. On failure it is
-// still pending.
+// Waits until the device has finished the submission and all before it. On failure it is still
+// pending.
 bool vkb_submission_wait(struct vkb_device *device, const struct vkb_submissions *submissions,
                          struct vkb_submission *submission, struct vkb_error *error);
 
-// Waits for all that is pending: what submissions share can be changed by the host after this.
+// Waits for all pending submissions. After this the host can change what submissions share.
 bool vkb_submissions_wait(struct vkb_device *device, struct vkb_submissions *submissions,
                           struct vkb_error *error);
 
-// The same for the last time, also on a lost device: false where what submissions use cannot be
-// destroyed, because the device may still be at work on it.
+// The same before everything is destroyed, also on a lost device. False if the device may still use
+// what the submissions use, so that it cannot be destroyed.
 bool vkb_submissions_end(struct vkb_device *device, struct vkb_submissions *submissions,
                          struct vkb_error *error);
 

@@ -22,14 +22,15 @@ static const void *channel_one(enum vkb_format format)
                                              : (const void *)&single;
 }
 
-// The next two are compiled once for each size of a channel, so that no copy has a variable size.
+// The next two functions are compiled once for each channel size, so that no memcpy has a variable
+// size.
 
-// A row of RGB pixels without gaps.
+// Packs a row of RGB pixels without gaps.
 static inline void pack_rgb(unsigned char *to, const unsigned char *from, uint32_t width,
                             const void *one, size_t size)
 {
     for (uint32_t x = 1; x < width; ++x, to += 4 * size, from += 3 * size) {
-        // With the next pixel's red, which is there, a pixel is one move.
+        // One move for each pixel: it also copies the next pixel's red, which is then overwritten.
         memcpy(to, from, 4 * size);
         memcpy(to + 3 * size, one, size);
     }
@@ -50,7 +51,7 @@ static inline void pack_strided(unsigned char *to, const unsigned char *from,
     }
 }
 
-// Whether the input has all channels of its format, which RGB has not.
+// Whether the input has all channels of its format; an RGB image has not.
 static bool is_complete(const struct vkb_input *input)
 {
     return input->channels == vkb_formats[input->format].channels;
@@ -109,11 +110,11 @@ static bool row_differs(const struct vkb_upload *upload, const struct vkb_input 
     return memcmp(kept_row(upload, y), upload->packed, size) != 0;
 }
 
-enum { COUNTED_AT_ONCE = 32768 };  // a sum of so many fits the narrow counters below
+enum { COUNTED_AT_ONCE = 32768 };  // a sum of this many fits the 16-bit counters below
 
 static struct vkb_specials count_halves(const uint16_t *bits, size_t count)
 {
-    // As wide as what is counted, so that compilers keep to vectors of that width.
+    // The counters have the width of the elements, so that compilers use vectors of this width.
     uint16_t special = 0, infinite = 0;
 
     for (size_t i = 0; i < count; ++i) {
@@ -163,7 +164,7 @@ static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *
         && upload->height == input->height && upload->channels == input->channels;
 }
 
-// Memory for an image of another kind than the last.
+// Reserves memory for an image of another size or format than the last.
 bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
                       const struct vkb_input *input, const struct vkb_image *image,
                       struct vkb_error *error)
@@ -174,7 +175,7 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
     if (!vkb_grow(error, &upload->rows, &upload->row_capacity, input->height, sizeof *upload->rows)
         || !vkb_grow(error, &upload->packed, &upload->packed_capacity, row_size, 1))
         return false;
-    // Cached memory: it is compared with the next image.
+    // Cached host memory, since the host reads it to compare it with the next image.
     if (!image->mapped
         && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                row_size * input->height, &upload->staging, error))
@@ -190,7 +191,7 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
     return true;
 }
 
-// Rows `from` to the last of the input, which is the image's from row `first` on.
+// Packs rows `from` to the last of the input, whose first row is row `first` of the image.
 static void pack_rows(struct vkb_upload *upload, const struct vkb_input *input, uint32_t from,
                       uint32_t first)
 {

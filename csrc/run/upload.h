@@ -1,5 +1,6 @@
-// An image from the host: packed into staging memory, or into the device's image itself where the
-// host can write to that. There it is kept, so that the same image does not travel twice.
+// Upload of images from the host. The pixels are packed into staging memory, or directly into the
+// device's image if it is mapped. They are kept there, so that the same image is not uploaded
+// twice.
 #ifndef VKB_UPLOAD_H
 #define VKB_UPLOAD_H
 
@@ -7,7 +8,7 @@
 
 #include <stddef.h>
 
-// The caller's pixels as they lie in memory, any strides (in bytes).
+// The caller's pixels in host memory, with any strides (in bytes).
 struct vkb_input {
     const void *memory;
     ptrdiff_t row_stride, pixel_stride, channel_stride;
@@ -21,38 +22,40 @@ struct vkb_specials {
 
 struct vkb_upload {
     struct vkb_buffer staging;
-    unsigned char *pixels;  // the image that it holds, packed: in the staging or mapped
+    unsigned char
+        *pixels;  // the packed image that it holds: in staging memory or in the mapped image
     size_t row_pitch;
-    enum vkb_format format;  // of what it holds; NONE: nothing
+    enum vkb_format format;  // of the image that it holds; NONE: no image
     uint32_t width, height, channels;
-    struct vkb_specials *rows;     // in each row of what it holds
-    struct vkb_specials specials;  // in all
-    unsigned char *packed;         // one row, to be compared
+    struct vkb_specials *rows;     // in each row of the image
+    struct vkb_specials specials;  // in the complete image
+    unsigned char *packed;         // one row, for the comparison
     size_t row_capacity, packed_capacity;
 };
 
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload);
 
-// What it holds is not compared with the next image.
+// Discards the image, so that the next one is not compared with it.
 void vkb_upload_forget(struct vkb_upload *upload);
 
-// Packs the image to its format, alpha 1 where it has none; *changed: it is another one than the
-// last. The submissions may still read the last one: they are waited for before it is written over.
-// `image` is where the device will read it; if that is mapped, it has it now, else
-// vkb_upload_record brings it there.
+// Packs the input in its format, with an alpha of 1 if it has none. *changed becomes true if it
+// differs from the last one. Pending submissions may still read the last one, so it is overwritten
+// only after a wait for them. `image` is the device's image. If it is mapped, it has the pixels
+// now; otherwise vkb_upload_record copies them.
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       struct vkb_submissions *submissions, const struct vkb_input *input,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error);
 
-// The same in steps, for an image that nothing compares: memory for an image of the input's kind,
-// whatever its pixels; then rows of it, from `first` on.
+// The same in steps, without a comparison: vkb_upload_begin reserves memory for an image of the
+// input's size and format; vkb_upload_rows packs the input's rows as rows `first` and following of
+// the image.
 bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
                       const struct vkb_input *input, const struct vkb_image *image,
                       struct vkb_error *error);
 bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
                      const struct vkb_input *input, uint32_t first, struct vkb_error *error);
 
-// Records the copy of what is staged to the image.
+// Records the copy from staging memory to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,
                        const struct vkb_upload *upload, struct vkb_image *image);
 

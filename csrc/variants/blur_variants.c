@@ -10,7 +10,7 @@
 static const enum vkb_shader line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line_comp);
 static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(strip);
 
-// A line's row: `origin` is the place of the target's first pixel in the source.
+// The row of a line blur. `origin` is the position of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct vkb_pass_row *blur,
                                     const struct vkb_texel_kernel *kernel, uint32_t target,
                                     int origin)
@@ -38,7 +38,7 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     return row;
 }
 
-// A blur whose source has the target's size, as a line.
+// Adds a line blur if the source has the target's size.
 bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                   bool *fits, struct vkb_error *error)
 {
@@ -54,16 +54,16 @@ bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// A horizontal blur into a target of another size, its taps integer texels apart: such a blur
-// commutes with the filter between the sizes, so it runs in the source's size, and every pixel of
-// the target takes one sample of it instead of one a tap.
+// For a horizontal blur into a target of another size whose taps are integer texels apart. Such a
+// blur commutes with the filter between the sizes. So it runs at the source's size, and each pixel
+// of the target takes one sample of the result instead of one for each tap.
 bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                       bool *fits, struct vkb_error *error)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const struct vkb_sampling sampling = vkb_sampling_into(&choice->plain, pass->targets[0]);
-    // In 8 bits the sampler's filter of the lines is good enough, where there is one for floats.
+    // In 8 bits the sampler filters the float lines, if the device supports that.
     const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     const bool filters = vkb_device_supports(choice->device, VKB_FORMAT_RGBA32_FLOAT,
                                              VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
@@ -77,8 +77,8 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
          && vkb_blur_kernel(pass, LINE_RADIUS, &kernel);
     if (!*fits)
         return true;
-    // In floats: what is between two rounded values must not be rounded before. The border holds
-    // what the filter takes from beyond the edges.
+    // The lines are floats, since rounding them would change the filtered values. The border has
+    // the texels that the filter reads beyond the edges.
     const struct vkb_size size = {source->width + 2, source->height};
     char name[VKB_NAME_SIZE];
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
@@ -99,13 +99,13 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
         && vkb_add_fullscreen(choice, &row, error);
 }
 
-// The chain of passes that gives an image its bloom where all have its size.
+// The chain of passes that adds a bloom to an image, all at the image's size.
 struct chain {
     const struct vkb_pass_row *threshold, *vertical, *horizontal, *composite;
     struct vkb_texel_kernel vertical_kernel, horizontal_kernel;
 };
 
-// The one blur of that direction that writes the image.
+// The only pass that writes the image, if it is a blur in this direction; else NULL.
 static const struct vkb_pass_row *blur_of(const struct vkb_graph *graph, uint32_t image,
                                           enum vkb_mode direction)
 {
@@ -156,7 +156,7 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-// The composite as it is, and after it the fused pass in strips, which may replace it.
+// Adds the composite, and after it the fused pass in strips, which may replace it.
 bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
@@ -173,7 +173,7 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// The composite as it is, and after it one that takes the bloom from the lines that end in it.
+// Adds the composite, and after it a fused pass that samples the bloom from the blurred lines.
 bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         bool *fits, struct vkb_error *error)
 {

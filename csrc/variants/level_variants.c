@@ -1,4 +1,4 @@
-// Variants of a pyramid's levels that are exactly half or twice as large as the one before.
+// Variants of downsampling to exactly half the size and of upsampling to exactly twice the size.
 #include "variants/variant.h"
 
 #include "passes/levels.h"
@@ -14,7 +14,8 @@ static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMA
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
 
-// Blocks of an invocation, in storage images and in words.
+// Sets the shader, and the block of pixels that each invocation writes, for storage images or
+// words.
 static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
                          enum vkb_format format)
 {
@@ -39,14 +40,14 @@ static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pa
     }
 }
 
-// Whether the device can run the pass in the way of make_halving and make_doubling.
+// Whether the device can run the pass as make_halving and make_doubling set it.
 static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     return choice->variants != VKB_VARIANTS_CPU || vkb_fits_words(choice, pass);
 }
 
-// If the threshold pass writes the larger level: adds a fused pass that starts from the image
-// itself. It may replace `halving`, the variant of `pass`.
+// If a threshold pass writes the larger level, adds a fused pass that reads the image itself. It
+// may replace `halving`, the variant of `pass`.
 static bool add_halved_image(const struct vkb_variant_choice *choice,
                              const struct vkb_pass_row *pass, const struct vkb_pass_row *halving,
                              struct vkb_error *error)
@@ -100,7 +101,7 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// The composite as it is, and after it one that doubles the last level itself.
+// Adds the composite, and after it a fused pass that also upsamples the last level.
 bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {

@@ -1,5 +1,5 @@
-// What the files of variants share: variants.c has the table, blur_variants.c and level_variants.c
-// what stands in it for blurs and for levels.
+// Shared by the files of this folder: variants.c has the table of variants, blur_variants.c and
+// level_variants.c the functions in it for blurs and for levels.
 #ifndef VKB_VARIANT_H
 #define VKB_VARIANT_H
 
@@ -8,7 +8,7 @@
 #include "variants/variants.h"
 #include "vulkan/memory.h"
 
-// The choice of variants for one graph: the passes of `plain` to those of `graph`.
+// The choice of variants for one graph: from the passes of `plain` to those of `graph`.
 struct vkb_variant_choice {
     enum vkb_variants variants;
     const struct vkb_device *device;
@@ -16,43 +16,44 @@ struct vkb_variant_choice {
     struct vkb_graph *graph;
 };
 
-// A variant adds what runs for a pass; false in *fits, and nothing added, where it does not suit
-// it.
+// Adds the variant of a pass to the graph. If the variant does not suit the pass, adds nothing and
+// sets *fits to false.
 typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
                              const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error);
 
-// A blur's lines and enlarged lines; fused passes for the complete bloom of an image, in strips and
-// tiles.
+// Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
+// and in tiles.
 vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
-// Levels of exactly half and twice a size.
+// Levels of exactly half and exactly twice the size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 
 // The same for images as words.
 #define VKB_WORDS_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_words)
 
-// What an image of the format gives back of what is stored: of STORED_*.
+// How the device rounds a value that is stored in an image of this format, as a STORED_* mode.
 enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format);
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
-// The last pass whose one target the image is; NULL: there is none.
+// The last pass whose only target is the image; NULL: none.
 const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image);
-// The threshold pass that writes `image` from an image of the same size and format; NULL: none.
+// The threshold pass that writes `image` from an image of the same size and format; NULL: no such
+// pass.
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
 
-// The pass reads no more than so many of its images.
+// Removes all images after the first `read_count` from the images that the pass reads.
 void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 
-// Makes a dispatch of a pass over all pixels.
+// Turns a pass over all pixels into a dispatch.
 void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
                        uint32_t block_height);
-// Makes a dispatch of a pass whose images are words, by a block of so many columns and rows for
-// each of ROW_INVOCATIONS.
+// Turns a pass into a dispatch that accesses its images as words. Each of the ROW_INVOCATIONS
+// invocations of a workgroup writes a block of `columns` x `rows` pixels.
 void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
                     uint32_t rows);
-// Whether the images that a pass of words accesses are small enough for that.
+// Whether all images that the pass accesses are small enough for a view of their words.
 bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
-// A pass over all pixels of one target: on processors drawn, where its texels cannot be loaded, on
-// GPUs a compute shader, for some of them (made to compute) draw slowly.
+// A pass over all pixels of one target. On CPUs it is drawn if its texels cannot be loaded. On GPUs
+// it is a compute shader, since GPUs that are made for computing draw slowly.
 bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         struct vkb_error *error);
 

@@ -109,13 +109,13 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
 static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(threshold);
 
-// Whether the pixels of both have the same bytes. (Single floats hold R11G11B10.)
+// Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
 static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 {
     return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
 }
 
-// A composite whose images have one size and format.
+// Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN && !pass->constants.masked
@@ -125,13 +125,14 @@ static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pas
         && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-// A threshold pass between images of one format.
+// Whether the pass is a threshold pass between images of the same format.
 static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     return vkb_is_threshold(pass) && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-// A pass that needs the pixels at each pixel's own place alone, of the first images that it reads.
+// Turns a pass that reads only the pixel at its own position into one that loads it, from the first
+// `read_count` images.
 static void load_pixels(struct vkb_pass_row *row, enum vkb_shader shader, enum vkb_format format,
                         uint32_t read_count)
 {
@@ -201,9 +202,9 @@ struct variant {
     uint32_t least_pixels;  // of the target
 };
 
-// A GPU has no use for strips in an image of few pixels: each invocation walks down its strip
-// alone. On an H200 halving to 512 x 512 takes 29 us in strips and 56 pixel by pixel, to 256 x 256
-// 25 and 18; doubling to 1024 x 1024 33 and 45, to 512 x 512 29 and 15.
+// On a GPU, strips are slow in small images, since one invocation writes a complete strip. On an
+// H200, halving to 512 x 512 takes 29 us in strips and 56 pixel by pixel; to 256 x 256 it takes 25
+// and 18. Doubling to 1024 x 1024 takes 33 and 45; to 512 x 512, 29 and 15.
 enum { HALVE_STRIPS = 1 << 17, DOUBLE_STRIPS = 1 << 19 };
 
 static const struct variant variants_table[] = {
@@ -225,8 +226,8 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "pixels", add_pixels, 0},
 };
 
-// The rows from `first` on, by what stands in the table; one before a fused pass is the method's
-// own.
+// Names the rows from `first` on after the table's variant. A row before a fused pass is the
+// method's own pass.
 static void name_variant(struct vkb_graph *graph, uint32_t first, const char *name)
 {
     for (uint32_t i = first; i < graph->pass_count; ++i) {
@@ -271,12 +272,12 @@ bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *de
 
     if (variants == VKB_VARIANTS_FRAGMENT)
         return true;
-    // The images stay, the passes are laid anew.
+    // The graph keeps its images and gets new passes.
     graph->passes = NULL;
     graph->pass_count = 0;
     graph->pass_capacity = 0;
     for (uint32_t i = 0; done && i < choice.plain.pass_count; ++i) {
-        // Adding an image may move them all.
+        // Adding an image may move the array.
         choice.plain.images = graph->images;
         done = add_variant(&choice, &choice.plain.passes[i], error);
     }

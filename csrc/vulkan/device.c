@@ -165,7 +165,7 @@ static bool is_linear(const struct vkb_device *device, VkFormat format)
         && limits.maxExtent.height >= device->max_side;
 }
 
-// Whether the rows of a linear image are whole words.
+// Whether the row pitch of linear images is a multiple of a word.
 static bool has_whole_words(const struct vkb_device *device)
 {
     VkSubresourceLayout layout;

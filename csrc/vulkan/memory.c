@@ -384,8 +384,8 @@ void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer comma
         .subresourceRange = all_of_image(image),
     };
 
-    // A mapped image is accessed as a buffer, too, whose writes only a memory barrier covers. It
-    // needs another one only where its layout changes.
+    // A mapped image is also accessed as a buffer, and only a memory barrier covers these writes.
+    // It needs an image barrier only if its layout changes.
     vkb_barrier_record(device, commands,
                        !image->mapped || barrier.oldLayout != barrier.newLayout ? &barrier : NULL,
                        image->mapped, image->access, access);

@@ -34,8 +34,8 @@ struct vkb_image {
     VkBufferView words;
 };
 
-// Six layers make a cubemap. A mapped image has one layer and one level, and is a buffer, too;
-// device->words is required.
+// Six layers make a cubemap. A mapped image has one layer and one level, and its memory is also a
+// buffer; this requires device->words.
 struct vkb_image_spec {
     enum vkb_format format;
     uint32_t width, height, layers, levels;

@@ -5,7 +5,7 @@
 #include <stdio.h>
 
 static struct vkb_lock lock;           // protects the list and its elements
-static struct vkb_messages *all_open;  // with the lock
+static struct vkb_messages *all_open;  // accessed with the lock
 static _Thread_local const struct vkb_messages *current;
 
 void vkb_messages_open(struct vkb_messages *messages)

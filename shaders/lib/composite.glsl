@@ -5,7 +5,7 @@
 #include "lib/finite.glsl"
 #include "lib/tonemap.glsl"
 
-// `share` is what of the scene is in the source of the bloom.
+// `share` is the part of the scene from which the bloom was made.
 vec3 composite(vec3 s, vec3 b, float share)
 {
     if (COMPOSITE == COMPOSITE_MIX)

@@ -32,11 +32,11 @@ vec3 from_level(vec3 level, int format)
 }
 
 // The nearest floats with 5 bits of exponent and 6 of mantissa (of blue 5), ties to even: what images
-// of R11G11B10 hold. Negative values and NaN become 0, what is larger than the largest becomes that.
+// of R11G11B10 hold. Negative values and NaN become 0. Larger values become the largest one.
 vec3 nearest_ufloat(vec3 value)
 {
     const uvec3 dropped = uvec3(17, 17, 18);
-    // The least normal one, 2^-14; below it the steps stay the same.
+    // The smallest normal value, 2^-14. Below it the steps are constant.
     const float LEAST = 6.103515625e-5;
     const vec3 steps = vec3(1048576.0, 1048576.0, 524288.0);
     vec3 kept = mix(vec3(0.0), min(value, vec3(UFLOAT11_LIMIT, UFLOAT11_LIMIT, UFLOAT10_LIMIT)),

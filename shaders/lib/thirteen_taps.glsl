@@ -9,7 +9,7 @@ vec4 tap(Place place, float x, float y)
     return sample_at(source, place, vec2(x, y), SAMPLING);
 }
 
-// `apart`: the distance of the inner taps from the middle, in texels of the source.
+// `apart` is the distance of the inner taps from the centre, in texels of the source.
 vec4[5] group_means(Place place, vec2 apart)
 {
     float x = 2.0 * apart.x, y = 2.0 * apart.y;

@@ -23,7 +23,7 @@ vec4 shade()
     vec4 sum = vec4(0.0);
     for (int group = 0; group < 5; ++group) {
         vec4 part = GROUP_SHARES[group] * means[group];
-        // Bevy's buffers hold nothing below 0; ours do, and must not divide by 0 for it.
+        // Bevy's buffers hold no negative values. These do, and the divisor must not become 0.
         float luminance = max(dot(part.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
         sum += part / (1.0 + 0.25 * luminance);
     }

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The first downsample of Blender's bloom: 13 taps in five groups of four, within which each tap is
-// weighted by brightness against fireflies (formulas of the compositor of Blender 4.5).
+// The first downsample of Blender's bloom: 13 taps in five groups of four. Within a group, brighter
+// taps weigh less, against fireflies (formulas of the compositor of Blender 4.5).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -13,7 +13,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
-// A tap times its weight, and the weight.
+// A tap multiplied by its weight, and the weight.
 struct Weighted {
     vec4 value;
     float weight;

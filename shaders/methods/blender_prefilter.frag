@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The highlights of Blender's Glare node: what a colour's brightest channel has above the threshold,
-// with soft ends (formulas of the compositor of Blender 4.5).
+// The highlights of Blender's Glare node: the part of a colour's brightest channel above the
+// threshold, with smooth transitions at both ends (formulas of the compositor of Blender 4.5).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -14,8 +14,8 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 
-// What a soft end of that width takes away (min) or adds (max) at a distance from it (Quilez,
-// "Smooth minimum").
+// The value that a smooth transition of this width subtracts (minimum) or adds (maximum) at a
+// distance from it (Quilez, "Smooth minimum").
 float rounding(float distance_to_end, float width)
 {
     float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
@@ -26,7 +26,7 @@ float rounding(float distance_to_end, float width)
 float highlight(float value)
 {
     float low = params.threshold, range = params.maximum, high = low + range;
-    // So narrow that nothing of the soft parts lies below 0 or beyond the other end.
+    // The widths are limited, so that the transitions stay between 0 and the other end.
     float at_low = min(params.smoothness, min(low, range));
     float at_high = min(params.smoothness, min(high, range));
     float above = value - low;

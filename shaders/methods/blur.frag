@@ -18,7 +18,7 @@ float weight(int tap)
     return params.weights[abs(tap) >> 2][abs(tap) & 3];
 }
 
-// From the first tap to the last, as in all variants of a blur, so that they round alike.
+// Adds from the first tap to the last, as all variants of a blur, so that they round identically.
 vec4 blur_line(Place place, vec2 centre, vec2 tap_step)
 {
     vec4 sum = vec4(0.0);

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// A level from the one above it by four taps one texel to each side: a box of 4 x 4 texels. Against
-// fireflies the taps are weighted by brightness and renormalized (Karis 2013; keijiro/KinoBloom
+// Downsamples a level with four diagonal taps at a distance of one texel: a box of 4 x 4 texels.
+// The firefly filter weights the taps by brightness and renormalizes (Karis 2013; keijiro/KinoBloom
 // @ 0a04c43fa47d, Bloom.cginc).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"

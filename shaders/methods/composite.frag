@@ -15,7 +15,7 @@ layout(set = 0, binding = 3) uniform sampler2D mask;
 #define TARGET_BINDING 4
 #include "lib/fullscreen.glsl"
 
-// The bloom from its image, or from the lines that end in it, as that image would give it back.
+// The bloom from its image; or from the lines of the last blur, rounded as that image would be.
 vec4 bloom_light()
 {
     if (BLOOM == BLOOM_OWN)

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Filament's level from one of even sides above it: 3 x 3 bilinear taps that come near a Gaussian
-// (google/filament, bloomDownsample9.mat @ 523a261b1052).
+// Filament's downsampling of a level with even sides: 3 x 3 bilinear taps that approximate a
+// Gaussian (google/filament, bloomDownsample9.mat @ 523a261b1052).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

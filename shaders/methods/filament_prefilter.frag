@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Filament's reduction: a 3 x 3 binomial between texels as four bilinear taps; with the threshold
-// also its firefly filter, which weights the taps by brightness (google/filament,
+// Filament's reduction: a 3 x 3 binomial filter as four bilinear taps. With the threshold it also
+// has a firefly filter, which weights the taps by brightness (google/filament,
 // bloomDownsample2x.mat @ 9f62dc2f2f53).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
@@ -24,8 +24,8 @@ vec4 shade()
 {
     Place place = PLACE_IN(source);
     vec2 part = place.part;
-    // Along an axis the texels at -1 .. 2 weigh (1 - f, 2 - f, 1 + f, f) / 4: two
-    // taps, each between two of them.
+    // Along an axis the texels at -1 .. 2 have the weights (1 - f, 2 - f, 1 + f, f) / 4. Two
+    // bilinear taps, each between two texels, give these weights.
     vec2 left_share = 0.25 * (3.0 - 2.0 * part), right_share = 0.25 * (1.0 + 2.0 * part);
     vec2 left = (2.0 - part) / (3.0 - 2.0 * part) - 1.0 - part;
     vec2 right = 1.0 + part / (1.0 + 2.0 * part) - part;
@@ -46,7 +46,8 @@ vec4 shade()
     if (THRESHOLDED != 0) {
         vec3 kept = max(sum.rgb - params.threshold, vec3(0.0));
         kept /= 1.0 + brightest(kept) / params.highlight;
-        // The threshold subtracts: alpha takes the factor of the brightest channel.
+        // The threshold subtracts from colours. The alpha is multiplied by the factor of the
+        // brightest channel.
         float value = brightest(sum.rgb);
         sum = vec4(kept, value > 0.0 ? sum.a * (brightest(kept) / value) : 0.0);
     }

@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Levels of several sizes into one image, each enlarged on its own, with its weight.
+// Adds up levels of several sizes: each is enlarged and multiplied by its weight.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/cubic.glsl"

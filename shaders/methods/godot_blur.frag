@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Godot's blur in one direction. The horizontal pass samples the image above at the level's pixels;
-// the vertical one ends the level (godotengine/godot, copy.glsl @ 0a5efd02df51).
+// Godot's blur in one direction. The horizontal pass samples the larger image at the level's
+// pixels; the vertical pass completes the level (godotengine/godot, copy.glsl @ 0a5efd02df51).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -14,14 +14,14 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 
-// Where the sample of a place is read: samples are clamped in pairs.
+// The position from which a sample is read: samples are clamped in pairs.
 int paired(int place, int length)
 {
     int pair = clamp(place & ~1, 0, max(length - 2, 0));
     return min(pair + (place & 1), length - 1);
 }
 
-// In units of the cap, 6 at least; negative luminances count as 0.
+// In units of the cap, which is at least 6. Negative luminances count as 0.
 float luminance(vec4 value)
 {
     return max(dot(value.rgb, vec3(0.299, 0.587, 0.114)), 0.0) / max(params.luminance_cap, 6.0);
@@ -35,11 +35,11 @@ vec4 read(ivec2 pixel, ivec2 size)
     return FIRST != 0 ? value / (1.0 + luminance(value)) : value;
 }
 
-// How much of a colour glows.
+// The part of a colour that glows.
 float feedback(vec4 value)
 {
     float brightest = max(value.r, max(value.g, value.b));
-    // A scale of 0 is a step.
+    // A scale of 0 means a step.
     float t = clamp((brightest - params.threshold) / max(params.threshold_scale, 1e-6), 0.0, 1.0);
     return max(t * t * (3.0 - 2.0 * t), params.glow_bloom);
 }
@@ -49,7 +49,7 @@ vec4 end(vec4 sum)
     if (FIRST == 0)
         return params.strength * sum;
     vec4 value = sum / (1.0 - luminance(sum)) * params.strength;
-    // Neither exposure nor cap is alpha's.
+    // Exposure and cap do not apply to alpha.
     value.rgb *= exp2(params.exposure);
     if (THRESHOLDED != 0)
         value *= feedback(value);

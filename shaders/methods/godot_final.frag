@@ -18,7 +18,7 @@ layout(set = 0, binding = 3) uniform sampler2D mask;
 
 vec3 soft_light(vec3 s, vec3 light)
 {
-    // No further down, for infinity times no light is NaN.
+    // Limited from below, since infinity times 0 is NaN.
     vec3 low = max(s, -1e6);
     vec3 dark = ((16.0 * low - 12.0) * low + 4.0) * low;
     vec3 full = mix(sqrt(max(s, 0.0)), dark, lessThanEqual(s, vec3(0.25)));

@@ -1,9 +1,10 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// HDRP's binomial of order 8 in one direction, which reduces the image along it, and its borders
-// (Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition, BloomBlur.compute
-// @ 0e4ca4d79b2c). The texels before the first one of the first level are the first two in turn; of
-// others, and beyond the last pixel, the outermost sample is repeated.
+// HDRP's binomial filter of order 8 in one direction. It reduces the image along this direction,
+// and treats borders as HDRP does (Unity-Technologies/Graphics,
+// com.unity.render-pipelines.high-definition, BloomBlur.compute @ 0e4ca4d79b2c). Before the first
+// texel of the first level, the first two texels alternate. Before the first texel of other levels,
+// and after the last pixel, the outermost sample is repeated.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -15,7 +16,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
-// The place of a pixel of the target, or of one beyond its border.
+// The position of a pixel of the target, or of one outside of its border.
 Place place_of(ivec2 pixel, ivec2 size)
 {
     if (FIRST != 0)

@@ -1,8 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// HDRP's prefilter: five taps in a turned square, weighted against fireflies (Karis 2013;
-// Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition, BloomPrefilter.compute
-// @ 2309d2c2fde8).
+// HDRP's prefilter: the centre and four diagonal taps, weighted against fireflies (Karis 2013;
+// Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition, BloomPrefilter.compute @
+// 2309d2c2fde8).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

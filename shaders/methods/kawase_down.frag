@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Dual Kawase, down: four times the centre and four diagonals, half a texel of the source times
-// the offset away (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015).
+// Downsampling of dual Kawase: four times the centre, and four diagonal taps at a distance of half
+// a source texel times the offset (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

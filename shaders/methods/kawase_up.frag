@@ -1,7 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Dual Kawase, up: four axial taps one texel of the smaller level times the offset away, and four
-// diagonal ones half as far that count twice (source: kawase_down.frag).
+// Upsampling of dual Kawase: four axial taps at a distance of one texel of the smaller level times
+// the offset, and four diagonal taps at half that distance with twice the weight (source:
+// kawase_down.frag).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

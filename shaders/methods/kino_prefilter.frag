@@ -21,7 +21,7 @@ vec4 tap(float x, float y)
     return vec4(min(value.rgb, vec3(65000.0)), value.a);
 }
 
-// By choice alone: a sum of the three would round.
+// Selects with minimum and maximum only, since arithmetic would round.
 vec4 middle(vec4 a, vec4 b, vec4 c)
 {
     return max(min(a, b), min(max(a, b), c));

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// pygfx' first downsample: 13 taps, or the mean of their five groups weighted by brightness alone;
-// never below 0 (pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c).
+// pygfx' first downsample: 13 taps, or the mean of their five groups weighted only by brightness;
+// at least 0 (pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

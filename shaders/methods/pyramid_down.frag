@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// A level of the pyramid from the one above it by 13 taps.
+// Downsamples a level of the pyramid with 13 taps.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -14,7 +14,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 #include "lib/thirteen_taps.glsl"
 
-// What a group counts: less the brighter it is where fireflies are filtered (Karis 2013).
+// The weight of a group. With the firefly filter, brighter groups weigh less (Karis 2013).
 float group_share(vec4 mean, float share)
 {
     if (FIREFLY_FILTER == 0)
@@ -22,8 +22,8 @@ float group_share(vec4 mean, float share)
     return share / (1.0 + max(dot(mean.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0));
 }
 
-// The 13 taps from a level of exactly twice the size, where they lie between texels: the sum of two
-// separable kernels, as in all variants of such a pass (variants/halve.comp).
+// The 13 taps from a level of exactly twice the size, where all taps are between texels. They are
+// added as two separable kernels, as in all variants of this pass (variants/halve.comp).
 vec4 halved()
 {
     vec4 sum = vec4(0.0);

@@ -1,6 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// A level of the pyramid on the way up: its own share and, upsampled, that of the smaller level.
+// Upsampling in the pyramid: adds the share of the level itself and that of the upsampled smaller
+// level.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/cubic.glsl"
@@ -15,7 +16,7 @@ layout(set = 0, binding = 2) uniform sampler2D own;
 #define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 
-// 3 x 3 taps of weights (1 2 1)^2 / 16.
+// 3 x 3 taps with the weights (1 2 1)^2 / 16.
 vec4 tent(Place place)
 {
     vec4 sum = vec4(0.0);
@@ -28,8 +29,8 @@ vec4 tent(Place place)
     return sum;
 }
 
-// HDRP's border: no place beyond the middle of the last two texels, no tap of the cubic filter beyond
-// 1 - 1 / size of the target.
+// HDRP's border: positions are limited to the middle of the last two texels, taps of the bicubic
+// filter to 1 - 1 / size of the target.
 vec4 upsample_inset(Place place)
 {
     ivec2 size = textureSize(smaller, 0);
@@ -42,7 +43,7 @@ vec4 upsample_inset(Place place)
     return sample_cubic_within(smaller, kept, furthest, SAMPLING);
 }
 
-// The same, or one bilinear tap, where the level is exactly twice as large as the smaller one.
+// The same, or one bilinear tap, for a level of exactly twice the size of the smaller one.
 vec4 doubled()
 {
     ivec2 first = (PIXEL + 1) / 2 - 2;

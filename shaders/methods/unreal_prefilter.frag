@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// three.js' high pass: one bilinear tap, faded in over a step of luminance (mrdoob/three.js,
+// three.js' high pass: one bilinear tap, with a smooth step of its luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"

@@ -6,8 +6,7 @@ layout(location = 1) out vec4 normal;
 layout(location = 2) out vec4 position;
 layout(location = 3) out vec4 brightness;
 
-// Blending does not clamp. So each of the emitters that are added is clamped to its part of the
-// range.
+// Blending does not clamp, so each added emitter is clamped to its part of the range.
 vec3 clamp_to_part(vec3 light)
 {
     const float most = HALF_LIMIT / float(EMITTERS);

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The finished picture where scene and bloom have its size and one format.
+// The composite for a scene and a bloom that have the size and format of the result.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);

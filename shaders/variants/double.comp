@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// A level of the pyramid on the way up to exactly twice the size of the smaller one.
+// Upsampling in the pyramid to exactly twice the size of the smaller level.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(PYRAMID_BLOCK);

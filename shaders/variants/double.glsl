@@ -1,7 +1,7 @@
-// From a level to one of exactly twice its size. An invocation walks down a strip and loads each
-// texel once. A shader that includes this defines, with pixels.glsl, `smaller`, `own` (of the target's
-// size, and of OWN_CHANNELS as the target; HAS_OWN: whether it is read), and shade(): what a pixel
-// becomes by its own pixel and the sum.
+// Upsampling to exactly twice the size. An invocation writes a strip from top to bottom and loads
+// each texel once. The including shader includes pixels.glsl and defines: `smaller`; `own`, an
+// image of the target's size (HAS_OWN: whether it is read; OWN_CHANNELS: its channels and the
+// target's); and shade(), which computes a pixel from the pixel of `own` and the upsampled sum.
 #include "lib/doubling.glsl"
 
 #ifdef WORDS
@@ -9,7 +9,8 @@ const int COLUMNS = DOUBLE_WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROW
 #else
 const int COLUMNS = DOUBLE_COLUMNS, ROWS = DOUBLE_ROWS;
 #endif
-// Texels of the smaller level, columns and rows; a pixel of an odd place starts one texel later.
+// Columns of the smaller level that are loaded for a row. A pixel at an odd position starts one
+// texel later.
 const int LOADED = COLUMNS / 2 + 4;
 const int KEPT = 5;
 

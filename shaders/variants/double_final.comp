@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The finished picture from the largest level of a bloom of twice its size.
+// The last upsampling of the bloom, to exactly twice the size, fused with the composite.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(DOUBLE_FINAL_BLOCK);

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The end of a blur that ran at the size of the bloom buffers: its lines, which have a border of
-// one texel, at every pixel of a target of another size.
+// Enlarges a blur that ran at the size of the bloom buffers: samples its lines, which have a border
+// of one texel, for every pixel of a target of another size.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

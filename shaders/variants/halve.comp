@@ -1,9 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// A level of the pyramid from one of exactly twice its size: the 13 taps, which there lie between
-// texels, as the sum of two separable kernels, (1 1 1 1) / 4 and (1 1 2 2 1 1) / 8 a side, each with
-// half of the weight. An invocation walks down a strip and loads each texel once.
+// Downsampling in the pyramid to exactly half the size. The 13 taps are between texels, so they are
+// the sum of two separable kernels, (1 1 1 1) / 4 and (1 1 2 2 1 1) / 8 along each axis, each with
+// half of the weight. An invocation writes a strip from top to bottom and loads each texel once.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
@@ -41,7 +41,7 @@ vec4 thresholded(vec4 value)
         return value;
     vec4 kept =
         apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
-    // Without a knee it is the texel or 0, which has the format that it would be stored in.
+    // Without a knee the value is the texel or 0, which needs no rounding.
     return THRESHOLD_MODE == THRESHOLD_KNEE ? as_stored(kept, FORMAT) : kept;
 }
 
@@ -50,7 +50,8 @@ void main()
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);
-    // Of the output row that a pair of source rows ends, and of the one that it is the middle of.
+    // The sums of three output rows: a pair of source rows is the end of the first, the middle of
+    // the second and the start of the third.
     vec4 ending[COLUMNS], middle[COLUMNS], starting[COLUMNS];
     vec4 texels[LOADED];
     uvec4 raw[LOADED], stored[COLUMNS];
@@ -70,7 +71,8 @@ void main()
                 vec4 inner = texels[2 * i + 2] + texels[2 * i + 3];
                 vec4 four = inner + texels[2 * i + 1] + texels[2 * i + 4];
                 vec4 six = four + inner + texels[2 * i] + texels[2 * i + 5];
-                // Shares of 1/2 * 1/4 * 1/4 and 1/2 * 1/8 * 1/8 (the two middle rows twice that).
+                // The weights are 1/2 * 1/4 * 1/4 and 1/2 * 1/8 * 1/8 (the two middle rows have
+                // twice that).
                 ending[i] += six / 128.0 + (half_row == 0 ? four / 32.0 : vec4(0.0));
                 middle[i] += six / 64.0 + four / 32.0;
                 starting[i] += six / 128.0 + (half_row == 1 ? four / 32.0 : vec4(0.0));

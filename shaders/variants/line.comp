@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// A blur in one direction where the source's pixels are the target's. An invocation writes a run of
-// LINE_OUTPUTS pixels along the line and loads each texel once for all of them.
+// A blur in one direction with all taps on integer texels. An invocation writes LINE_OUTPUTS pixels
+// along the line and loads each texel once for all of them.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(LINE_BLOCK);
@@ -35,7 +35,7 @@ void add_short(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
             sums[i] += params.kernel[tap >> 2][tap & 3] * texels[i + tap];
 }
 
-// As many taps at a time as there are outputs, for loops of a length that is known.
+// Adds as many taps at a time as there are outputs, so that all loops have a constant length.
 void add_long(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
 {
     vec4 texels[2 * LINE_OUTPUTS - 1];

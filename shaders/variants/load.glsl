@@ -1,12 +1,12 @@
-// Makes a function that loads a run of pixels of one row. Before each inclusion these are defined:
+// Defines a function that loads a run of pixels of one row. Define before each inclusion:
 //
 //   LOAD           its name
 //   LOAD_IMAGE     the image, and LOAD_NUMBER its binding
 //   LOAD_CHANNELS  the channels of its pixels in memory, 3 or 4; storage images have 4
-//   LOAD_FROM      where the run begins, 0 or less, in pixels after `first`
-//   LOAD_COUNT     how many pixels it has
+//   LOAD_FROM      the offset of the run from `first` in pixels, 0 or less
+//   LOAD_COUNT     the number of pixels in the run
 //
-// `first` is a multiple of 16 bytes. Beyond the edges the outermost pixels are repeated.
+// `first` is at a multiple of 16 bytes. Outside of the image, the outermost pixels are repeated.
 
 void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
 {
@@ -41,7 +41,7 @@ void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
             raw[i].x |= packed[at + 1] << (32 - offset);
 #endif
     }
-    // A word of one pixel is clamped already.
+    // If a word is one pixel, its index is clamped already.
     if (BYTES == 16)
         return;
     [[unroll]] for (int i = -LOAD_FROM - 1; i >= 0; --i)

@@ -1,16 +1,16 @@
-// How variants load and store runs of pixels. With WORDS an image is a buffer of 16-byte words, as a
-// CPU has it: llvmpipe loads and stores a word nearly as fast as one channel. Else an image is a
-// storage image. A shader that includes this has included storage.glsl.
+// How variants load and store runs of pixels. With WORDS (on CPUs) an image is a buffer of 16-byte
+// words, since llvmpipe loads and stores a word nearly as fast as one channel. Otherwise it is a
+// storage image. Include storage.glsl before this file.
 //
-// A pixel is `raw` before its channels are floats: with WORDS the bits of its CHANNEL_BYTES bytes a
-// channel, else the bits of single floats. load.glsl and store.glsl make the functions.
+// A `raw` pixel has its channels as bits: with WORDS the bits of CHANNEL_BYTES bytes for each
+// channel, otherwise the bits of single floats. load.glsl and store.glsl define the functions.
 
 #ifdef WORDS
 
 layout(push_constant) uniform Words {
-    ivec4 target;    // width, height, words in a row, first row of what is bound
+    ivec4 target;    // width, height, words in a row, first row of the bound buffer
     ivec4 reads[2];  // by binding, from 1 on: width, height, words in a row
-    uint zero;       // 0, which compilers do not know
+    uint zero;       // 0, but unknown to compilers
 } words;
 
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
@@ -18,7 +18,7 @@ layout(push_constant) uniform Words {
     layout(set = 0, binding = number, std430) writeonly buffer Target { uvec4 row_words[]; } target
 #define READ_SIZE(name, number) (words.reads[number - 1].xy)
 #define TARGET_SIZE() (words.target.xy)
-// Where a dispatch begins that does not reach all rows.
+// The first row of this dispatch, which may cover only some rows of the target.
 #define FIRST_ROW() (words.target.w)
 
 #else
@@ -33,7 +33,7 @@ layout(push_constant) uniform Words {
 
 #endif
 
-// The first pixel of an invocation's block of that size, in the whole target.
+// The first pixel of this invocation's block, in coordinates of the complete target.
 ivec2 first_pixel(ivec2 block)
 {
     return ivec2(gl_GlobalInvocationID.xy) * block + ivec2(0, FIRST_ROW());
@@ -42,7 +42,7 @@ ivec2 first_pixel(ivec2 block)
 vec4 value_of(uvec4 raw)
 {
 #if CHANNEL_BYTES == 1
-    // As llvmpipe reads 8 bits.
+    // The same floats that llvmpipe's samplers return for 8 bits.
     return vec4(ivec4(raw.x, raw.x >> 8, raw.x >> 16, raw.x >> 24) & 255) * (1.0 / 255.0);
 #elif CHANNEL_BYTES == 2
     return vec4(unpackHalf2x16(raw.x), unpackHalf2x16(raw.y));
@@ -54,7 +54,8 @@ vec4 value_of(uvec4 raw)
 uvec4 raw_of(vec4 value)
 {
 #if CHANNEL_BYTES == 1
-    // A sum with 2^23 is rounded to an integer, which its last bits are: Mesa 25 converts lane by lane.
+    // The sum with 2^23 is rounded to an integer, which is in its last bits. A conversion is slow
+    // in Mesa 25, which converts lane by lane.
     uvec4 level = floatBitsToUint(clamp(value, 0.0, 1.0) * 255.0 + 8388608.0) & 255u;
     return uvec4(level.r | level.g << 8 | level.b << 16 | level.a << 24, 0, 0, 0);
 #elif CHANNEL_BYTES == 2
@@ -64,7 +65,7 @@ uvec4 raw_of(vec4 value)
 #endif
 }
 
-// The value with the bits of `own` for its alpha.
+// The value, with the alpha bits of `own`.
 uvec4 with_alpha_of(uvec4 own, vec4 value)
 {
 #if CHANNEL_BYTES == 1
@@ -77,7 +78,7 @@ uvec4 with_alpha_of(uvec4 own, vec4 value)
 #endif
 }
 
-// A value of a bloom buffer, whose alpha is 1 unless it is blurred like a colour.
+// A pixel of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
 uvec4 buffer_of(vec4 value)
 {
 #if CHANNEL_BYTES == 1

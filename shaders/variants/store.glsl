@@ -1,5 +1,5 @@
-// Makes the function that stores a run of STORE_COUNT pixels, a multiple of 16 bytes, to a row of the
-// target, whose pixels have STORE_CHANNELS channels (a storage image: 4).
+// Defines the function that stores a run of STORE_COUNT pixels to a row of the target. The run is a
+// multiple of 16 bytes. Pixels have STORE_CHANNELS channels (4 in a storage image).
 
 void store(int first, int row, uvec4 raw[STORE_COUNT])
 {
@@ -12,7 +12,8 @@ void store(int first, int row, uvec4 raw[STORE_COUNT])
     [[unroll]] for (int i = 0; i < COUNT; ++i) {
         uvec4 word;
         [[unroll]] for (int j = 0; j < 4; ++j) {
-            // The pixel in which this quarter of a word begins, and the bytes of it before that.
+            // The pixel at which this quarter of a word begins, and the number of its bytes that
+            // the previous quarter has.
             int byte = 16 * i + 4 * j, pixel = byte / BYTES, skipped = byte % BYTES;
 #if STORE_CHANNELS * CHANNEL_BYTES == 3
             word[j] = (raw[pixel].x & 0xffffffu) >> 8 * skipped;
@@ -26,7 +27,7 @@ void store(int first, int row, uvec4 raw[STORE_COUNT])
             word[j] = raw[pixel][skipped / 4];
 #endif
         }
-        // (Without the maximum LLVM packs lane by lane, in the loop that stores them.)
+        // Without the maximum, LLVM packs lane by lane in the loop that stores.
         if (start + i <= last)
             target.row_words[row_start + start + i] = max(word, uvec4(words.zero));
     }

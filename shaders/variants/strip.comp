@@ -1,8 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The complete bloom of an image for processors without fast shared memory: an invocation walks down a
-// strip, with the vertical sums of the rows to come in registers.
+// The complete bloom of an image for devices without fast shared memory. An invocation writes a
+// strip from top to bottom and keeps the vertical sums of the following rows in registers.
 #include "variants/fused_bloom.glsl"
 #include "variants/pixels.glsl"
 
@@ -53,14 +53,14 @@ void main()
     [[unroll]] for (int row = 0; row < SUMS; ++row)
         [[unroll]] for (int i = 0; i < LOADED; ++i)
             sums[row][i] = vec3(0.0);
-    // Every loop but this is unrolled: else the sums would be memory.
+    // All other loops are unrolled; otherwise the sums would be in memory.
     for (int y = first.y - STRIP_RADIUS; y < end + STRIP_RADIUS; ++y) {
         load_wide(first.x, clamp(y, 0, size.y - 1), raw);
         [[unroll]] for (int i = 0; i < LOADED; ++i)
             line[i] = thresholded(value_of(raw[i]).rgb);
         [[unroll]] for (int i = 0; i < LOADED; ++i) {
             vec3 added = line[i];
-            // The row that ends here, and those to come, each one place further.
+            // Completes the current row and moves the sums of the following rows by one place.
             line[i] = as_stored(sums[0][i] + weights[STRIP_RADIUS] * added, FORMAT);
             [[unroll]] for (int tap = 1; tap < SUMS; ++tap)
                 sums[tap - 1][i] = sums[tap][i] + weights[abs(STRIP_RADIUS - tap)] * added;

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The complete bloom of an image for GPUs: a workgroup writes a tile, whose vertical sums lie in shared
-// memory between the blurs.
+// The complete bloom of an image for GPUs. A workgroup writes a tile, and keeps its vertical sums
+// in shared memory between the two blurs.
 #include "variants/fused_bloom.glsl"
 
 const int RUN = TILE_ROWS / TILE_RUNS;
@@ -10,8 +10,8 @@ layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
 layout(set = 0, binding = 1) uniform sampler2D image;
 layout(set = 0, binding = 2) uniform writeonly image2D target;
 
-// The vertical sums, packed as their image would hold them, in planes of words so that neighbours
-// lie in neighbouring banks.
+// The vertical sums, packed in the format of their image. They are stored in planes of words, so
+// that neighbours are in neighbouring banks.
 const int WORDS = FORMAT == STORED_SINGLE ? 3 : FORMAT == STORED_HALF ? 2 : 1;
 shared uint sums[WORDS][TILE_ROWS][TILE_LOADED];
 
@@ -45,7 +45,7 @@ vec3 kept_sum(int row, int column)
     return from_level(vec3(uvec3(levels, levels >> 8, levels >> 16) & 255u), FORMAT);
 }
 
-// A run of vertical sums in one column, each texel loaded once.
+// Computes a run of vertical sums in one column and loads each texel once.
 void sum_vertically(ivec2 place, ivec2 last, int top, int column)
 {
     vec3 run[RUN];
@@ -81,7 +81,8 @@ void main()
     if (column >= columns || first.x + column > last.x)
         return;
     for (int i = 0; i < RUN; ++i) {
-        // Rows in turn, so that those of a warp follow each other in memory.
+        // Consecutive invocations take consecutive rows, so that the accesses of a warp are
+        // adjacent in memory.
         int row = i * TILE_RUNS + int(gl_LocalInvocationID.y);
         ivec2 pixel = first + ivec2(column, row);
         if (pixel.y <= last.y)

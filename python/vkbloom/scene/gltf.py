@@ -36,29 +36,28 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     """Load all triangles of a glTF or GLB file as one mesh.
 
-    Node transforms are baked: positions are transformed, normals multiplied by the 3x3 part and
-    normalized again. Colours are COLOR_0 times the material's base colour factor, either being 1
-    where there is none; what is negative in COLOR_0 counts as 0. The y of positions and normals is
-    negated. Where a material emits, the mesh's `emission` is the emissive factor times its
-    strength (KHR_materials_emissive_strength).
+    Node transforms are baked: positions are transformed; normals are multiplied by the 3x3 part and
+    normalized. Colours are COLOR_0 times the material's base colour factor. Each of them is 1 if it
+    is missing, and negative values of COLOR_0 count as 0. The y of positions and normals is
+    negated. If a material emits, the mesh's `emission` is the emissive factor times its strength
+    (KHR_materials_emissive_strength).
 
-    Textures of the base colour and of the emission are read from PNG and JPEG images, decoded by
-    the sRGB curve (3.9.2, 3.9.3) and sampled as their sampler says; one that says nothing of its
-    minification gets mip levels. Any TEXCOORD_n serves, moved by KHR_texture_transform. The texture
-    of an emission whose factor is 0 is not read, for it changes nothing. A base colour's alpha is
-    ignored.
+    Textures of the base colour and of the emission are read from PNG and JPEG images, decoded with
+    the sRGB curve (3.9.2, 3.9.3) and sampled as their sampler states. A texture whose sampler has
+    no minification filter gets mip levels. Any TEXCOORD_n can be used, with KHR_texture_transform.
+    An emissive texture whose factor is 0 is not read. The alpha of a base colour is ignored.
 
-    Nodes of the file's default scene are used, or of its first where it names none, or all root
-    nodes where it has no scenes. Triangles, strips and fans, indexed or not, are read; where there
-    are no normals, flat ones are computed (3.7.2.1). Under a transform of negative determinant the
-    winding is reversed (3.7.4). A normal without length becomes the mesh's y axis, as a shader
-    would make NaN of it. Cameras of the file and `doubleSided` are ignored.
+    The nodes of the file's default scene are used; without a default scene those of the first one;
+    without scenes all root nodes. Triangles, strips and fans are read, with or without indices. If
+    there are no normals, flat ones are computed (3.7.2.1). A transform with a negative determinant
+    reverses the winding (3.7.4). A normal of length 0 becomes the mesh's y axis, since a shader
+    would make it NaN. The file's cameras and `doubleSided` are ignored.
 
     Parameters
     ----------
     path
-        The file. A GLB is known by its first bytes, not by its name. Buffers and images may be in
-        it, in data URIs, or in files in the same folder or under it.
+        The file. A GLB is recognized by its first bytes, not by its name. Buffers and images may be
+        in the file, in data URIs, or in files in the same folder or below it.
 
     Returns
     -------
@@ -67,16 +66,16 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     Warns
     -----
     UserWarning
-        Once a file, with everything in it that is left out: points and lines, other textures, alpha
-        modes, skins, morph targets, animations, extensions.
+        Once for each file, with everything that is not loaded: points and lines, other textures,
+        alpha modes, skins, morph targets, animations, extensions.
 
     Raises
     ------
     OSError
-        The file or one of its buffers or images is not there or cannot be read.
+        The file or one of its buffers or images is missing or cannot be read.
     ValueError
-        The file or an image is damaged, needs an extension that is not supported, refers to
-        something outside of its folder, is too large, or has no triangles; the message names it.
+        The file or an image is damaged, requires an extension that is not supported, refers to a
+        file outside of its folder, is too large, or has no triangles. The message names the cause.
     ModuleNotFoundError
         pygltflib, or OpenImageIO for textures, is not installed.
     """
@@ -89,17 +88,17 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
 
 @dataclass(frozen=True)
 class _Material:
-    """What a material gives its surfaces."""
+    """The factors and textures of a material."""
 
     factor: Floats  # rgb
     emission: Floats  # rgb
-    # None where there is no texture.
+    # None: no texture.
     base_texture: TextureUse | None = None
     emission_texture: TextureUse | None = None
 
     @property
     def textures(self) -> tuple[Texture, Texture] | None:
-        """The two textures of a `Surface`, or None where it needs none."""
+        """The two textures of a `Surface`; None if the material has none."""
         uses = (self.base_texture, self.emission_texture)
         if uses == (None, None):
             return None
@@ -109,7 +108,7 @@ class _Material:
 
 @dataclass(frozen=True)
 class _Geometry:
-    """One primitive in its own space."""
+    """One primitive in its local space."""
 
     positions: Floats  # (n, 3)
     normals: Floats | None  # (n, 3)
@@ -120,7 +119,7 @@ class _Geometry:
 
     @property
     def vertex_count(self) -> int:
-        """Vertices after baking: flat normals need a vertex for every corner."""
+        """The number of vertices after baking: flat normals need one for every corner."""
         return self.triangles.size if self.normals is None else len(self.positions)
 
 
@@ -151,7 +150,8 @@ class _Loader:
         order = list(roots)
         for index in order:
             order.extend(children[index])
-        # Every node has one parent at most, so what no root leads to is in a cycle or below one.
+        # Every node has at most one parent. So a node that is not reached from a root is in a cycle
+        # or below one.
         if len(order) != len(nodes):
             stray = min(set(range(len(nodes))).difference(order))
             self._file.fail(f"damaged: the nodes form a cycle, at or above node {stray}")
@@ -159,7 +159,7 @@ class _Loader:
         starts = roots
         shown = self._file.root.scene
         if shown is None and self._file.items("scenes"):
-            # Scenes are alternatives: all of them at once would be what no viewer shows.
+            # Only one scene is shown, as in other viewers.
             shown = 0
         if shown is not None:
             scene = self._file.item("scenes", shown, "scene")
@@ -171,7 +171,7 @@ class _Loader:
         while pending:
             index, outer = pending.pop()
             node = nodes[index]
-            # Where this overflows, the baked vertices are found not to be finite.
+            # An overflow is found later: the baked vertices are then not finite.
             with np.errstate(over="ignore", invalid="ignore"):
                 world = outer @ self._local_matrix(node, f"nodes[{index}]")
             if node.skin is not None:
@@ -202,7 +202,7 @@ class _Loader:
                 )
             matrix = self._file.floats(node.matrix, f"{what}.matrix", 16).reshape(4, 4).T
             affine_row = (0.0, 0.0, 0.0, 1.0)
-            # Exporters multiply in single precision, so that the row may be rounded.
+            # A tolerance, since exporters multiply in single precision.
             if not np.allclose(matrix[3], affine_row, rtol=0.0, atol=1e-5):
                 self._file.fail(f"damaged: {what}.matrix is not affine")
             matrix[3] = affine_row
@@ -230,7 +230,7 @@ class _Loader:
         """Bake all triangles of the scene into one mesh."""
         vertices: list[NDArray[np.float32]] = []
         texcoords: list[NDArray[np.float32]] = []
-        # By their textures; those without come first.
+        # By textures; triangles without textures come first.
         indices: dict[tuple[Texture, Texture] | None, list[NDArray[np.uint32]]] = {None: []}
         emission: list[NDArray[np.float32]] = []
         read: dict[tuple[int, int], _Geometry | None] = {}
@@ -280,7 +280,7 @@ class _Loader:
     def _bake(
         self, geometry: _Geometry, world: Floats, what: str
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-        """Place a primitive in the renderer's world.
+        """Transform a primitive to the renderer's world space.
 
         Return its rows of `Mesh.vertices`, those of `Mesh.texcoords`, and its triangles.
         """
@@ -336,7 +336,7 @@ class _Loader:
         colours = np.broadcast_to(material.factor, (count, 3))
         if attribute["COLOR_0"] is not None:
             read = self._file.vectors(attribute["COLOR_0"], f"{what}.COLOR_0", count)
-            # 3.7.2.1 asks for 0..1; what is brighter than 1 serves the deferred system.
+            # 3.7.2.1 requires 0..1. Values above 1 are kept for the deferred system.
             colours = material.factor * np.maximum(read, 0.0)
         if primitive.indices is None:
             corners = np.arange(count, dtype=np.int64)
@@ -360,7 +360,7 @@ class _Loader:
         )
 
     def _texcoords(self, primitive: Parsed, material: _Material, count: int, what: str) -> Floats:
-        """Return where in its two textures each vertex lies ``(n, 4)``; 0 without a texture."""
+        """Return each vertex's coordinates in its two textures ``(n, 4)``; 0 without a texture."""
         if material.textures is None:
             return np.broadcast_to(np.float64(0.0), (count, 4))
         texcoords = np.zeros((count, 4))
@@ -378,7 +378,7 @@ class _Loader:
         return texcoords
 
     def _triangles(self, corners: NDArray[np.int64], mode: int, what: str) -> NDArray[np.int64]:
-        """Split a list, a strip or a fan into triangles ``(t, 3)`` by the rules of 3.7.2.1."""
+        """Split a list, a strip or a fan into triangles ``(t, 3)`` as in 3.7.2.1."""
         count = len(corners)
         if count < 3 or (mode == _TRIANGLES and count % 3):
             self._file.fail(
@@ -449,7 +449,7 @@ class _Loader:
 
 
 def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    """Join arrays into one that owns its memory and is read-only, which Mesh takes uncopied."""
+    """Join arrays into a read-only one that owns its memory, which Mesh does not copy."""
     joined = np.concatenate(parts)
     joined.flags.writeable = False
     return joined

@@ -1,8 +1,8 @@
 """glTF 2.0 and GLB files: the container, checked access to the JSON, accessors and buffers.
 
-pygltflib turns the JSON into objects; it checks next to nothing, so everything that is used is
-checked here. A file may come from anywhere: no URI leads out of its folder, sizes are checked
-before memory is taken for them, and whatever is wrong becomes a ValueError that names the file.
+pygltflib turns the JSON into objects with few checks, so everything that is used is checked here.
+Files are not trusted: a URI must not lead out of the file's folder, sizes are checked before memory
+is allocated, and every defect becomes a ValueError that names the file.
 
 Section numbers are those of the "glTF 2.0 Specification", version 2.0.1, Khronos Group.
 """
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from vkbloom.checks import import_extra
 
 Floats: TypeAlias = NDArray[np.float64]
-# An object of pygltflib, which has no types.
+# An object of pygltflib, which has no type hints.
 Parsed: TypeAlias = Any
 
 FLOAT: Final = 5126
@@ -33,23 +33,23 @@ INTEGERS: Final = (5121, 5123, 5125)
 EMISSIVE_STRENGTH: Final = "KHR_materials_emissive_strength"
 TEXTURE_TRANSFORM: Final = "KHR_texture_transform"
 FLOAT_MAX: Final = float(np.finfo(np.float32).max)
-# A node may use a mesh again and a sparse accessor needs no bytes for its zeros, so that a small
-# file can ask for any amount of memory. This many baked vertices take 0.6 GB.
+# A limit, since a small file can need any amount of memory: several nodes can use one mesh, and a
+# sparse accessor stores no zeros. This many baked vertices take 0.6 GB.
 MAX_VERTICES: Final = 2**24
 _COMPONENTS: Final = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _EXTENSIONS: Final = frozenset({EMISSIVE_STRENGTH, TEXTURE_TRANSFORM})
-# Compressed: what it holds is checked when it is decoded.
+# Of compressed bytes. The number of texels is checked when the image is decoded.
 _MAX_IMAGE_BYTES: Final = 2**30
 
 
 class GltfFile:
-    """An opened file: what was parsed, its buffers, and what of it is left out."""
+    """An opened file: its parsed JSON, its buffers, and the list of things that are not loaded."""
 
     def __init__(self, path: Path) -> None:
         pygltflib = import_extra("pygltflib", "scenes", "Reading glTF files")
         self.path = path
-        # A dict for its order and because each thing is named once.
+        # A dict, which keeps the order and names each thing once.
         self.left_out: dict[str, None] = {}
         self._buffers: dict[object, bytes] = {}
         data = path.read_bytes()
@@ -60,8 +60,8 @@ class GltfFile:
             )
         except MemoryError:
             raise
-        # The parser lets through whatever its Python code meets in malformed JSON: AttributeError,
-        # KeyError, RecursionError, ... All of them mean the same.
+        # For malformed JSON, the parser raises any error of its Python code: AttributeError,
+        # KeyError, RecursionError and others. All of them mean the same.
         except Exception as error:
             raise ValueError(
                 f"{path}: not a glTF 2.0 document ({type(error).__name__}: {error})"
@@ -129,21 +129,21 @@ class GltfFile:
         if self.root.animations:
             self.leave_out("animations")
 
-    # Checked access to what was parsed
+    # Checked access to the parsed JSON
 
     def leave_out(self, what: str) -> None:
-        """Note something that the file has and the mesh will not."""
+        """Note something in the file that is not loaded."""
         self.left_out[what] = None
 
     def items(self, field: str) -> list[Parsed]:
-        """Return one of the root's lists, empty where the file has none."""
+        """Return one of the root's lists; an empty one if it is missing."""
         items = getattr(self.root, field) or []
         if not isinstance(items, list):
             self.fail(f"{field} is no list")
         return items
 
     def item(self, field: str, index: object, user: str) -> Parsed:
-        """Return one entry of a list of the root; `user` is what refers to it, for messages."""
+        """Return one entry of a list of the root. Messages name `user`, which refers to it."""
         items = self.items(field)
         if not items:
             self.fail(f"{user}: index into {field} is {reprlib.repr(index)}; there are none")
@@ -153,8 +153,8 @@ class GltfFile:
         return item
 
     def integer(self, value: object, what: str, low: int, high: int) -> int:
-        """Return `value` if it is a whole number of low..high."""
-        # A bool is an int to Python, but not to JSON.
+        """Return `value` if it is an integer in low..high."""
+        # In Python a bool is an int, in JSON it is not.
         if not isinstance(value, int) or isinstance(value, bool):
             self.fail(f"{what} is {reprlib.repr(value)}; a whole number is needed")
         if not low <= value <= high:
@@ -162,13 +162,13 @@ class GltfFile:
         return value
 
     def floats(self, value: object, what: str, size: int, *, low: float = -FLOAT_MAX) -> Floats:
-        """Return a list as an array if it is `size` numbers, each `low` or more and finite."""
+        """Return a list as an array if it has `size` finite numbers of at least `low`."""
         if not isinstance(value, list) or len(value) != size:
             self.fail(f"{what} is {reprlib.repr(value)}; {size} numbers are needed")
         for number in value:
             if isinstance(number, bool) or not isinstance(number, (int, float)):
                 self.fail(f"{what} holds {reprlib.repr(number)}; a number is needed")
-            # False for NaN, and safe for whole numbers too large for a float.
+            # False for NaN. Works for integers that are too large for a float.
             if not low <= number <= FLOAT_MAX:
                 self.fail(f"{what} holds {reprlib.repr(number)}, which is out of range")
         return np.array(value, np.float64)
@@ -178,8 +178,8 @@ class GltfFile:
     def vectors(self, index: object, what: str, count: int | None = None) -> Floats:
         """Read the first three components of a vertex attribute.
 
-        Those are the two of texture coordinates. Colours and texture coordinates may be normalized
-        whole numbers, all else is of floats.
+        Texture coordinates have two. Colours and texture coordinates may be normalized integers;
+        all other attributes must be floats.
         """
         attribute = what.rpartition(".")[2]
         shapes = {"COLOR_0": ("VEC3", "VEC4"), "TEXCOORD": ("VEC2",)}
@@ -229,7 +229,7 @@ class GltfFile:
         return self._with_sparse(accessor.sparse, elements, what)
 
     def _with_sparse(self, sparse: Parsed, elements: NDArray[Any], what: str) -> NDArray[Any]:
-        """Return `elements` with those replaced that a sparse part gives (3.6.2.3)."""
+        """Return `elements` with those replaced that the sparse part contains (3.6.2.3)."""
         places: Parsed = getattr(sparse, "indices", None)
         values: Parsed = getattr(sparse, "values", None)
         if not hasattr(places, "componentType") or not hasattr(values, "bufferView"):
@@ -271,7 +271,7 @@ class GltfFile:
         *,
         what: str,
     ) -> NDArray[Any]:
-        """Return a view ``(count, width)`` into a bufferView, checked to lie within it."""
+        """Return a view ``(count, width)`` of a bufferView, after a check of its bounds."""
         view = self.item("bufferViews", view_index, what)
         user = f"bufferViews[{view_index}]"
         data = self._buffer(view.buffer, user)
@@ -294,7 +294,7 @@ class GltfFile:
         )
 
     def _buffer(self, index: object, user: str) -> bytes:
-        """Return the bytes of a buffer, `byteLength` of them."""
+        """Return the `byteLength` bytes of a buffer."""
         buffer = self.item("buffers", index, user)
         if index in self._buffers:
             return self._buffers[index]
@@ -316,7 +316,7 @@ class GltfFile:
         return self._buffers[index]
 
     def image_bytes(self, index: object, user: str) -> bytes:
-        """Return an image as it is stored, from a bufferView, a data URI or a file."""
+        """Return the encoded bytes of an image, from a bufferView, a data URI or a file."""
         image = self.item("images", index, user)
         what = f"images[{index}]"
         if (image.uri is None) == (image.bufferView is None):
@@ -343,13 +343,12 @@ class GltfFile:
             raise ValueError(f"{self.path}: damaged: base64 of {what}: {error}") from error
 
     def _outer_file(self, uri: str, length: int | None, what: str) -> bytes:
-        """Read `length` bytes (None: all) of a file in the glTF file's folder or under it."""
+        """Read `length` bytes (None: all) of a file in the glTF file's folder or below it."""
         name = unquote(uri)
         shown = reprlib.repr(uri)
         if re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", name):
             self.fail(f"{what}: URI {shown} has a scheme or a drive; only relative paths are read")
-        # A backslash separates folders on some systems only, so it is never taken as a part of
-        # a name.
+        # A backslash separates folders only on some systems. Here it always does.
         parts = re.split(r"[/\\]", name)
         if "\0" in name or name.startswith(("/", "\\")) or ".." in parts:
             self.fail(f"{what}: URI {shown} leads out of the file's folder")
@@ -358,7 +357,7 @@ class GltfFile:
             target = folder.joinpath(*parts).resolve()
         except (OSError, RuntimeError) as error:
             raise OSError(f"{self.path}: {what}: URI {shown}: {error}") from error
-        # After symbolic links are followed.
+        # Checked again, with symbolic links resolved.
         if not target.is_relative_to(folder):
             self.fail(f"{what}: URI {shown} leads out of the file's folder")
         try:
@@ -378,6 +377,6 @@ class GltfFile:
 
 
 def _without_extras(value: dict[str, Any]) -> dict[str, Any]:
-    """Drop what an application stores beside: it may be of any type, pygltflib takes objects."""
+    """Drop "extras": they may have any type, but pygltflib expects objects."""
     value.pop("extras", None)
     return value

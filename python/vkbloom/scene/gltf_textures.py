@@ -20,13 +20,13 @@ from vkbloom.io.srgb import decode_srgb
 from vkbloom.scene.gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
 from vkbloom.scene.textures import MAX_SIDE, AddressMode, Filter, Texture, mip_levels
 
-# The images that glTF has (3.8.3), known by how they begin.
+# The image formats of glTF (3.8.3), by their first bytes.
 _KINDS: Final = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
-# Of all of a file's textures: a small file can hold images that take any amount of memory. This
+# A limit for all textures of a file, since small images can decode to any amount of memory. This
 # many texels take 1.4 GB with their mip levels.
 MAX_TEXELS: Final = 2**27
-# The numbers of samplers (5.26) in WebGPU's words; a minification filter is that of the texels and
-# that between mip levels.
+# The numbers of samplers (5.26) as WebGPU's names. A minification filter has two parts: between
+# texels, and between mip levels.
 _ADDRESS_MODES: Final[dict[int, AddressMode]] = {
     33071: "clamp-to-edge",
     33648: "mirror-repeat",
@@ -45,14 +45,14 @@ _MIN_FILTERS: Final[dict[int, tuple[Filter, Filter | None]]] = {
 
 @dataclass(frozen=True)
 class TextureUse:
-    """A texture of a material, and where a vertex finds its place in it."""
+    """A texture of a material, and its texture coordinates."""
 
     texture: Texture
     coordinates: str  # the attribute, TEXCOORD_0 and so on
     transform: Floats  # (2, 3): applied to (u, v, 1)
 
     def placed(self, coordinates: Floats) -> Floats:
-        """Return texture coordinates ``(n, 2)`` after the transform."""
+        """Return the transformed texture coordinates ``(n, 2)``."""
         with np.errstate(over="ignore", invalid="ignore"):
             placed: Floats = coordinates @ self.transform[:, :2].T + self.transform[:, 2]
         return placed
@@ -67,7 +67,7 @@ class TextureReader:
         self._texels = 0
 
     def use(self, info: Parsed, what: str) -> TextureUse | None:
-        """Read what a material's textureInfo names; None where there is no image to read."""
+        """Read the texture of a material's textureInfo; None if it has no supported image."""
         texture = self._file.item("textures", info.index, what)
         user = f"textures[{info.index}]"
         if texture.source is None:
@@ -91,8 +91,8 @@ class TextureReader:
     def _transform(self, given: dict[str, Any], what: str) -> Floats:
         """Return the matrix ``(2, 3)`` of KHR_texture_transform: offset * rotation * scale.
 
-        The rotation is counter-clockwise as one sees it, v pointing down, as in the example of the
-        extension's text.
+        With v pointing down, the rotation appears counter-clockwise, as in the example in the
+        extension's specification.
         """
         what = f"{what}.{TEXTURE_TRANSFORM}"
         offset = self._file.floats(given.get("offset", [0.0, 0.0]), f"{what}.offset", 2)
@@ -104,7 +104,7 @@ class TextureReader:
     def _texture(self, texture: Parsed, user: str) -> Texture:
         address_mode: list[AddressMode] = ["repeat", "repeat"]
         mag_filter: Filter = "linear"
-        # Without a wish: what aliases least.
+        # The default is the filter with the least aliasing.
         min_filter: Filter = "linear"
         mipmap_filter: Filter | None = "linear"
         if texture.sampler is not None:
@@ -135,8 +135,8 @@ class TextureReader:
     def _picture(self, index: object, user: str) -> NDArray[np.float16]:
         """Read an image as linear rgb, with an alpha of 1.
 
-        Base colours and emission are encoded by the sRGB curve, whatever the image says of its
-        colours (3.8.3, 3.9.2); so alphaMode OPAQUE has no use for the image's alpha.
+        Base colours and emission are sRGB-encoded, whatever colour space the image declares (3.8.3,
+        3.9.2). The image's alpha is not used, as in alphaMode OPAQUE.
         """
         data = self._file.image_bytes(index, user)
         what = f"images[{index}]"
@@ -145,7 +145,7 @@ class TextureReader:
             self._file.fail(f"{what} is neither PNG nor JPEG")
         stored = self._decoded(data, suffix, what)
         scale = np.iinfo(stored.dtype).max
-        # By table: exact for each of the few values that there are.
+        # A table, since there are only a few values.
         table = decode_srgb(np.arange(scale + 1) / scale).astype(np.float16)
         picture = np.ones((*stored.shape[:2], 4), np.float16)
         picture[:, :, :3] = table[stored[:, :, :3] if stored.shape[2] > 2 else stored[:, :, :1]]
@@ -154,7 +154,7 @@ class TextureReader:
     def _decoded(self, data: bytes, suffix: str, what: str) -> NDArray[Any]:
         """Return an image's values ``(h, w, C)``: uint8 or uint16, C 1 to 4."""
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
-            # OpenImageIO's Python module reads files only.
+            # OpenImageIO's Python module can only read files.
             path = Path(folder) / f"image{suffix}"
             path.write_bytes(data)
             try:
@@ -170,7 +170,8 @@ class TextureReader:
                     check_plausible(spec, path)
                     kind = "uint16" if str(spec.format) == "uint16" else "uint8"
                     pixels = reader.read_image(0, 0, 0, channels, kind)
-                    # A file that ends early gives what is there, and says so.
+                    # For a truncated file, OpenImageIO returns the part that is there and reports
+                    # an error.
                     reason = failure_of(reader)
             except ValueError as error:
                 reason = str(error)

@@ -31,7 +31,7 @@ _TEXELS: Final[dict[tuple[int, int, int], tuple[int, str]]] = {
 
 
 def _aligned(size: int) -> int:
-    """Round a size in bytes up to the 4 bytes that KTX 1 aligns rows and images to."""
+    """Round a size in bytes up to a multiple of 4: KTX 1 aligns rows and images to 4 bytes."""
     return (size + 3) & ~3
 
 
@@ -46,16 +46,16 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], ...]:
     Returns
     -------
     tuple of ndarray
-        One array ``(6, n, n, C)`` a level, largest first, faces in the order +x, -x, +y, -y, +z,
-        -z; C is 3 or 4; dtype uint8, float16 or float32. The arrays own their memory.
+        One array ``(6, n, n, C)`` for each level, the largest first. The faces are in the order +x,
+        -x, +y, -y, +z, -z; C is 3 or 4; the dtype is uint8, float16 or float32. The arrays own
+        their memory.
 
     Raises
     ------
     OSError
-        The file is not there or cannot be read.
+        The file is missing or cannot be read.
     ValueError
-        The file is damaged or holds something else than such a cubemap; the message names the
-        file.
+        The file is damaged or is not such a cubemap. The message names the file.
     """
     path = Path(path)
     data = path.read_bytes()
@@ -101,7 +101,7 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], ...]:
             f"{gl_format:#06x}, glType {gl_type:#06x}; RGBA8, RGB8, RGBA16F, RGB16F, RGBA32F "
             "and RGB32F can be read"
         )
-    # 0 asks the reader to make the levels itself, so the file holds the first one only.
+    # With 0 the file has only the first level, and the reader has to make the others.
     level_count = max(level_count, 1)
     if level_count > width.bit_length():
         raise ValueError(
@@ -127,7 +127,7 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], ...]:
                 f"{path}: damaged: level {level} gives {image_size} bytes a face; "
                 f"{side} x {side} has {face}"
             )
-        # Rows are padded to 4 bytes, so faces and levels need no padding of their own.
+        # Rows are padded to 4 bytes, so faces and levels need no padding.
         texels = np.ndarray(
             (6, side, side, channels),
             stored,

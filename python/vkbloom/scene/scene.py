@@ -175,11 +175,11 @@ class Scene:
 
     @property
     def contents_serial(self) -> int:
-        """A number that just the scenes of the same meshes and sky share, whatever their camera."""
+        """A number that only scenes with the same meshes and sky share, whatever their camera."""
         return self._contents.serial
 
     def __reduce__(self) -> tuple[type[Scene], tuple[Any, ...]]:
-        # A copy gets a serial of its own: in another process this one's may be taken.
+        # A copy gets its own serial, since another process may have used this one.
         return Scene, (self.body, self.glow, self.skybox, self.camera, self.glow_intensity)
 
     @classmethod
@@ -205,7 +205,7 @@ class Scene:
         >>> vkbloom.Scene.ufo().glow is not None
         True
         """
-        # The folder as a whole, because the glTF files refer to others in it.
+        # The complete folder, because the glTF files refer to other files in it.
         with resources.as_file(resources.files("vkbloom") / "assets") as assets:
             return cls.from_gltf(
                 assets / "saucer.gltf",
@@ -228,7 +228,7 @@ class Scene:
         Parameters
         ----------
         base : str or path-like
-            File of the mesh that is lit; see `vkbloom.scene.gltf.load_mesh` for what is read.
+            File of the mesh that is lit. `vkbloom.scene.gltf.load_mesh` lists what is read.
         glow : str or path-like, optional
             File of the mesh that glows, or None.
         skybox : str, path-like, sequence of these, ndarray or Cubemap, optional
@@ -249,9 +249,9 @@ class Scene:
         TypeError
             An argument has another type.
         OSError
-            A file is not there or cannot be read.
+            A file is missing or cannot be read.
         ValueError
-            A file is damaged or holds no triangles, or an argument is out of range.
+            A file is damaged or has no triangles, or an argument is out of range.
         ModuleNotFoundError
             pygltflib, or OpenImageIO for an image, is not installed.
 
@@ -278,7 +278,7 @@ class Scene:
         )
 
     def with_camera(self, camera: Camera) -> Scene:
-        """Return a scene that shares everything with this one but the camera.
+        """Return this scene with another camera. They share all other data.
 
         `dataclasses.replace` does the same for any field.
 
@@ -293,7 +293,7 @@ class Scene:
         Raises
         ------
         TypeError
-            `camera` is none.
+            `camera` is not a Camera.
 
         See Also
         --------
@@ -334,7 +334,7 @@ class Scene:
 
     def _repr_html_(self) -> str:
         """Return the page of `display.scene_html`."""
-        # Late: pictures are of no use where nobody looks.
+        # Imported here, since only notebooks need it.
         from vkbloom.views import display  # noqa: PLC0415
 
         return display.scene_html(

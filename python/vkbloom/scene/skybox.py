@@ -1,8 +1,8 @@
 """Cubemaps for the sky: from KTX 1, six face images, one equirectangular image, or an array.
 
-Face images and KTX faces are used as they are: no colour decoding, no flip. The sky is looked up
-by the object-space position of a cube whose y the renderer has negated like that of every mesh,
-and its projection has no y flip, so the -y face appears at the top of the frame.
+Face images and KTX faces are used without colour decoding and without a flip. The sky is sampled in
+the direction of the object-space position on a cube. The renderer negates its y, as that of every
+mesh, and the projection has no y flip. So the -y face appears at the top of the frame.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from vkbloom.scene import ktx
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
-# Far beyond the 4096 that every Vulkan device must have; keeps a damaged image's size from being
-# taken at its word. The device's own limit is checked at upload.
+# Far above the 4096 that every Vulkan device supports. It rejects the sizes of damaged images. The
+# device's own limit is checked at upload.
 MAX_SIDE: Final = 16384
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Return `array` as a C-contiguous array that nobody can write to.
+    """Return `array` as a C-contiguous array that cannot be changed.
 
-    An array that is so already and owns its memory is returned itself; any other is copied,
-    because a read-only view can still change under the hands of its base's owner.
+    An array that is read-only, C-contiguous and owns its memory is returned itself. Any other is
+    copied, because the base of a read-only view can still be changed.
     """
     flags = array.flags
     if flags.writeable or not flags.c_contiguous or not flags.owndata:
@@ -47,16 +47,17 @@ class Cubemap:
     Parameters
     ----------
     levels
-        Arrays ``(6, n, n, 4)`` of one dtype (uint8, float16 or float32), faces in the order +x,
-        -x, +y, -y, +z, -z, top row first, RGBA. n is floor-halved from level to level, never
-        under 1; the chain may end early. Arrays are copied unless they are read-only owners.
+        Arrays ``(6, n, n, 4)`` of one dtype (uint8, float16 or float32): faces in the order +x, -x,
+        +y, -y, +z, -z, top row first, RGBA. n is halved and rounded down from level to level, but
+        at least 1. The chain may end before 1. Arrays are copied unless they are read-only and own
+        their memory.
 
     Raises
     ------
     TypeError
         A level is not an array of one of these dtypes.
     ValueError
-        The shapes do not make a mip chain.
+        The shapes are not a mip chain.
     """
 
     levels: tuple[NDArray[Any], ...]
@@ -110,12 +111,12 @@ SkyboxSource: TypeAlias = (
 
 
 def level_limit(side: int) -> int:
-    """Return the number of levels from `side` down to 1, each the floored half of the last."""
+    """Return the number of levels from `side` to 1, each half of the one before, rounded down."""
     return side.bit_length()
 
 
 def load(source: SkyboxSource) -> Cubemap:
-    """Make a cubemap from whatever a skybox may be given as.
+    """Make a cubemap from any type of skybox argument.
 
     Parameters
     ----------
@@ -127,16 +128,17 @@ def load(source: SkyboxSource) -> Cubemap:
     Returns
     -------
     Cubemap
-        With the file's own mip levels where it has more than one, else with all of them.
+        With the file's mip levels if it has more than one; otherwise with all levels, which are
+        computed.
 
     Raises
     ------
     TypeError
-        `source` is none of these.
+        `source` has another type.
     OSError
-        A file is not there or cannot be read.
+        A file is missing or cannot be read.
     ValueError
-        A file is damaged or does not fit; the message names the file.
+        A file is damaged or has a wrong size or format. The message names the file.
     ModuleNotFoundError
         An image is given and OpenImageIO is not installed.
     """
@@ -166,7 +168,8 @@ def from_array(faces: NDArray[Any]) -> Cubemap:
     ----------
     faces
         ``(6, N, N, C)``, faces in the order +x, -x, +y, -y, +z, -z, top row first; C is 3 (alpha
-        becomes 1, or 255) or 4; dtype uint8, float16 or float32. N need not be a power of two.
+        becomes 1, or 255) or 4; dtype uint8, float16 or float32. N does not have to be a power of
+        two.
 
     Returns
     -------
@@ -175,9 +178,9 @@ def from_array(faces: NDArray[Any]) -> Cubemap:
     Raises
     ------
     TypeError
-        The dtype is another.
+        The array has another dtype.
     ValueError
-        The shape is another.
+        The array has another shape.
     """
     if faces.dtype.newbyteorder("=") not in DTYPES:
         raise TypeError(f"skybox is {faces.dtype}; uint8, float16 or float32 is needed")
@@ -191,19 +194,20 @@ def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
     Parameters
     ----------
     path
-        See `vkbloom.scene.ktx.read` for the texel formats.
+        The file. `vkbloom.scene.ktx.read` lists the texel formats.
 
     Returns
     -------
     Cubemap
-        With the file's mip levels where it has more than one, else with all of them.
+        With the file's mip levels if it has more than one; otherwise with all levels, which are
+        computed.
 
     Raises
     ------
     OSError
-        The file is not there or cannot be read.
+        The file is missing or cannot be read.
     ValueError
-        The file is damaged or no cubemap; the message names it.
+        The file is damaged or is not a cubemap. The message names it.
     """
     levels = ktx.read(path)
     if len(levels) == 1:
@@ -217,9 +221,9 @@ def from_faces(paths: Sequence[str | os.PathLike[str]]) -> Cubemap:
     Parameters
     ----------
     paths
-        Image files in the order +x, -x, +y, -y, +z, -z; square, of one size, one dtype, RGB or
-        RGBA. 8-bit images stay uint8 and half-float ones float16; 16-bit integers become float32
-        of 0..1.
+        Image files in the order +x, -x, +y, -y, +z, -z. They are square, RGB or RGBA, and have the
+        same size and dtype. 8-bit images stay uint8, half-float images float16; 16-bit integers
+        become float32 in 0..1.
 
     Returns
     -------
@@ -230,9 +234,10 @@ def from_faces(paths: Sequence[str | os.PathLike[str]]) -> Cubemap:
     TypeError
         An entry is not a path.
     OSError
-        A file is not there or cannot be read.
+        A file is missing or cannot be read.
     ValueError
-        There are not six, or a file is damaged or does not fit the others; the message names it.
+        There are not six paths, or a file is damaged or differs from the others in size or dtype.
+        The message names it.
     ModuleNotFoundError
         OpenImageIO is not installed.
     """
@@ -269,15 +274,15 @@ def from_equirectangular(path: str | os.PathLike[str]) -> Cubemap:
     Returns
     -------
     Cubemap
-        Its faces have round(width / 4) pixels a side; see `project_equirectangular` for the
+        Its faces have a side of round(width / 4) pixels. `project_equirectangular` states the
         directions.
 
     Raises
     ------
     OSError
-        The file is not there or cannot be read.
+        The file is missing or cannot be read.
     ValueError
-        The file is damaged or not twice as wide as high; the message names it.
+        The file is damaged, or is not twice as wide as high. The message names it.
     ModuleNotFoundError
         OpenImageIO is not installed.
     """
@@ -294,17 +299,17 @@ def from_equirectangular(path: str | os.PathLike[str]) -> Cubemap:
 def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
     """Resample an equirectangular panorama to the faces of a cube.
 
-    In the renderer's world -y is up: meshes have their y negated and the projection has no y flip.
-    The panorama's top row is therefore the direction -y, its centre column -z (straight ahead of a
-    camera without rotation), and columns to the right of the centre lead to +x, which that camera
-    sees on its right: the picture appears upright and unmirrored.
+    In the renderer's world -y is up: the y of meshes is negated, and the projection has no y flip.
+    So the panorama's top row is the direction -y. Its centre column is -z, straight ahead of a
+    camera without rotation. Columns to the right of the centre are towards +x, which this camera
+    sees on its right. The picture appears upright and not mirrored.
 
     Parameters
     ----------
     panorama
         ``(H, W, C)``, uint8, float16 or float32, top row first.
     side
-        Pixels of a face's side, at least 1.
+        Side of a face in pixels, at least 1.
 
     Returns
     -------
@@ -356,17 +361,17 @@ def mip_levels(faces: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     Returns
     -------
     tuple of ndarray
-        `faces` and every next level down to 1 x 1. A pixel is the mean of the 2 x 2 pixels above
-        it; the last row and column of an odd side are left out, as sides are floored. Means are
-        carried in float32 and rounded to the dtype once a level, so that errors do not add up.
-        NaN and infinity count as 0 in them.
+        `faces` and all smaller levels down to 1 x 1. A pixel is the mean of 2 x 2 pixels of the
+        next larger level. The last row and column of an odd side are left out, as sides are rounded
+        down. Means are computed in float32 and rounded to the dtype once for each level, so that
+        errors do not add up. NaN and infinity count as 0.
     """
     levels = [faces]
     mean = _finite(faces)
     while mean.shape[1] > 1:
         side = mean.shape[1] // 2
         quads = mean[:, : 2 * side, : 2 * side].reshape(6, side, 2, side, 2, -1)
-        # A quarter of each before the sum: four of the largest float32 must not overflow.
+        # Multiplied before the sum, so that four of the largest float32 do not overflow.
         mean = (quads * np.float32(0.25)).sum(axis=(2, 4))
         levels.append(_as_dtype(mean, faces.dtype))
     return tuple(levels)
@@ -389,7 +394,7 @@ def _check_faces(field: str, faces: NDArray[Any], *, channels: tuple[int, ...]) 
 
 
 def _with_alpha(image: NDArray[Any]) -> NDArray[Any]:
-    """Return `image` with a fourth channel of 1 (255) where it has three."""
+    """Return `image` with a fourth channel of 1 (255) if it has three."""
     if image.shape[-1] == 4:
         return image
     full = np.empty((*image.shape[:-1], 4), image.dtype)
@@ -399,7 +404,7 @@ def _with_alpha(image: NDArray[Any]) -> NDArray[Any]:
 
 
 def _finite(image: NDArray[Any]) -> NDArray[np.float32]:
-    """Return `image` in float32, 0 in place of NaN and infinity, which a mean would spread."""
+    """Return `image` in float32. NaN and infinity become 0, since a mean would spread them."""
     values = image.astype(np.float32)
     values[~np.isfinite(values)] = 0.0
     return values
@@ -410,13 +415,13 @@ def _as_dtype(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
 
 
 def _split(coordinate: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Split texel coordinates into whole texels and the fractions beyond them (with one axis)."""
+    """Split texel coordinates into integer texels and fractions (with a new last axis)."""
     whole = np.floor(coordinate)
     return whole.astype(np.intp), (coordinate - whole).astype(np.float32)[..., np.newaxis]
 
 
 def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
-    """Read an RGB or RGBA image file as ``(H, W, C)``, texels as they are stored."""
+    """Read an RGB or RGBA image file as ``(H, W, C)``, with its stored values."""
     name = os.fspath(path)
     with opened(path, "Reading sky images") as image:
         spec = image.spec()
@@ -427,7 +432,7 @@ def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
         check_plausible(spec, name)
         kind = str(spec.format) if str(spec.format) in ("uint8", "half") else "float"
         pixels = image.read_image(0, 0, 0, spec.nchannels, kind)
-        # A file that ends early gives what is there, and says so.
+        # For a truncated file, OpenImageIO returns the part that is there and reports an error.
         if pixels is None or image.has_error:
             raise ValueError(f"{name}: damaged: {failure_of(image)}")
     result: NDArray[Any] = np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)

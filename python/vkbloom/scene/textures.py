@@ -1,4 +1,4 @@
-"""Textures of meshes: pictures that a surface's colours are multiplied by."""
+"""Textures of meshes: pictures by which a surface's colours are multiplied."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from vkbloom.scene.skybox import read_only
 
-#: What lies beyond a texture's edge, and how texels are weighed: the names of WebGPU.
+#: How a texture continues beyond its edge, and how texels are filtered: WebGPU's names.
 AddressMode = Literal["repeat", "mirror-repeat", "clamp-to-edge"]
 Filter = Literal["nearest", "linear"]
 
-#: The longest side: far beyond the 4096 that every Vulkan device must have; the device's own limit
-#: is checked at upload.
+#: The longest side, far above the 4096 that every Vulkan device supports. The device's own limit is
+#: checked at upload.
 MAX_SIDE: Final = 16384
 
 
@@ -27,13 +27,14 @@ class Texture:
     ----------
     levels
         Arrays ``(h, w, 4)`` of float16, all finite: linear RGBA, top row first; sides 1..16384. h
-        and w are floor-halved from level to level, never under 1; the chain may end early, and one
-        level alone is a texture without mip levels. Arrays are copied unless they are read-only
-        owners of their memory.
+        and w are halved and rounded down from level to level, but at least 1. The chain may end
+        early; a single level is a texture without mip levels. Arrays are copied unless they are
+        read-only and own their memory.
     address_mode
-        Across and down: "repeat", "mirror-repeat" or "clamp-to-edge".
+        Horizontal and vertical: "repeat", "mirror-repeat" or "clamp-to-edge".
     mag_filter, min_filter
-        "nearest" or "linear", where a texel is larger or smaller than a pixel.
+        "nearest" or "linear": used where a texel is larger (`mag_filter`) or smaller (`min_filter`)
+        than a pixel.
     mipmap_filter
         "nearest" or "linear": the nearest level, or a mean of two.
 
@@ -42,7 +43,7 @@ class Texture:
     TypeError
         A level is not an array of float16.
     ValueError
-        The shapes do not make a mip chain, a value is not finite, or a name is unknown.
+        The shapes are not a mip chain, a value is not finite, or a name is unknown.
     """
 
     levels: tuple[NDArray[np.float16], ...]
@@ -109,16 +110,16 @@ class Surface:
     index_count
         Entries of the mesh's indices, a positive multiple of 3.
     base
-        What the vertex colours are multiplied by, at the first two texture coordinates.
+        Multiplies the vertex colours; sampled at the first two texture coordinates.
     emission
-        What the emission is multiplied by, at the last two.
+        Multiplies the emission; sampled at the last two texture coordinates.
 
     Raises
     ------
     TypeError
         A texture has another type.
     ValueError
-        `index_count` is no positive multiple of 3.
+        `index_count` is not a positive multiple of 3.
     """
 
     index_count: int
@@ -146,10 +147,10 @@ def mip_levels(picture: NDArray[np.float16]) -> tuple[NDArray[np.float16], ...]:
     Returns
     -------
     tuple of ndarray
-        The picture, then each level half the size, floored, down to 1 x 1. A texel is the mean of
-        the part of the level above it that it covers: of two texels each way where a side is even,
-        of three by their shares where it is odd (Guthe and Heckbert, "Non-Power-of-Two
-        Mipmapping", NVIDIA, 2005). Means are carried in float32 and rounded once a level.
+        The picture and all smaller levels down to 1 x 1; sizes are halved and rounded down. A texel
+        is the mean of the part of the larger level that it covers: of two texels along an even
+        side, and of three weighted texels along an odd side (Guthe and Heckbert, "Non-Power-of-Two
+        Mipmapping", NVIDIA, 2005). Means are computed in float32 and rounded once for each level.
     """
     levels = [picture]
     mean: NDArray[Any] = picture
