@@ -83,6 +83,7 @@ static bool add_placing(const struct convolution *convolution, uint32_t kernel, 
 
     row.geometry = VKB_GEOMETRY_DISPATCH;
     row.vertex = (enum vkb_shader)0;
+    row.variant = "dispatch";
     row.block_width = row.block_height = PIXEL_INVOCATIONS;
     row.reads[0] = kernel;
     row.read_count = 1;

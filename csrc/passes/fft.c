@@ -110,6 +110,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     row.geometry = VKB_GEOMETRY_DISPATCH;
     row.vertex = (enum vkb_shader)0;
     row.reading = VKB_READING_LOADED;
+    row.variant = "dispatch";
     row.block_width = row.block_height = 1;
     row.groups_width = groups(horizontal ? count : stage->lines, FFT_COLUMNS);
     row.groups_height = groups(horizontal ? stage->lines : count, FFT_ROWS);

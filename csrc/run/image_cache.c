@@ -144,21 +144,24 @@ static bool check_dispatches(const struct vkb_device *device, const struct vkb_g
     return true;
 }
 
-// All images of a graph must fit the largest heap of the device together.
+// The images of a convolution, which are many times larger than the frame, must fit the largest heap
+// of the device together.
 static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
                          struct vkb_error *error)
 {
     uint64_t needed = 0, largest = 0;
+    bool convolves = false;
 
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         const struct vkb_image_row *row = &graph->images[i];
+        convolves = convolves || row->serial;
         needed += (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
     }
     for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
         if (device->memory.memoryHeaps[i].size > largest)
             largest = device->memory.memoryHeaps[i].size;
     // Plans without a renderer know no heaps.
-    if (largest && needed > largest)
+    if (convolves && largest && needed > largest)
         return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
                         "%llu MiB of images are needed, and the adapter %s has %llu; use a smaller "
                         "bloom_scale",

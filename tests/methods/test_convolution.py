@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom import Convolution, Error, OutOfMemoryError, Renderer, Settings, psf, reference
+from vkbloom import Convolution, OutOfMemoryError, Renderer, Scene, Settings, psf, reference
 from vkbloom.reference.convolution import convolve, prefiltered
 
 BOUNDARIES = ("zero", "edge", "wrap", "wrap_x")
@@ -241,8 +241,9 @@ def test_a_kernel_without_a_sum(renderer: Renderer) -> None:
     assert_close(renderer, image_of(4, 4), settings.replace(normalize=False))
 
 
-def test_too_large(renderer: Renderer) -> None:
-    """Found out by the plan, before any work."""
-    image = np.broadcast_to(np.float32(0), (16000, 16000, 3))
-    with pytest.raises((OutOfMemoryError, Error), match=r"MiB of images are needed|size"):
-        renderer.plan(image, Convolution(kernel_of(3, 3)))
+def test_too_large(renderer: Renderer, scene: Scene) -> None:
+    """An error of the plan, with the memory that is needed, before any work."""
+    size = (8000, 8000)
+    # Three images of 8192 x 8192 or less, 16 bytes a texel.
+    with pytest.raises(OutOfMemoryError, match=r"[34]\d{3} MiB of images are needed"):
+        renderer.plan(scene, Convolution(kernel_of(3, 3), bloom_size=size), size)
