@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import vkbloom
 
 #: Selects the variants of passes for renderers that are made while it is set.
-FORM_VARIABLE = "VKBLOOM_FORM"
+VARIANTS_VARIABLE = "VKBLOOM_FORM"
 
 
 def usable_cores() -> int:
@@ -76,7 +76,7 @@ class Plan:
 
     def renderer(self, variant: str = "auto") -> vkbloom.Renderer:
         """Make a renderer with VKBLOOM_FORM set to `variant`."""
-        with _environment(FORM_VARIABLE, variant):
+        with _environment(VARIANTS_VARIABLE, variant):
             return vkbloom.Renderer(self.adapter)
 
 

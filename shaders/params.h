@@ -271,7 +271,7 @@
 #define LINE_OUTPUTS           8
 #define LINE_VEC4S             34
 #define STRIP_RADIUS           4
-#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
+#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
 #define STRIP_ROWS             135
 #define HALVE_COLUMNS          4
 #define HALVE_ROWS             16
@@ -306,8 +306,9 @@
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
-// applies the threshold. FIRST marks an engine's first level. LEVELS is the number of levels that a
-// pass adds up. RADIX_A to STAGE are of Fourier transforms (fft.comp).
+// applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
+// first level. LEVELS is the number of levels that a pass adds up. RADIX_A to STAGE are of Fourier
+// transforms (fft.comp).
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -332,12 +333,13 @@
     CONSTANT(20, NODE, node) \
     CONSTANT(21, ALPHA, alpha) \
     CONSTANT(22, MASKED, masked) \
-    CONSTANT(23, RADIX_A, radix_a) \
-    CONSTANT(24, RADIX_B, radix_b) \
-    CONSTANT(25, INVERSE, inverse) \
-    CONSTANT(26, ROTATED, rotated) \
-    CONSTANT(27, PADDED, padded) \
-    CONSTANT(28, STAGE, stage)
+    CONSTANT(23, STORED, stored) \
+    CONSTANT(24, RADIX_A, radix_a) \
+    CONSTANT(25, RADIX_B, radix_b) \
+    CONSTANT(26, INVERSE, inverse) \
+    CONSTANT(27, ROTATED, rotated) \
+    CONSTANT(28, PADDED, padded) \
+    CONSTANT(29, STAGE, stage)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -6,7 +6,9 @@ import ctypes
 import dataclasses
 import gc
 import os
+import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,16 +18,17 @@ import pytest
 
 from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
 
-#: What the tests run on; a GPU is tested by hand, with VKBLOOM_TEST_ADAPTER=hardware.
+#: The adapter of the tests. For a GPU, set VKBLOOM_TEST_ADAPTER=hardware.
 ADAPTER = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # A shell starts background jobs with SIGINT ignored, which the tests' processes would inherit.
+    # A shell starts background jobs with SIGINT ignored, and the tests' processes would inherit
+    # that.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # A slow machine is no failure.
-    hypothesis.settings.register_profile("untimed", deadline=None)
+    # A slow machine must not fail a test. Where more examples find more, a test asks for them.
+    hypothesis.settings.register_profile("untimed", deadline=None, max_examples=30)
     hypothesis.settings.load_profile("untimed")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
 
@@ -89,14 +92,15 @@ def modules_stay(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def renderer(environment: None) -> Iterator[Renderer]:
-    """A renderer whose first validation message raises, at the latest when it is closed."""
+    """A renderer whose first validation message raises an exception, at the latest when it is
+    closed."""
     with Renderer(validation=True) as opened:
         yield opened
 
 
 @pytest.fixture
 def new_renderer() -> Iterator[Callable[[], Renderer]]:
-    """Opens renderers as `renderer` is one, and closes them after the test."""
+    """Opens renderers like `renderer`, and closes them after the test."""
     opened: list[Renderer] = []
 
     def open_one() -> Renderer:
@@ -110,11 +114,29 @@ def new_renderer() -> Iterator[Callable[[], Renderer]]:
 
 @pytest.fixture(scope="session")
 def software(environment: None) -> AdapterInfo:
-    """The software adapter, for tests of it; they are skipped where there is none."""
+    """The software adapter. A test that uses this is skipped if there is none."""
     for adapter in adapters():
         if adapter.type == "cpu":
             return adapter
     pytest.skip("there is no software adapter here, such as Mesa's lavapipe")
+
+
+@pytest.fixture(scope="session")
+def display(environment: None) -> Iterator[dict[str, str]]:
+    """The environment of processes that open windows: an X server without a screen."""
+    for module in ("glfw", "PIL.ImageGrab"):
+        pytest.importorskip(module)
+    if shutil.which("Xvfb") is None:
+        pytest.skip("Xvfb is not here, whose windows no screen shows (Debian: xvfb)")
+    read, write = os.pipe()
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
+    with subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL) as server:
+        os.close(write)
+        with os.fdopen(read) as pipe:
+            number = pipe.readline().strip()
+        # A bundled driver has no windows.
+        yield {**os.environ, "DISPLAY": f":{number}", "VKBLOOM_DRIVER": "system"}
+        server.terminate()
 
 
 @pytest.fixture(scope="session")
@@ -124,7 +146,7 @@ def scene() -> Scene:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Meshes and frames of the original program, which lie beside the repository."""
+    """Meshes and frames of the original program, which are stored beside the repository."""
     folder = Path(__file__).resolve().parents[2] / "shared" / "data"
     if not folder.is_dir():
         pytest.skip("the original's meshes and frames (../shared/data) are not here")

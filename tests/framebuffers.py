@@ -1,4 +1,4 @@
-"""Made-up framebuffers, and readers of the files that come of them."""
+"""Framebuffers for tests, and functions that read the files that were written from them."""
 
 from __future__ import annotations
 

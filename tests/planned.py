@@ -26,7 +26,7 @@ def scene_source(
 def scene_plan(
     settings: object, size: Any = (1280, 720), has_sky: bool = True, shading: str = "forward"
 ) -> _core.Plan:
-    """Return the plan of all framebuffers of a frame, each pass as its method has it."""
+    """Return the plan of all framebuffers of a frame, in the fragment variant."""
     source = scene_source(size, has_sky=has_sky, shading=shading)
     return _core.plan(source, settings, None, "fragment")
 

@@ -1,4 +1,4 @@
-"""How close a renderer's framebuffers have to be to those of `vkbloom.reference`."""
+"""The allowed differences of a renderer's framebuffers from those of `vkbloom.reference`."""
 
 from __future__ import annotations
 

@@ -51,7 +51,12 @@ def counts() -> dict[str, int]:
     }
 
 
-def frame(renderer: vkbloom.Renderer, scene: vkbloom.Scene, dice: random.Random) -> None:
+def frame(
+    renderer: vkbloom.Renderer,
+    surface: vkbloom.Surface | None,
+    scene: vkbloom.Scene,
+    dice: random.Random,
+) -> None:
     """Render one frame with random size, source and settings."""
     # Some presets have levels of a fixed height; their width depends on the frame's aspect.
     size = (dice.randrange(4, 65), dice.randrange(4, 65))
@@ -67,6 +72,11 @@ def frame(renderer: vkbloom.Renderer, scene: vkbloom.Scene, dice: random.Random)
             *vkbloom.presets.values(),
         ]
     )
+    if surface and dice.random() < 0.2:
+        if dice.random() < 0.05:
+            surface.size = size
+        surface.present(scene, settings, time=dice.random())
+        return
     if dice.random() < 0.3:
         shading = dice.choice(("forward", "deferred"))
         renderer.render(scene, settings, size, shading=shading, time=dice.random())
@@ -87,9 +97,14 @@ def main(total: int) -> int:
     rows: list[dict[str, int]] = []
     begin = time.perf_counter()
     with vkbloom.Renderer("software") as renderer:
+        try:
+            surface = vkbloom.Surface(renderer, size=(40, 30))
+        except vkbloom.Error as error:
+            print(f"Nothing is presented: {error}")
+            surface = None
         for step in range(STEPS):
             for _ in range(total // STEPS):
-                frame(renderer, scene, dice)
+                frame(renderer, surface, scene, dice)
             # The same last frames, so that each count sees the same cached objects.
             for _ in range(4):
                 renderer.render(scene, None, (16, 16))

@@ -28,8 +28,21 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
     if (!vkb_grow(error, &graph->passes, &graph->pass_capacity, graph->pass_count + 1,
                   sizeof *graph->passes))
         return false;
-    graph->passes[graph->pass_count++] = *row;
+    graph->passes[graph->pass_count] = *row;
+    // (A row without an image is found by vkb_graph_check.)
+    if (row->targets[0] < graph->image_count)
+        graph->passes[graph->pass_count].constants.stored =
+            (int32_t)vkb_storage_mode(graph->images[row->targets[0]].format);
+    ++graph->pass_count;
     return true;
+}
+
+enum vkb_mode vkb_storage_mode(enum vkb_format format)
+{
+    return format == VKB_FORMAT_RGBA8_UNORM    ? STORED_UNORM8
+         : format == VKB_FORMAT_RGBA16_FLOAT   ? STORED_HALF
+         : format == VKB_FORMAT_RG11B10_UFLOAT ? STORED_UFLOAT
+                                               : STORED_SINGLE;
 }
 
 size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)

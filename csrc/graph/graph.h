@@ -19,13 +19,15 @@ enum {
 #define VKB_NO_IMAGE UINT32_MAX
 
 // What the host fills an image with, if it does: the image that a source is of, what takes its
-// place as the source of the bloom, and the mask of what glows.
+// place as the source of the bloom, the mask of what glows, and images that another part of the
+// graph has made.
 enum vkb_input_kind {
     VKB_INPUT_NONE,
     VKB_INPUT_IMAGE,
     VKB_INPUT_EMISSION,
     VKB_INPUT_MASK,
-    VKB_INPUT_COUNT,
+    VKB_INPUT_LEVEL,
+    VKB_INPUT_COUNT = VKB_INPUT_LEVEL + GATHERED_LEVELS,
 };
 
 // An image is either given by the host, or written by one sequence of consecutive passes. So its
@@ -117,8 +119,12 @@ void vkb_graph_destroy(struct vkb_graph *graph);
 // Adds a copy of the row; *index (may be NULL) gets its index.
 bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *row, uint32_t *index,
                          struct vkb_error *error);
+// The copy's constant `stored` is that of its first target.
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error);
+
+// How shaders round what they store to an image of that format: of STORED_*.
+enum vkb_mode vkb_storage_mode(enum vkb_format format);
 
 // Checks all rules for rows, so that only a valid graph reaches Vulkan.
 bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error);

@@ -52,6 +52,32 @@ size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, uns
     return size;
 }
 
+void vkb_params_set_height(enum vkb_block block, int height, union vkb_params *params)
+{
+    switch (block) {
+    case VKB_BLOCK_blur:
+        params->blur.target_height = height;
+        break;
+    case VKB_BLOCK_threshold:
+        params->threshold.target_height = height;
+        break;
+    case VKB_BLOCK_pyramid:
+        params->pyramid.target_height = height;
+        break;
+    case VKB_BLOCK_prefilter:
+        params->prefilter.target_height = height;
+        break;
+    case VKB_BLOCK_gather:
+        params->gather.target_height = height;
+        break;
+    case VKB_BLOCK_kawase:
+        params->kawase.target_height = height;
+        break;
+    default:
+        break;
+    }
+}
+
 #define READ(block, name) params->block.name = values->name;
 #define READ_BLOCK(block, ROWS) \
     case VKB_BLOCK_##block: \

@@ -12,6 +12,12 @@ struct vkb_image_source {
     struct vkb_size size;
     uint32_t channels;  // 3 or 4
     bool has_emission, has_mask;
+    // Images that another part of the graph has made.
+    struct vkb_level {
+        enum vkb_format format;
+        struct vkb_size size;
+    } levels[GATHERED_LEVELS];
+    uint32_t level_count;
 };
 
 // Checks that the sizes from which a graph derives all others are 1 to max_side. It is called

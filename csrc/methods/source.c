@@ -33,11 +33,23 @@ bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings
     return true;
 }
 
+static bool levels_fit(const struct vkb_image_source *planned, const struct vkb_image_source *given)
+{
+    bool fits = planned->level_count == given->level_count;
+
+    for (uint32_t i = 0; fits && i < planned->level_count; ++i)
+        fits = planned->levels[i].format == given->levels[i].format
+            && planned->levels[i].size.width == given->levels[i].size.width
+            && planned->levels[i].size.height == given->levels[i].size.height;
+    return fits;
+}
+
 static bool image_fits(const struct vkb_image_source *planned, const struct vkb_image_source *given)
 {
     return planned->format == given->format && planned->channels == given->channels
         && planned->size.width == given->size.width && planned->size.height == given->size.height
-        && planned->has_emission == given->has_emission && planned->has_mask == given->has_mask;
+        && planned->has_emission == given->has_emission && planned->has_mask == given->has_mask
+        && levels_fit(planned, given);
 }
 
 static bool scene_fits(const struct vkb_scene_source *planned, const struct vkb_scene_source *given)

@@ -94,7 +94,8 @@ static PyMethodDef functions[] = {
     {"adapters", adapters, METH_VARARGS,
      "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
     {"image_source", vkb_image_source, METH_VARARGS,
-     "image_source(image, emission=None, mask=None) -> Source"},
+     "image_source(image, emission=None, mask=None, levels=()) -> Source. The levels are images "
+     "that another part of a graph has made."},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
     {"plan", vkb_any_plan, METH_VARARGS,
@@ -260,6 +261,7 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
+                && add_type(module, &vkb_screen_spec, "Screen", &state->screen_type)
                 && vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
                 && add_steal(module, "CHOICES", choice_table())
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
@@ -277,6 +279,7 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->plan_type);
     Py_VISIT(state->submission_type);
     Py_VISIT(state->pages_type);
+    Py_VISIT(state->screen_type);
     Py_VISIT(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
@@ -292,6 +295,7 @@ static int clear(PyObject *module)
     Py_CLEAR(state->plan_type);
     Py_CLEAR(state->submission_type);
     Py_CLEAR(state->pages_type);
+    Py_CLEAR(state->screen_type);
     Py_CLEAR(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);

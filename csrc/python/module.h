@@ -5,6 +5,7 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
+#include "graph/bands.h"
 #include "methods/source.h"
 #include "run/frame.h"
 #include "variants/variants.h"
@@ -13,7 +14,7 @@
 #include <stdatomic.h>
 
 struct vkb_module_state {
-    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type;
+    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *screen_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
 };
@@ -32,7 +33,7 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
-    vkb_pages_spec;
+    vkb_pages_spec, vkb_screen_spec;
 
 // The data of a submission until the device has finished it. If nobody waits for it any more, it is
 // abandoned: the renderer owns it.
@@ -173,6 +174,16 @@ struct vkb_source_object {
 // Whether the renderer can use the source; else with a ValueError set.
 bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_source_object *source);
 
+// A screen of a renderer, which owns it: without the renderer's device there is none.
+struct vkb_screen_object {
+    PyObject_HEAD
+    struct vkb_renderer *renderer;
+    struct vkb_screen *screen;  // NULL: closed
+};
+
+// Fails if the screen is closed. With the renderer's lock.
+bool vkb_require_screen(const struct vkb_screen_object *screen, struct vkb_error *error);
+
 struct vkb_plan_object {
     PyObject_HEAD
     struct vkb_source source;
@@ -185,6 +196,17 @@ struct vkb_plan_object {
 // Size in bytes of an output in the caller's array.
 size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 
+// A tuple of the names of images.
+PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count);
+
+// The part of a graph that makes the names, from (rows of the image, names of the levels that the
+// source brings, whether it is a band of the image).
+bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyObject *names,
+                   struct vkb_part *part);
+bool vkb_build_part(const struct vkb_device *device, const struct vkb_source *source,
+                    const struct vkb_settings *settings, const struct vkb_part *part,
+                    struct vkb_graph *graph, struct vkb_error *error);
+
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
@@ -193,7 +215,10 @@ PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 
 // Methods of the Renderer.
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_renderer_bands(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_renderer_show(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_new_screen(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_fill(PyObject *renderer, PyObject *arguments);

@@ -123,9 +123,11 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
 
 static bool build_graph(const struct vkb_device *device, enum vkb_variants variants,
                         const struct vkb_source *source, const struct vkb_settings *settings,
-                        struct vkb_graph *graph, struct vkb_error *error)
+                        const struct vkb_part *part, struct vkb_graph *graph,
+                        struct vkb_error *error)
 {
-    return vkb_source_build(source, settings, device->max_side, graph, error)
+    return (part ? vkb_build_part(device, source, settings, part, graph, error)
+                 : vkb_source_build(source, settings, device->max_side, graph, error))
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_image_cache_check(device, graph, error);
@@ -149,7 +151,8 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
 
 static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
                           enum vkb_variants variants, uint64_t renderer, PyObject *source,
-                          PyObject *settings_object, struct vkb_settings *settings, PyObject *names)
+                          PyObject *settings_object, struct vkb_settings *settings,
+                          const struct vkb_part *part, PyObject *names)
 {
     struct vkb_plan_object *self = vkb_new_object(state->plan_type);
     struct vkb_error error = {0};
@@ -162,7 +165,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         Py_DECREF(self);
         return NULL;
     }
-    if (!build_graph(device, variants, &self->source, settings, &self->plan.graph, &error)) {
+    if (!build_graph(device, variants, &self->source, settings, part, &self->plan.graph, &error)) {
         Py_DECREF(self);
         return vkb_raise(state, &error);
     }
@@ -173,24 +176,36 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
     return (PyObject *)self;
 }
 
+PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)
+{
+    PyObject *tuple = PyTuple_New(count);
+
+    for (uint32_t i = 0; tuple && i < count; ++i)
+        if (!set_steal(tuple, i, PyUnicode_FromString(graph->images[images[i]].name)))
+            Py_CLEAR(tuple);
+    return tuple;
+}
+
 PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 {
     const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyObject *source, *settings_object, *names;
+    PyObject *source, *settings_object, *names, *given = NULL;
+    struct vkb_part part;
     struct vkb_settings settings;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!OO:plan", state->source_type, &source, &settings_object,
-                          &names)
-        || !vkb_read_settings(state, settings_object, &settings))
+    if (!PyArg_ParseTuple(arguments, "O!OO|O:plan", state->source_type, &source, &settings_object,
+                          &names, &given)
+        || !vkb_read_settings(state, settings_object, &settings)
+        || (given && !vkb_read_part(given, (struct vkb_source_object *)source, names, &part)))
         return NULL;
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
     return new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
-                    settings_object, &settings, names);
+                    settings_object, &settings, given ? &part : NULL, names);
 }
 
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
@@ -213,17 +228,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     device.adapter.device_type = variants == VKB_VARIANTS_CPU
                                    ? VK_PHYSICAL_DEVICE_TYPE_CPU
                                    : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-    return new_plan(state, &device, variants, 0, source, settings_object, &settings, names);
-}
-
-static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)
-{
-    PyObject *tuple = PyTuple_New(count);
-
-    for (uint32_t i = 0; tuple && i < count; ++i)
-        if (!set_steal(tuple, i, PyUnicode_FromString(graph->images[images[i]].name)))
-            Py_CLEAR(tuple);
-    return tuple;
+    return new_plan(state, &device, variants, 0, source, settings_object, &settings, NULL, names);
 }
 
 // The images that the pass reads, each once; returns how many.
@@ -250,8 +255,8 @@ static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, 
     const uint32_t target_count = vkb_pass_targets(pass, targets);
 
     return Py_BuildValue("(ssNNsI)", name, vkb_spirv[pass->shader].name,
-                         image_names(graph, reads, read_count),
-                         image_names(graph, targets, target_count),
+                         vkb_image_names(graph, reads, read_count),
+                         vkb_image_names(graph, targets, target_count),
                          pass->variant ? pass->variant : "fragment", group);
 }
 

@@ -342,6 +342,14 @@ static PyObject *get_info(PyObject *object, void *unused)
     return vkb_adapter_tuple(&((struct vkb_renderer *)object)->device.adapter);
 }
 
+static PyObject *get_instance(PyObject *object, void *unused)
+{
+    const struct vkb_renderer *self = (struct vkb_renderer *)object;
+
+    (void)unused;
+    return PyLong_FromVoidPtr(self->open ? (void *)self->device.instance->handle : NULL);
+}
+
 static PyObject *get_pipeline_count(PyObject *object, void *unused)
 {
     (void)unused;
@@ -360,7 +368,13 @@ static PyObject *get_cached(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Releases the device; may be called twice."},
     {"plan", vkb_renderer_plan, METH_VARARGS,
-     "plan(source, settings, names) -> Plan. Makes no device call; names None: all framebuffers."},
+     "plan(source, settings, names, part=None) -> Plan. Makes no device call; names None: all "
+     "framebuffers. A part is (rows of the image, names of the levels that the source has, whether "
+     "it is a band of the image): of that part of the graph, and names are any images."},
+    {"bands", vkb_renderer_bands, METH_VARARGS,
+     "bands(source, settings, height) -> (head, levels, step, reach) or None. How the final of an "
+     "image of so many rows, of which the source has some, can be made of bands: see "
+     "graph/bands.h."},
     {"run", vkb_renderer_run, METH_VARARGS,
      "run(source, plans, arrays[, first, count]) -> Submission. Submits plans with the same "
      "images; "
@@ -373,6 +387,12 @@ static PyMethodDef methods[] = {
     {"fill", vkb_renderer_fill, METH_VARARGS,
      "fill(source, rows, first). Copies rows of an image into an uploaded image, from row `first` "
      "on, before anything uses it."},
+    {"screen", vkb_new_screen, METH_VARARGS,
+     "screen(surface, mode) -> Screen. Takes over a VkSurfaceKHR; 0: one without a window."},
+    {"show", vkb_renderer_show, METH_VARARGS,
+     "show(source, plan, screen, width, height, linear) -> (Submission, shown). Presents the "
+     "plan's only output on a screen, of that size if it has none of its own; `linear`: encoded as "
+     "sRGB."},
     {"pages", vkb_new_pages, METH_O,
      "pages(size) -> Pages. Memory for an array; reused when the array is gone."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
@@ -382,6 +402,7 @@ static PyMethodDef methods[] = {
 static PyGetSetDef attributes[] = {
     {"closed", get_closed, NULL, "Whether close() was called.", NULL},
     {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
+    {"instance", get_instance, NULL, "The VkInstance; 0: closed.", NULL},
     {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},
     {"cached", get_cached, NULL,
      "(pipelines, framebuffers, bytes of images) that are kept for later frames.", NULL},

@@ -131,6 +131,11 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
     const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
     Py_buffer *view = &pending->views[pending->view_count];
 
+    if (array == Py_None) {
+        // The view stays without an object.
+        pending->outputs[pending->view_count++].row_count = row->height;
+        return true;
+    }
     if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
         return false;
     pending->outputs[pending->view_count++] = (struct vkb_output){
@@ -204,8 +209,16 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
     return NULL;
 }
 
+// The screen on which the only output of a submission is presented.
+struct show {
+    struct vkb_screen_object *screen;
+    struct vkb_swapchain_spec spec;
+    bool shown;
+};
+
+// `show` may be NULL.
 static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object *source,
-                   struct vkb_pending *pending, struct vkb_error *error)
+                   struct vkb_pending *pending, struct show *show, struct vkb_error *error)
 {
     struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
@@ -223,9 +236,34 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
                                  pending->count, &pending->submission, error);
     if (done)
         pending->specials = vkb_frame_specials(&renderer->frame, &data);
+    if (done && show)
+        done = vkb_require_screen(show->screen, error)
+            && vkb_screen_show(&renderer->device, &renderer->frame, show->screen->screen,
+                               pending->requests[0].plan, &show->spec, &show->shown, error);
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
+}
+
+static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *plans,
+                     const struct rows *rows, PyObject *arrays, struct show *show)
+{
+    struct vkb_source_object *given = (struct vkb_source_object *)source;
+    struct vkb_error error = {0};
+
+    if (!vkb_check_source(renderer, given) || !check_plans(renderer, &given->source, plans, arrays))
+        return NULL;
+    struct submission *self = new_submission(renderer, source, plans, rows, arrays);
+    if (self && !submit(renderer, given, self->pending, show, &error)) {
+        // The exception is kept while the arrays are released, which may run Python code.
+        vkb_raise(state_of((PyObject *)renderer), &error);
+        PyObject *type, *value, *traceback;
+        PyErr_Fetch(&type, &value, &traceback);
+        Py_DECREF(self);
+        PyErr_Restore(type, value, traceback);
+        return NULL;
+    }
+    return (PyObject *)self;
 }
 
 PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
@@ -234,26 +272,42 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     struct vkb_module_state *state = state_of(object);
     PyObject *source, *plans, *arrays;
     struct rows rows = {0};
-    struct vkb_error error = {0};
 
     if (!PyArg_ParseTuple(arguments, "O!O!O!|O&O&:run", state->source_type, &source, &PyTuple_Type,
                           &plans, &PyTuple_Type, &arrays, vkb_read_uint32, &rows.first,
-                          vkb_read_uint32, &rows.count)
-        || !vkb_check_source(renderer, (struct vkb_source_object *)source)
-        || !check_plans(renderer, &((struct vkb_source_object *)source)->source, plans, arrays))
+                          vkb_read_uint32, &rows.count))
         return NULL;
-    struct submission *self =
-        new_submission(renderer, source, plans, PyTuple_Size(arguments) > 3 ? &rows : NULL, arrays);
-    if (self && !submit(renderer, (struct vkb_source_object *)source, self->pending, &error)) {
-        // The exception is kept while the arrays are released, which may run Python code.
-        vkb_raise(state, &error);
-        PyObject *type, *value, *traceback;
-        PyErr_Fetch(&type, &value, &traceback);
-        Py_DECREF(self);
-        PyErr_Restore(type, value, traceback);
+    return run(renderer, source, plans, PyTuple_Size(arguments) > 3 ? &rows : NULL, arrays, NULL);
+}
+
+PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
+{
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+    struct vkb_module_state *state = state_of(object);
+    PyObject *source, *plan, *screen, *result = NULL;
+    struct show show = {0};
+    int linear;
+
+    if (!PyArg_ParseTuple(arguments, "O!O!O!O&O&p:show", state->source_type, &source,
+                          state->plan_type, &plan, state->screen_type, &screen, vkb_read_uint32,
+                          &show.spec.extent.width, vkb_read_uint32, &show.spec.extent.height,
+                          &linear))
+        return NULL;
+    show.screen = (struct vkb_screen_object *)screen;
+    show.spec.linear = linear;
+    if (show.screen->renderer != renderer) {
+        PyErr_SetString(PyExc_ValueError, "surface: it belongs to another renderer");
         return NULL;
     }
-    return (PyObject *)self;
+    PyObject *plans = PyTuple_Pack(1, plan);
+    PyObject *arrays = Py_BuildValue("((O))", Py_None);
+    PyObject *submission =
+        plans && arrays ? run(renderer, source, plans, NULL, arrays, &show) : NULL;
+    if (submission)
+        result = Py_BuildValue("(NO)", submission, show.shown ? Py_True : Py_False);
+    Py_XDECREF(plans);
+    Py_XDECREF(arrays);
+    return result;
 }
 
 static PyObject *timing_dict(const struct vkb_request *request)

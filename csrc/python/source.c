@@ -22,11 +22,33 @@ static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind
     return false;
 }
 
+static bool read_levels(PyObject *levels, struct vkb_source_object *self)
+{
+    struct vkb_image_source *image = &self->source.image;
+    const Py_ssize_t count = PyTuple_Size(levels);
+
+    if (count > GATHERED_LEVELS) {
+        PyErr_Format(PyExc_ValueError, "levels: %zd are more than %d", count, GATHERED_LEVELS);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i) {
+        struct vkb_held_image *held = &self->images[VKB_INPUT_LEVEL + i];
+        if (!vkb_read_image(PyTuple_GetItem(levels, i), "levels", held))
+            return false;
+        image->levels[image->level_count++] = (struct vkb_level){
+            .format = held->input.format,
+            .size = {held->input.width, held->input.height},
+        };
+    }
+    return true;
+}
+
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
 {
-    PyObject *image, *emission = Py_None, *mask = Py_None;
+    PyObject *image, *emission = Py_None, *mask = Py_None, *levels = NULL;
 
-    if (!PyArg_ParseTuple(arguments, "O|OO:image_source", &image, &emission, &mask))
+    if (!PyArg_ParseTuple(arguments, "O|OOO!:image_source", &image, &emission, &mask, &PyTuple_Type,
+                          &levels))
         return NULL;
     struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
@@ -51,6 +73,10 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
                 .has_mask = mask != Py_None,
             },
     };
+    if (levels && !read_levels(levels, self)) {
+        Py_DECREF(self);
+        return NULL;
+    }
     return (PyObject *)self;
 }
 

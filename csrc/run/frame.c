@@ -13,6 +13,8 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
+    while (frame->screens)
+        vkb_screen_destroy(device, frame, frame->screens);
     vkb_submissions_destroy(device, &frame->submissions);
     vkb_buffer_destroy(device, &frame->constants);
     vkb_image_cache_destroy(device, &frame->cache);
@@ -124,7 +126,7 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
         return true;
     if (!vkb_submissions_wait(device, &run->frame->submissions, error)
         || !vkb_scene_begin(device, &submission->commands, data, scene, error)
-        || !vkb_submission_submit(device, submission, error)
+        || !vkb_submission_submit(device, submission, NULL, error)
         || !vkb_submission_wait(device, &run->frame->submissions, submission, error))
         return false;
     vkb_scene_end(device, data, scene);
@@ -306,7 +308,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
             return false;
     vkb_barrier_record_host_read(device, commands);
     return vkb_buffer_flush(device, &submission->uniforms, error)
-        && vkb_submission_submit(device, submission, error);
+        && vkb_submission_submit(device, submission, NULL, error);
 }
 
 static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,

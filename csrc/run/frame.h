@@ -7,6 +7,7 @@
 #include "run/image_cache.h"
 #include "run/pipeline.h"
 #include "run/resident.h"
+#include "run/screen.h"
 #include "run/submission.h"
 #include "scene/scene.h"
 
@@ -21,7 +22,8 @@ struct vkb_frame {
     struct vkb_image_cache cache;
     struct vkb_planner planner;
     uint64_t submitted;  // submissions so far
-    bool stale;          // after a failure: the images are created again before the next recording
+    struct vkb_screen *screens;
+    bool stale;  // after a failure: the images are created again before the next recording
 };
 
 // The data of a source. Members that its graph does not use are NULL.

@@ -144,8 +144,8 @@ static bool check_dispatches(const struct vkb_device *device, const struct vkb_g
     return true;
 }
 
-// The images of a convolution, which are many times larger than the frame, must fit the largest heap
-// of the device together.
+// The images of a convolution, which are many times larger than the frame, must fit the largest
+// heap of the device together.
 static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
                          struct vkb_error *error)
 {

@@ -4,15 +4,8 @@
 // floats.
 #define KEPT_BYTES ((size_t)256 << 20)
 
-// Memory of this size or more is aligned to the system's large pages: fewer pages have to be
-// mapped, zeroed and pinned.
-#define LARGE_BYTES ((size_t)4 << 20)
-#define LARGE_PAGE  ((size_t)2 << 20)
-#define SMALL_PAGE  ((size_t)4096)
-
-#ifdef __linux__
-#include <sys/mman.h>
-#endif
+#define LARGE_PAGE ((size_t)2 << 20)
+#define SMALL_PAGE ((size_t)4096)
 
 struct vkb_pages {
     const struct vkb_device *device;    // NULL: closed
@@ -29,24 +22,13 @@ struct vkb_pages *vkb_pages_create(const struct vkb_device *device, struct vkb_e
     return pages;
 }
 
-static void advise(const struct vkb_page_run *run)
-{
-#ifdef MADV_HUGEPAGE
-    // A system without large pages ignores this.
-    if (run->size >= LARGE_BYTES)
-        (void)madvise(run->memory, run->size, MADV_HUGEPAGE);
-#else
-    (void)run;
-#endif
-}
-
 static struct vkb_page_run *create_run(const struct vkb_device *device, size_t size,
                                        struct vkb_error *error)
 {
     const size_t page = device && device->import_alignment > SMALL_PAGE
                           ? (size_t)device->import_alignment
                           : SMALL_PAGE;
-    const size_t align = size >= LARGE_BYTES && LARGE_PAGE > page ? LARGE_PAGE : page;
+    const size_t align = size >= VKB_LARGE_BYTES && LARGE_PAGE > page ? LARGE_PAGE : page;
     struct vkb_page_run *run = vkb_alloc(error, 1, sizeof *run);
 
     if (!run)
@@ -58,7 +40,7 @@ static struct vkb_page_run *create_run(const struct vkb_device *device, size_t s
     }
     run->memory = (void *)(((uintptr_t)run->start + align - 1) / align * align);
     run->size = (size + page - 1) / page * page;
-    advise(run);
+    vkb_advise_large(run->memory, run->size);
     return run;
 }
 

@@ -59,6 +59,8 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     output->width = width;
     output->imported = VK_NULL_HANDLE;
     output->stored = false;
+    if (!output->memory)
+        return true;
     const size_t size = row_size(output) * output->row_count;
     if (size >= VKB_IMPORTED_BYTES) {
         if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
@@ -101,7 +103,7 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
         .imageExtent = {image->width, output->row_count, 1},
     };
 
-    if (output->stored)
+    if (output->stored || !output->memory)
         return;
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
     device->vk.vkCmdCopyImageToBuffer(
@@ -129,7 +131,7 @@ void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_ou
 {
     const size_t pixels = (size_t)output->width * output->row_count;
 
-    if (output->imported)
+    if (output->imported || !output->memory)
         return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
     if (output->channels == vkb_formats[output->format].channels) {

@@ -16,7 +16,7 @@ enum { VKB_IMPORTED_BYTES = 1 << 20 };
 struct vkb_output {
     uint32_t channels;
     uint32_t first_row, row_count;  // of the image
-    void *memory;
+    void *memory;                   // NULL: it stays on the device
     struct vkb_page_run *pages;  // the run that contains the memory; NULL: none, or a small array
     // Set by vkb_readback_plan.
     enum vkb_format format;

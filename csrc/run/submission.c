@@ -78,9 +78,9 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
 }
 
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
-                           struct vkb_error *error)
+                           const struct vkb_semaphores *semaphores, struct vkb_error *error)
 {
-    submission->pending = vkb_commands_submit(device, &submission->commands, error);
+    submission->pending = vkb_commands_submit(device, &submission->commands, semaphores, error);
     return submission->pending;
 }
 

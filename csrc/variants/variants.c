@@ -34,12 +34,10 @@ bool vkb_variants_by_name(const char *name, const struct vkb_device *device,
 
 enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format)
 {
-    if (format == VKB_FORMAT_RGBA8_UNORM)
-        return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? STORED_UNORM8_SCALED
-                                                                          : STORED_UNORM8;
-    return format == VKB_FORMAT_RGBA16_FLOAT   ? STORED_HALF
-         : format == VKB_FORMAT_RG11B10_UFLOAT ? STORED_UFLOAT
-                                               : STORED_SINGLE;
+    return format == VKB_FORMAT_RGBA8_UNORM
+                && device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
+             ? STORED_UNORM8_SCALED
+             : vkb_storage_mode(format);
 }
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)

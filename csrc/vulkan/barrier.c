@@ -82,11 +82,28 @@ static const struct access_info {
             .writes = VK_ACCESS_TRANSFER_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
         },
+    // The stage of the wait for the semaphore, after which the barrier comes.
+    [VKB_ACCESS_ACQUIRED] =
+        {
+            .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,
+            .layout = VK_IMAGE_LAYOUT_UNDEFINED,
+        },
+    // The semaphore makes what was written available.
+    [VKB_ACCESS_PRESENTED] =
+        {
+            .stages = VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT,
+            .layout = VK_IMAGE_LAYOUT_PRESENT_SRC_KHR,
+        },
 };
 
 VkImageLayout vkb_access_layout(enum vkb_access access)
 {
     return accesses[access].layout;
+}
+
+VkPipelineStageFlags vkb_access_stages(enum vkb_access access)
+{
+    return accesses[access].stages;
 }
 
 void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer commands,

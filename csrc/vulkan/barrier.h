@@ -17,10 +17,13 @@ enum vkb_access {
     VKB_ACCESS_DISPATCH_CHANGED,  // loaded and stored by one compute shader
     VKB_ACCESS_COPY_SOURCE,
     VKB_ACCESS_COPY_TARGET,
+    VKB_ACCESS_ACQUIRED,   // of a swapchain's image, whose content is discarded
+    VKB_ACCESS_PRESENTED,  // the same image, handed back
     VKB_ACCESS_COUNT,
 };
 
 VkImageLayout vkb_access_layout(enum vkb_access access);
+VkPipelineStageFlags vkb_access_stages(enum vkb_access access);
 
 // Records the barrier between two accesses: for an image with the given layouts (NULL: its layout
 // stays), and with `memory` for all memory. Two equal read accesses need no barrier.

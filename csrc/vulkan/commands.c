@@ -54,10 +54,10 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
 }
 
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         struct vkb_error *error)
+                         const struct vkb_semaphores *semaphores, struct vkb_error *error)
 {
     return VK(error, device->vk.vkEndCommandBuffer(commands->buffer))
-        && vkb_device_submit(device, commands->buffer, commands->fence, error);
+        && vkb_device_submit(device, commands->buffer, semaphores, commands->fence, error);
 }
 
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,

@@ -18,9 +18,10 @@ void vkb_commands_destroy(const struct vkb_device *device, struct vkb_commands *
 // Begins an empty recording. A recording that was not submitted is discarded.
 bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *commands,
                         struct vkb_error *error);
-// Ends the recording and submits it. The device runs submissions in order.
+// Ends the recording and submits it, with `semaphores` or NULL. The device runs submissions in
+// order.
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         struct vkb_error *error);
+                         const struct vkb_semaphores *semaphores, struct vkb_error *error);
 // Waits for the last submission, which contains `frames` frames.
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
                        struct vkb_error *error);

@@ -71,13 +71,21 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
     const struct vkb_instance_table *vk = &device->instance->vk;
     VkPhysicalDeviceFeatures available;
+    const char *extensions[2];
+    uint32_t extension_count = 0;
     bool has_import;
 
-    if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error))
+    if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
+        || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error))
         return false;
-    has_import = has_import && imports_buffers(device);
-    if (has_import)
+    if (has_import && imports_buffers(device)) {
         device->import_alignment = import_alignment(device);
+        extensions[extension_count++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
+    }
+    // It depends on the instance's extension.
+    device->presents = device->presents && device->instance->surfaces;
+    if (device->presents)
+        extensions[extension_count++] = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
     vk->vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
     device->dispatch = available.shaderStorageImageWriteWithoutFormat;
     return VK(error, vk->vkCreateDevice(
@@ -96,9 +104,8 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
                                      .queueCount = 1,
                                      .pQueuePriorities = &(float){1.0f},
                                  },
-                             .enabledExtensionCount = has_import ? 1 : 0,
-                             .ppEnabledExtensionNames =
-                                 (const char *[]){VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME},
+                             .enabledExtensionCount = extension_count,
+                             .ppEnabledExtensionNames = extensions,
                          },
                          NULL, &device->handle));
 }
@@ -265,7 +272,8 @@ static bool remember_loss(struct vkb_device *device, bool done, const struct vkb
     return done;
 }
 
-bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFence fence,
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
+                       const struct vkb_semaphores *semaphores, VkFence fence,
                        struct vkb_error *error)
 {
     VkSubmitInfo submit = {
@@ -273,6 +281,12 @@ bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkFe
         .commandBufferCount = 1,
         .pCommandBuffers = &commands,
     };
+    if (semaphores) {
+        submit.waitSemaphoreCount = submit.signalSemaphoreCount = 1;
+        submit.pWaitSemaphores = &semaphores->wait;
+        submit.pWaitDstStageMask = &semaphores->stages;
+        submit.pSignalSemaphores = &semaphores->signal;
+    }
     bool done = VK(error, device->vk.vkQueueSubmit(device->queue, 1, &submit, fence));
 
     return remember_loss(device, done, error);
@@ -315,6 +329,12 @@ static void poll_fence(const struct vkb_device *device, VkFence fence)
             return;
 }
 
+bool vkb_device_go_on(const struct vkb_device *device, struct vkb_error *error)
+{
+    return !device->interrupted || !device->interrupted(device->context)
+        || vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
+}
+
 bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
                      struct vkb_error *error)
 {
@@ -331,8 +351,8 @@ bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
         if (result != VK_TIMEOUT)
             break;
         waited += slice;
-        if (device->interrupted && device->interrupted(device->context))
-            return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
+        if (!vkb_device_go_on(device, error))
+            return false;
         if (waited >= limit)
             break;
     }

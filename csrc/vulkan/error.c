@@ -36,6 +36,8 @@ bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *for
     NAME(VK_ERROR_OUT_OF_POOL_MEMORY) \
     NAME(VK_ERROR_INVALID_EXTERNAL_HANDLE) \
     NAME(VK_ERROR_FRAGMENTATION) \
+    NAME(VK_ERROR_SURFACE_LOST_KHR) \
+    NAME(VK_ERROR_NATIVE_WINDOW_IN_USE_KHR) \
     NAME(VK_ERROR_INVALID_SHADER_NV)
 
 static const char *result_name(VkResult result)

@@ -5,6 +5,7 @@
 #include "vulkan/process.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define VALIDATION_LAYER "VK_LAYER_KHRONOS_validation"
@@ -123,6 +124,46 @@ static bool open_source(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr
     return true;
 }
 
+// What an instance has where its source has it: surfaces. Those of a display server only where the
+// variable names one: Mesa's layer for the selection of devices connects to it.
+static const struct wish {
+    const char *extension, *variable;
+} wishes[] = {
+    {VK_KHR_SURFACE_EXTENSION_NAME, NULL},
+    {VK_EXT_HEADLESS_SURFACE_EXTENSION_NAME, NULL},
+    {"VK_KHR_xcb_surface", "DISPLAY"},
+    {"VK_KHR_xlib_surface", "DISPLAY"},
+    {"VK_KHR_wayland_surface", "WAYLAND_DISPLAY"},
+    {"VK_KHR_win32_surface", NULL},
+    {"VK_EXT_metal_surface", NULL},
+};
+enum {
+    WISH_COUNT = sizeof wishes / sizeof wishes[0],
+    MAX_EXTENSIONS = 128,
+};
+
+// Adds to `names` those of the wished extensions that are there. Without a list there are none.
+static void add_wished(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr get,
+                       const char **names, uint32_t *count)
+{
+    PFN_vkEnumerateInstanceExtensionProperties vkEnumerateInstanceExtensionProperties =
+        (PFN_vkEnumerateInstanceExtensionProperties)get(VK_NULL_HANDLE,
+                                                        "vkEnumerateInstanceExtensionProperties");
+    VkExtensionProperties found[MAX_EXTENSIONS];
+    uint32_t found_count = MAX_EXTENSIONS;
+
+    if (!vkEnumerateInstanceExtensionProperties
+        || VK_RESULT(vkEnumerateInstanceExtensionProperties(NULL, &found_count, found)) < 0)
+        return;
+    for (const struct wish *wish = wishes; wish < wishes + WISH_COUNT; ++wish)
+        for (uint32_t i = 0; i < found_count; ++i)
+            if (strcmp(found[i].extensionName, wish->extension) == 0
+                && (!wish->variable || getenv(wish->variable))) {
+                names[(*count)++] = wish->extension;
+                instance->surfaces |= wish == wishes;
+            }
+}
+
 // The messenger also receives the messages of the instance's creation.
 static bool create_handle(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr driver,
                           const VkDebugUtilsMessengerCreateInfoEXT *messenger,
@@ -150,26 +191,32 @@ static bool create_handle(struct vkb_instance *instance, PFN_vkGetInstanceProcAd
                 VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT},
     };
 
-    return check_created(
-        VK_RESULT(vkCreateInstance(
-            &(VkInstanceCreateInfo){
-                .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
-                .pNext = messenger ? &features : NULL,
-                .pApplicationInfo =
-                    &(VkApplicationInfo){
-                        .sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
-                        .pApplicationName = "vkbloom",
-                        .apiVersion = VK_API_VERSION_1_1,
-                    },
-                .enabledLayerCount = messenger ? 1 : 0,
-                .ppEnabledLayerNames = (const char *[]){VALIDATION_LAYER},
-                .enabledExtensionCount = messenger ? (driver ? 2 : 1) : 0,
-                .ppEnabledExtensionNames =
-                    (const char *[]){VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
-                                     VK_LUNARG_DIRECT_DRIVER_LOADING_EXTENSION_NAME},
-            },
-            NULL, &instance->handle)),
-        driver != NULL, error);
+    const char *extensions[WISH_COUNT + 2];
+    uint32_t extension_count = 0;
+    if (messenger)
+        extensions[extension_count++] = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+    if (messenger && driver)
+        extensions[extension_count++] = VK_LUNARG_DIRECT_DRIVER_LOADING_EXTENSION_NAME;
+    // Of a driver that the loader opens alone, those that this driver has.
+    add_wished(instance, driver ? driver : instance->get, extensions, &extension_count);
+
+    return check_created(VK_RESULT(vkCreateInstance(
+                             &(VkInstanceCreateInfo){
+                                 .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
+                                 .pNext = messenger ? &features : NULL,
+                                 .pApplicationInfo =
+                                     &(VkApplicationInfo){
+                                         .sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
+                                         .pApplicationName = "vkbloom",
+                                         .apiVersion = VK_API_VERSION_1_1,
+                                     },
+                                 .enabledLayerCount = messenger ? 1 : 0,
+                                 .ppEnabledLayerNames = (const char *[]){VALIDATION_LAYER},
+                                 .enabledExtensionCount = extension_count,
+                                 .ppEnabledExtensionNames = extensions,
+                             },
+                             NULL, &instance->handle)),
+                         driver != NULL, error);
 }
 
 static void load_functions(struct vkb_instance *instance)

@@ -13,7 +13,8 @@
 extern const char vkb_install_hint[];
 
 // The instance functions that the core calls. Each instance has its own table, as each device has,
-// since two instances may come from different loaders.
+// since two instances may come from different loaders. Those of an extension that the instance does
+// not have are NULL.
 #define VKB_INSTANCE_FUNCTIONS(NAME) \
     NAME(vkCreateDevice) \
     NAME(vkDestroyInstance) \
@@ -28,6 +29,12 @@ extern const char vkb_install_hint[];
     NAME(vkGetPhysicalDeviceProperties) \
     NAME(vkGetPhysicalDeviceProperties2) \
     NAME(vkGetPhysicalDeviceQueueFamilyProperties) \
+    NAME(vkGetPhysicalDeviceSurfaceCapabilitiesKHR) \
+    NAME(vkGetPhysicalDeviceSurfaceFormatsKHR) \
+    NAME(vkGetPhysicalDeviceSurfacePresentModesKHR) \
+    NAME(vkGetPhysicalDeviceSurfaceSupportKHR) \
+    NAME(vkCreateHeadlessSurfaceEXT) \
+    NAME(vkDestroySurfaceKHR) \
     NAME(vkCreateDebugUtilsMessengerEXT) \
     NAME(vkDestroyDebugUtilsMessengerEXT)
 
@@ -41,6 +48,7 @@ struct vkb_instance {
     VkInstance handle;
     char driver[4096];  // the path of its library; "": those that the system's loader finds
     bool validation;
+    bool surfaces;  // it has VK_KHR_surface, and those of the windows and screens that there are
     PFN_vkGetInstanceProcAddr get;  // of the loader, or of the driver
     struct vkb_instance_table vk;
     VkDebugUtilsMessengerEXT messenger;  // with validation: vkb_messages_receive

@@ -1,4 +1,22 @@
+// madvise and its flags are no part of C11.
+#define _DEFAULT_SOURCE
 #include "vulkan/memory.h"
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+void vkb_advise_large(void *memory, size_t size)
+{
+#ifdef MADV_HUGEPAGE
+    // The range must start at a page. Where the system has no large ones, nothing is lost.
+    const size_t page = 4096, skipped = (size_t)(-(uintptr_t)memory % page);
+    if (size >= VKB_LARGE_BYTES)
+        (void)madvise((char *)memory + skipped, size - skipped, MADV_HUGEPAGE);
+#else
+    (void)memory, (void)size;
+#endif
+}
 
 // The required flags of a memory type, and the preferred ones.
 static const struct memory_wish {
@@ -316,6 +334,7 @@ static bool map_image(const struct vkb_device *device, struct vkb_image *image,
         || !VK(error, device->vk.vkMapMemory(device->handle, image->memory, 0, VK_WHOLE_SIZE, 0,
                                              &image->mapped)))
         return false;
+    vkb_advise_large(image->mapped, image->row_pitch * image->height);
     return !vkb_image_fits_words(device, image->format, image->width, image->height)
         || VK(error,
               device->vk.vkCreateBufferView(device->handle,

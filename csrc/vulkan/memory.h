@@ -12,6 +12,10 @@ enum vkb_memory_kind {
     VKB_MEMORY_SHARED,    // mapped and coherent; for images, on devices whose memory is the host's
 };
 
+// From so much on, memory is in the system's large pages: fewer have to be given, zeroed, pinned
+// and looked up.
+#define VKB_LARGE_BYTES ((size_t)4 << 20)
+
 struct vkb_buffer {
     VkBuffer handle;
     VkDeviceMemory memory;
@@ -42,6 +46,9 @@ struct vkb_image_spec {
     VkImageUsageFlags usage;
     bool mapped;
 };
+
+// Asks the system for large pages for memory that nobody has written to yet.
+void vkb_advise_large(void *memory, size_t size);
 
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,

@@ -39,6 +39,7 @@ from vkbloom.presets import presets
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
 from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
+from vkbloom.surface import Surface
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
@@ -101,6 +102,7 @@ __all__ = [
     "Separable",
     "Settings",
     "ShaderError",
+    "Surface",
     "UnrealBloom",
     "UrpBloom",
     "ValidationError",

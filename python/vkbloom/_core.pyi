@@ -39,6 +39,7 @@ def image_source(
     image: _Array,
     emission: _Array | None = None,
     mask: NDArray[np.float32] | None = None,
+    levels: tuple[_Array, ...] = (),
     /,
 ) -> Source: ...
 def scene_source(
@@ -76,12 +77,22 @@ class Renderer:
     def cached(self) -> tuple[int, int, int]: ...
     def close(self) -> None: ...
     def pipeline_cache(self) -> bytes: ...
-    def plan(self, source: Source, settings: object, names: tuple[str, ...] | None, /) -> Plan: ...
+    def plan(
+        self,
+        source: Source,
+        settings: object,
+        names: tuple[str, ...] | None,
+        part: tuple[int, tuple[str, ...], bool] = ...,
+        /,
+    ) -> Plan: ...
+    def bands(
+        self, source: Source, settings: object, height: int, /
+    ) -> tuple[str | None, tuple[str, ...], int, int] | None: ...
     def run(
         self,
         source: Source,
         plans: tuple[Plan, ...],
-        arrays: tuple[tuple[_Array, ...], ...],
+        arrays: tuple[tuple[_Array | None, ...], ...],
         first: int = ...,
         count: int = ...,
         /,
@@ -90,6 +101,19 @@ class Renderer:
         self, source: Source, spare: Source | None, recycled: bool, height: int = 0, /
     ) -> Source: ...
     def fill(self, source: Source, rows: Source, first: int, /) -> None: ...
+    @property
+    def instance(self) -> int: ...
+    def screen(self, surface: int, mode: str, /) -> Screen: ...
+    def show(
+        self,
+        source: Source,
+        plan: Plan,
+        screen: Screen,
+        width: int,
+        height: int,
+        linear: bool,
+        /,
+    ) -> tuple[Submission, bool]: ...
     def pages(self, size: int, /) -> Pages: ...
 
 class Source:
@@ -109,6 +133,9 @@ class Plan:
 
 class Submission:
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, int]]: ...
+
+class Screen:
+    def close(self) -> None: ...
 
 class Pages:
     def __len__(self) -> int: ...

@@ -61,7 +61,7 @@ class AdapterInfo:
 
 
 def bundled_driver() -> str:
-    """Return the path of the driver that needs no Vulkan loader, "" where there is none.
+    """Return the path of the driver that needs no Vulkan loader; "" if there is none.
 
     The environment variable VKBLOOM_DRIVER names one: the path of a driver's library or of its
     manifest (JSON), or "system" for none. Without it, the package ``vkbloom-lavapipe`` has one.
@@ -85,10 +85,10 @@ def bundled_driver() -> str:
 
 
 def bundled_hash() -> str:
-    """Return the SHA-256 of the driver in ``vkbloom-lavapipe``, "" for other drivers.
+    """Return the SHA-256 of the driver in ``vkbloom-lavapipe``; "" for other drivers.
 
-    Two drivers of one hash draw the same bits on every CPU. Other drivers have none here: what
-    they draw depends on libraries beside them and on the CPU.
+    Two drivers with the same hash draw the same bits on every CPU. Other drivers have no hash here,
+    since their results also depend on shared libraries and on the CPU.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def _library_of(manifest: Path) -> str:
     """Return the library that a driver's manifest names; a relative path starts at its folder."""
     try:
         library: str = json.loads(manifest.read_text(encoding="utf-8"))["ICD"]["library_path"]
-        # A bare name is for the system's search.
+        # The system searches for a name without a folder.
         return os.fspath(manifest.parent / library) if "/" in library else library
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"VKBLOOM_DRIVER: {manifest} is not a driver's manifest") from error
@@ -147,6 +147,6 @@ def adapters() -> tuple[AdapterInfo, ...]:
 
 
 def from_core(adapter: _core.AdapterTuple) -> AdapterInfo:
-    """Make what the core tells about an adapter an AdapterInfo."""
+    """Make an AdapterInfo from the core's description of an adapter."""
     name, kind, driver, driver_info, api_version, _, bundled = adapter
     return AdapterInfo(name, kind, driver, driver_info, api_version, bundled)

@@ -1,8 +1,10 @@
-"""Large images by bands: rows go to the device, and come back from it, as they are read."""
+"""Large images by bands of rows."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -13,22 +15,226 @@ if TYPE_CHECKING:
 
     from vkbloom.settings import Settings
 
-__all__ = ["BandedImage"]
+__all__ = ["Band", "BloomByBands", "ImageByBands"]
 
 
-class BandedImage:
-    """An image on the device of which the host has a band at a time.
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Rows of an image, and of what belongs to it.
 
-    The device has all of it, and of the result; the bloom is the same as that of the image given at
-    once.
+    Parameters
+    ----------
+    image : ndarray, shape (N, W, 3) or (N, W, 4)
+        As for `vkbloom.Renderer.apply`.
+    emission : ndarray, optional
+        Of the image's shape and dtype.
+    mask : ndarray of float32, shape (N, W), optional
+    """
+
+    image: NDArray[Any]
+    emission: NDArray[Any] | None = None
+    mask: NDArray[np.float32] | None = None
+
+    def rows(self, first: int, end: int | None = None) -> Band:
+        """Return rows `first` to `end` of it."""
+        return Band(
+            self.image[first:end],
+            None if self.emission is None else self.emission[first:end],
+            None if self.mask is None else self.mask[first:end],
+        )
+
+    def joined(self, other: Band) -> Band:
+        """Return its rows, and after them those of another band."""
+        return Band(
+            np.concatenate([self.image, other.image]),
+            None
+            if self.emission is None or other.emission is None
+            else np.concatenate([self.emission, other.emission]),
+            None
+            if self.mask is None or other.mask is None
+            else np.concatenate([self.mask, other.mask]),
+        )
+
+    def source(self, levels: tuple[NDArray[Any], ...] = ()) -> _core.Source:
+        """Return it as the core takes it, with smaller images."""
+        return _core.image_source(self.image, self.emission, self.mask, levels)
+
+
+class BloomByBands:
+    """Bloom of an image of which host and device have a band at a time.
+
+    Only smaller images of the bloom are held as a whole: the first, which bands of the image are
+    reduced to, and those that the result is made of. The result is the same as that of the image
+    given at once, bit by bit.
 
     Parameters
     ----------
     core : Renderer of the core
-    rows : ndarray, shape (N, W, 3) or (N, W, 4)
-        The first rows, as for `vkbloom.Renderer.apply`.
+    settings : Settings
+    sample : Band
+        Rows of the image, any.
     height : int
         Rows in all.
+    parts : _Parts
+    """
+
+    def __init__(
+        self,
+        core: _core.Renderer,
+        settings: Settings,
+        sample: Band,
+        height: int,
+        parts: _Parts,
+    ) -> None:
+        self._core = core
+        self._settings = settings
+        self._sample = sample.rows(0, 1)
+        self._height = height
+        self._head, self._names, self._rows, self._halo = parts
+        self._levels: tuple[NDArray[Any], ...] = ()
+
+    @classmethod
+    def of(
+        cls, core: _core.Renderer, settings: Settings, sample: Band, height: int, rows: int
+    ) -> Self | None:
+        """Make one; None where the bloom needs the whole image.
+
+        That is where the sizes of image and bloom have no small common divisor, where the bloom
+        reaches too far, and for dithering, which depends on a pixel's place.
+        """
+        found = core.bands(sample.source(), settings, height)
+        if found is None:
+            return None
+        head, names, step, reach = found
+        parts = _Parts(head, names, max(rows // step, 1) * step, -(-reach // step) * step)
+        if 2 * (parts.rows + 2 * parts.halo) > height:
+            return None
+        return cls(core, settings, sample, height, parts)
+
+    def reduce(self, bands: Iterable[Band]) -> Iterator[int]:
+        """Take the image from the top to the bottom; yield how many rows were taken.
+
+        Parameters
+        ----------
+        bands : iterable of Band
+            With any number of rows each.
+        """
+        if self._head is None:
+            for band in bands:
+                yield len(band.image)
+            return
+        reduced: list[NDArray[Any]] = []
+        for window in self._windows(bands):
+            part = self._height, (), True
+            (array,) = self._render(window.rows.source(), (self._head,), part)
+            # Rows of it for as many rows of the window.
+            count, own = len(array), len(window.rows.image)
+            reduced.append(array[window.first * count // own : window.end * count // own])
+            yield window.end - window.first
+        head = np.concatenate(reduced)
+        del reduced
+        others = tuple(name for name in self._names if name != self._head)
+        source = self._sample.source((head,))
+        made = self._render(source, others, (self._height, (self._head,), False)) if others else ()
+        found = {**dict(zip(others, made, strict=True)), self._head: head}
+        self._levels = tuple(found[name] for name in self._names)
+
+    @property
+    def is_without(self) -> bool:
+        """Whether there is a bloom, and it is known to be zero everywhere; after `reduce`."""
+        return bool(self._levels) and not any(level[:, :, :3].any() for level in self._levels)
+
+    def finals(self, bands: Iterable[Band]) -> Iterator[NDArray[Any]]:
+        """Take the image once more, and yield the rows of `final`; after `reduce`."""
+        part = self._height, self._names, True
+        for window in self._windows(bands):
+            first, end = window.top, window.top + len(window.rows.image)
+            levels = tuple(
+                level[first * len(level) // self._height : end * len(level) // self._height]
+                for level in self._levels
+            )
+            (final,) = self._render(window.rows.source(levels), ("final",), part)
+            yield final[window.first : window.end]
+
+    def _render(
+        self, source: _core.Source, names: tuple[str, ...], part: tuple[int, tuple[str, ...], bool]
+    ) -> tuple[NDArray[Any], ...]:
+        plan = self._core.plan(source, self._settings, names, part)
+        arrays = {name: np.empty(shape, dtype) for name, shape, dtype in plan.outputs}
+        self._core.run(source, (plan,), (tuple(arrays.values()),)).wait()
+        return tuple(arrays[name] for name in names)
+
+    def _windows(self, bands: Iterable[Band]) -> Iterator[_Window]:
+        """Yield the image in bands with what is beyond them."""
+        held: Band | None = None
+        top = first = 0  # of what is held; of the next band
+        for band in bands:
+            held = band if held is None else held.joined(band)
+            end = top + len(held.image)
+            while first < self._height:
+                last = min(first + self._rows, self._height)
+                beyond = min(last + self._halo, self._height)
+                if beyond > end:
+                    break
+                yield _Window(held.rows(0, beyond - top), top, first - top, last - top)
+                first = last
+                kept = max(first - self._halo, 0)
+                held = held.rows(kept - top)
+                top = kept
+
+
+class _Parts(NamedTuple):
+    """How an image is taken by bands: see graph/bands.h of the core.
+
+    Attributes
+    ----------
+    head : str or None
+        The smaller image that bands are reduced to.
+    levels : tuple of str
+        Those that the result is made of.
+    rows : int
+        Of the image to take at a time.
+    halo : int
+        Rows beyond a band that it depends on.
+    """
+
+    head: str | None
+    levels: tuple[str, ...]
+    rows: int
+    halo: int
+
+
+class _Window(NamedTuple):
+    """A band with what is beyond it.
+
+    Attributes
+    ----------
+    rows : Band
+    top : int
+        The place of its first row in the image.
+    first, end : int
+        The band's own rows.
+    """
+
+    rows: Band
+    top: int
+    first: int
+    end: int
+
+
+class ImageByBands:
+    """An image on the device, of which the host has only one band at a time.
+
+    The device has the complete image and the complete result. The bloom is the same as for the
+    image in one array.
+
+    Parameters
+    ----------
+    core : Renderer of the core
+    rows : Band
+        The first rows.
+    height : int
+        Height of the image in rows.
 
     Raises
     ------
@@ -36,15 +242,15 @@ class BandedImage:
         As `vkbloom.Renderer.upload`.
     """
 
-    def __init__(self, core: _core.Renderer, rows: NDArray[Any], height: int) -> None:
+    def __init__(self, core: _core.Renderer, rows: Band, height: int) -> None:
         self._core = core
-        self._source = core.upload(_core.image_source(rows), None, False, height)
-        self._filled = len(rows)
+        self._source = core.upload(rows.source(), None, False, height)
+        self._filled = len(rows.image)
 
-    def add(self, rows: NDArray[Any]) -> None:
+    def add(self, rows: Band) -> None:
         """Give it the next rows, of the same width, channels and dtype."""
-        self._core.fill(self._source, _core.image_source(rows), self._filled)
-        self._filled += len(rows)
+        self._core.fill(self._source, rows.source(), self._filled)
+        self._filled += len(rows.image)
 
     def final(self, settings: Settings, first: int, count: int) -> NDArray[Any]:
         """Return rows of the framebuffer `final`; the first call renders it."""

@@ -148,7 +148,7 @@ def check_index(field: str, value: int, low: int, high: int) -> int:
 def check_image(image: object, name: str = "image") -> NDArray[Any]:
     """Return the image, in this machine's byte order, if the core can take it.
 
-    `name` is the argument's, for the errors.
+    Errors start with `name`.
 
     Anything that NumPy can view is an image: arrays, ``__array__``, the buffer protocol, DLPack on
     the CPU, and an xarray.DataArray with the dimensions y, x and channel in any order. float64
@@ -209,14 +209,14 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
 
 
 def _outside(array: NDArray[Any]) -> float:
-    """Return the first value that is not within 0 to 1."""
+    """Return the first value outside of 0 to 1."""
     return float(array[~((array >= 0) & (array <= 1))][0])
 
 
 def _viewed(
     image: object, name: str, dimensions: tuple[str, ...] = ("y", "x", "channel")
 ) -> NDArray[Any]:
-    """Return what NumPy sees of an object, or raise TypeError."""
+    """Return an array view of an object, or raise TypeError."""
     dims = getattr(image, "dims", None)
     if isinstance(dims, tuple) and hasattr(image, "transpose"):
         # A grid's channels are named after their framebuffer, such as "final_channel".
@@ -242,7 +242,7 @@ def _viewed(
 
 
 def _dimension(dims: tuple[Any, ...], name: str) -> Any:
-    """Return the dimension of a name, or the one that ends with it behind an underscore."""
+    """Return the dimension with this name, or the one that ends with an underscore and the name."""
     if name in dims:
         return name
     ending = [dim for dim in dims if str(dim).endswith(f"_{name}")]
@@ -250,7 +250,7 @@ def _dimension(dims: tuple[Any, ...], name: str) -> Any:
 
 
 def _shape_cure(shape: tuple[int, ...]) -> str:
-    """Return what makes an image of an array of such a shape, "" where nothing is known."""
+    """Return a hint how to convert an array of this shape to an image; "" if there is none."""
     if len(shape) == 2:
         return "; of grey make RGB: np.repeat(image[..., None], 3, axis=2)"
     if len(shape) == 3 and shape[2] == 1:

@@ -252,38 +252,38 @@ class Frames(Mapping[str, NDArray[Any]]):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote.
+        """Read framebuffers from files that `save` wrote.
 
         Parameters
         ----------
         path : str or path-like
-            What `save` was given: a file name, or a folder.
+            The argument of `save`: a file name, or a folder.
 
         Returns
         -------
         Frames
-            The framebuffers in the order and the dtypes that they had, with their settings,
-            timings and info.
+            The framebuffers in their original order and dtypes, with their settings, timings and
+            info.
 
         Raises
         ------
         OSError
-            There is no such file, or it cannot be opened; it names the file.
+            A file does not exist or cannot be opened. The error names it.
         ValueError
-            A file is damaged, or holds no settings: `save` did not write it, or its format (of
-            those that `save` writes, all but OpenEXR, PNG, TIFF and JPEG) has no place for them.
-            Or a framebuffer is in two files, of two calls of `save`. It names the file.
+            A file is damaged; it has no settings, because `save` did not write it, or because its
+            format cannot store them (only OpenEXR, PNG, TIFF and JPEG can); or two files have the
+            same framebuffer, from two calls of `save`. The error names the file.
         ModuleNotFoundError
-            If OpenImageIO is missing: ``pip install vkbloom[images]``.
+            OpenImageIO is missing: ``pip install vkbloom[images]``.
 
         See Also
         --------
-        save : The way there.
+        save : Writes the files.
 
         Notes
         -----
-        Other files in a folder are left out, and so are those of other names that begin alike. Of
-        JPEG, which compresses with loss, the values are those that are left.
+        Other files in a folder are ignored, and so are files with other names that start the same.
+        JPEG compresses with loss, so its values differ from the saved ones.
 
         Examples
         --------

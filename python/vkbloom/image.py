@@ -13,24 +13,24 @@ __all__ = ["Image"]
 
 
 class Image:
-    """A snapshot of an image on the device of one renderer, made by `Renderer.upload`.
+    """A copy of an image on a renderer's device, made by `Renderer.upload`.
 
-    It is accepted wherever an image is, by the renderer that made it: `apply`, `apply_many`,
-    `apply_each`, `plan` and `grid`. Its pixels travel to the device once, and are compared with
-    nothing. Its memory is free again when the handle is collected, or the renderer is closed.
+    The renderer that made it accepts it in place of an image, in `apply`, `apply_many`,
+    `apply_each`, `plan` and `grid`. Its pixels are uploaded once and are not compared with other
+    images. Its memory is released when this object is collected or the renderer is closed.
 
     Attributes
     ----------
     shape : (int, int, int)
-        (H, W, 3) or (H, W, 4), as of the array that it was made of.
+        (H, W, 3) or (H, W, 4), the shape of the original array.
     dtype : numpy.dtype
         uint8, float16 or float32.
     mask, emission : bool
-        Whether it was made with one, which then counts wherever it is used.
+        Whether it was uploaded with a mask or an emission, which are used in all calls.
 
     See Also
     --------
-    Renderer.upload : Makes it.
+    Renderer.upload : Returns an Image.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A renderer that a Ctrl-C does not wait for."""
+"""A renderer for commands: Ctrl-C ends the command without waiting for the device."""
 
 from __future__ import annotations
 

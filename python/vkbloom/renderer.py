@@ -75,7 +75,7 @@ def _arrays_for(
             continue
         array = _check_out(out[name], name, shape, dtype)
         for other, taken in given.items():
-            # Of contiguous arrays the bounds say it all.
+            # For contiguous arrays the bounds are sufficient.
             if np.may_share_memory(array, taken):
                 raise ValueError(f"out: {other} and {name} must not share memory")
         given[name] = array
@@ -88,7 +88,7 @@ def _arrays_for(
 def _paired(
     images: Iterable[NDArray[Any] | Image], settings: Settings | Sequence[Settings]
 ) -> Iterator[requests.Work]:
-    """Yield each image with its settings; what is wrong comes in its turn."""
+    """Yield each image with its settings. Errors are raised in order."""
     count = 0
     for image in images:
         if isinstance(settings, Settings):
@@ -98,7 +98,7 @@ def _paired(
         else:
             raise ValueError(f"settings: {len(settings)} are fewer than the images")
         work = requests.Work(image_source(image), one)
-        # The array is the caller's again while the next is asked for.
+        # The iterable may overwrite the array when it makes the next image.
         del image
         yield work
         del work
@@ -115,11 +115,12 @@ class Renderer:
     adapter : str
         "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", or a
         part of an adapter's name, in any case. The environment variable VKBLOOM_ADAPTER replaces
-        "auto". "software" is the driver of the package ``vkbloom-lavapipe`` where it is installed,
-        else the system's; VKBLOOM_DRIVER names another driver's library or manifest, or "system".
+        "auto". "software" is the driver of the package ``vkbloom-lavapipe`` if it is installed,
+        otherwise the system's. VKBLOOM_DRIVER selects another driver by the path of its library or
+        manifest, or "system".
     validation : bool
-        Turns the Khronos validation layer on, with synchronization validation; its first message
-        raises `ValidationError` from the call that caused it.
+        Enables the Khronos validation layer with synchronization validation. A call that causes
+        messages raises `ValidationError` with the first one.
 
     Attributes
     ----------
@@ -129,12 +130,13 @@ class Renderer:
     Raises
     ------
     AdapterNotFoundError
-        No adapter fits; says what was found, what is missing and what to install.
+        No adapter fits. The message lists the adapters found, and what is missing or has to be
+        installed.
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
         `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
-        what the adapter cannot run.
+        variants that the adapter cannot run.
 
     See Also
     --------
@@ -143,18 +145,20 @@ class Renderer:
 
     Notes
     -----
-    A context manager; usable from any thread. Calls release the GIL while the device works, and
-    wait for each other. Framebuffers own their memory and outlive the renderer.
+    A renderer is a context manager, and any thread can use it. Calls release the GIL while the
+    device works, and wait for each other. Framebuffers own their memory and stay valid when the
+    renderer is closed.
 
-    Ctrl-C, or whatever else a signal's handler raises, ends a call that waits, and the renderer can
-    be used again; closing waits for what the device is still at work on. A device that takes longer
-    than 300 s for a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces that
-    number. After a fork the child opens a renderer of its own, where the driver can; its parent's
-    raise ValueError. NVIDIA's driver cannot: start processes by multiprocessing's method "spawn".
+    Ctrl-C, or any exception from a signal handler, ends a waiting call. The renderer can be used
+    again; closing it waits until the device has finished. A device that takes longer than 300 s for
+    a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces this number. After a
+    fork, the parent's renderers raise ValueError in the child. The child can open its own renderer
+    if the driver supports this. NVIDIA's driver does not: start processes with multiprocessing's
+    method "spawn".
 
-    The first renderer, or list of `adapters`, opens the Vulkan loader for the life of the process:
-    drivers that are installed later, and variables such as VK_DRIVER_FILES that are set later, are
-    seen by new processes only.
+    The first renderer, or the first call of `adapters`, opens the Vulkan loader for the life of the
+    process. Drivers that are installed later, and variables such as VK_DRIVER_FILES that are set
+    later, have an effect only in new processes.
 
     Examples
     --------
@@ -203,17 +207,17 @@ class Renderer:
         return self._core.closed
 
     def close(self) -> None:
-        """Give back all that the renderer holds of the device; may be called twice.
+        """Release the device and everything on it. May be called twice.
 
         Raises
         ------
         ValidationError
-            With validation on: something was left behind.
+            With validation: an object was not destroyed.
         """
         self._core.close()
 
     def __reduce__(self) -> NoReturn:
-        # Of copy.copy, copy.deepcopy and pickle: two would share what `close` closes.
+        # For copy.copy, copy.deepcopy and pickle: two objects would share one device.
         raise TypeError("a Renderer cannot be copied or pickled; create another one")
 
     def __enter__(self) -> Renderer:
@@ -234,7 +238,7 @@ class Renderer:
 
     def _repr_html_(self) -> str:
         """Return the table of `display.renderer_html`."""
-        # Late: notebooks need it, and nothing else.
+        # Imported here, since only notebooks need it.
         from vkbloom.views import display  # noqa: PLC0415
 
         return display.renderer_html(self.info, closed=self.closed)
@@ -256,22 +260,22 @@ class Renderer:
         ----------
         scene : Scene
         settings : Settings, optional
-            By default ``Separable()``, the forward system's.
+            Default: ``Separable()``, the forward system's method.
         size : (int, int)
             Width and height of the frame in pixels.
         shading : {"forward", "deferred"}
-            Forward: the glow mesh is drawn into buffers of its own, blurred and added to the
-            Phong-lit scene, all in 8 bits. Deferred: albedo, normal, position and brightness of
-            what is seen are drawn into a G-buffer of half floats; the scene is lit from it, and
-            what is blurred is the brightness: what the body's materials emit plus the glow mesh's
-            colour times the scene's `glow_intensity`.
+            Forward: the glow mesh is drawn into its own buffers, blurred, and added to the
+            Phong-lit scene, all in 8 bits. Deferred: albedo, normal, position and brightness of the
+            visible surfaces are drawn into a G-buffer of half floats. The scene is lit from it. The
+            blurred image is the brightness: the emission of the body's materials plus the glow
+            mesh's colour times the scene's `glow_intensity`.
         time : float
-            Of the animation, in turns: 0 and 1 are the same place. Any finite number.
+            Time of the animation in turns, any finite number. 0 and 1 give the same frame.
         attachments : "all" or sequence of str
-            Names of the framebuffers wanted. What is not wanted is neither rendered for its own
-            sake nor read back.
+            Names of the requested framebuffers. Others are rendered only if a requested one needs
+            them, and are not read back.
         out : mapping of str to ndarray, optional
-            Arrays to fill in place, by name; what it lacks is allocated.
+            Arrays to fill, by name. Arrays for the other framebuffers are allocated.
 
         Returns
         -------
@@ -280,11 +284,11 @@ class Renderer:
             ``blur_vertical``, ``bloom`` (at the frame's size), ``scene`` ((H, W, 4) uint8),
             ``depth`` ((H, W) float32) and ``final`` ((H, W, 4) uint8).
 
-            Deferred, at the frame's size but for the blur's: ``albedo``, ``normal``, ``position``
+            Deferred, at the frame's size except for the blur: ``albedo``, ``normal``, ``position``
             (both in view space), ``brightness`` (all (H, W, 4) float16), ``depth``,
             ``blur_vertical``, ``bloom``, ``scene`` ((H, W, 4) float16, light plus brightness) and
-            ``final`` ((H, W, 4) uint8). Where the normal is 0 there is the sky, or nothing:
-            its albedo is its colour.
+            ``final`` ((H, W, 4) uint8). A normal of 0 marks the sky or the empty background: there
+            the albedo is the colour.
 
             With ``direct=True`` there is no ``blur_vertical``. With ``bloom=False`` there are no
             bloom buffers, and the glow mesh is left out.
@@ -300,8 +304,8 @@ class Renderer:
 
         Notes
         -----
-        A pass runs only when what it reads, its settings or its size changed since it last ran;
-        ``timings`` of the result names the passes that ran.
+        A pass runs only if its inputs, its settings or its size have changed since it ran last. The
+        ``timings`` of the result name the passes that ran.
         """
         settings = check_settings(settings)
         source = scene_source(scene, size, shading, time)
@@ -323,31 +327,31 @@ class Renderer:
         ----------
         image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
             Linear light: uint8 (read as value / 255), float16 or float32; any strides. The levels
-            of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; what
-            becomes of an alpha is the field `alpha` of the settings. NaN and infinity count as 0 in
-            the bloom and stay where they are in ``final``. An `Image` of `upload` is used as it is,
+            of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; the field
+            `alpha` of the settings selects the treatment of an alpha. NaN and infinity count as 0
+            in the bloom, and stay in ``final`` at their pixels. An `Image` from `upload` is used
             with its mask and emission.
         settings : Settings, optional
             By default ``Separable()``.
         mask : ndarray, shape (H, W), optional
-            What may glow, 0 to 1, of the image's size: uint8 (read as value / 255), bool, float16
-            or float32. It is reduced bilinearly like the image, and multiplies what the threshold
-            lets through. Published methods read it at the pixel centres of the first image that
-            they write after their threshold.
+            The parts that glow, 0 to 1, with the image's size: uint8 (read as value / 255), bool,
+            float16 or float32. It is reduced bilinearly like the image, and multiplies the
+            thresholded image. Published methods read it at the pixel centres of the first image
+            that they write after their threshold.
         emission : ndarray, optional
-            An image of the same shape and dtype that takes the image's place as the source of the
-            bloom, as the glow mesh does in a scene; ``final`` still starts from the image.
+            An image of the same shape and dtype from which the bloom is made instead, like the glow
+            mesh in a scene. It is added to the image in ``final``.
         attachments, out
             As for `render`.
 
         Returns
         -------
         Frames
-            ``glow`` (what the threshold lets through), the blur's framebuffers
-            (``blur_vertical``; or ``down_0``, ``down_1``, ... and ..., ``up_0``), ``bloom``, all
-            (H, W, 4) in the format of the bloom buffers, and ``final``, which has the image's
-            shape and dtype. With ``bloom=False`` there is ``final`` only. ``info`` counts the
-            "nan" and "inf" of the image and the emission.
+            ``glow`` (the thresholded image), the blur's framebuffers (``blur_vertical``; or
+            ``down_0``, ``down_1``, ... and ..., ``up_0``), ``bloom``, all (H, W, 4) in the format
+            of the bloom buffers, and ``final``, which has the image's shape and dtype. With
+            ``bloom=False`` there is only ``final``. ``info`` has the numbers of "nan" and "inf" in
+            the image and the emission.
 
         Raises
         ------
@@ -362,11 +366,11 @@ class Renderer:
 
         Notes
         -----
-        The same image again, to the byte, is not sent to the device again, and passes run only
-        when what they read or their settings changed. The same holds for mask and emission.
+        An image with the same bytes as before is not uploaded again. Passes run only if their
+        inputs or settings have changed. The same is true for mask and emission.
 
-        With the composite "mix" a bloom takes from the scene s only what it came of: with a mask m
-        the result is s + i (b - m s), with an emission s + i b.
+        The composite "mix" subtracts from the scene s only the part from which the bloom was made.
+        With a mask m the result is s + i (b - m s), with an emission s + i b.
 
         Examples
         --------
@@ -392,12 +396,12 @@ class Renderer:
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
     ) -> Iterator[Frames]:
-        """Give an image bloom with one settings after the other.
+        """Give an image bloom with many settings.
 
         Parameters
         ----------
         image
-            As for `apply`; an array must not change before the last frame is taken.
+            As for `apply`. An array must not change before the last frame is taken.
         settings_seq : iterable of Settings
         attachments
             As for `apply`.
@@ -410,9 +414,9 @@ class Renderer:
 
         Notes
         -----
-        The device works on the next settings while a frame is used: after the first frame,
-        settings are taken from their iterable before the frames that come before theirs.
-        What a wrong one of them raises is raised in its turn, after the frames before it.
+        The device works on the next settings while the caller uses a frame. So after the first
+        frame, settings are taken from the iterable before earlier frames are yielded. An error in
+        one of them is raised after the frames before it.
         """
         names = check_attachments(attachments)
         return self._run_many(image_source(image), settings_seq, names)
@@ -424,15 +428,15 @@ class Renderer:
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
     ) -> Iterator[Frames]:
-        """Give one image after the other bloom.
+        """Give many images bloom.
 
         Parameters
         ----------
         images : iterable of images
-            Each as for `apply`; shapes and dtypes may change from one to the next. Each is copied
-            before the next is asked for, so that one array can be filled again and again.
+            Each as for `apply`. Shapes and dtypes may differ. Each image is copied before the next
+            one is taken, so the iterable can fill one array repeatedly.
         settings : Settings or sequence of Settings, optional
-            For all images, or one for each of them; by default ``Separable()``.
+            For all images, or one for each image. Default: ``Separable()``.
         attachments
             As for `apply`.
 
@@ -444,21 +448,21 @@ class Renderer:
         Raises
         ------
         ValueError
-            At the call: the lengths of both sequences differ, or an argument is out of range. At
-            the turn of an image: it is one that `apply` refuses, or there is no settings for it.
+            At the call: the lengths of both sequences differ, or an argument is out of range. In
+            the iteration: `apply` would refuse the image, or it has no settings.
         TypeError
             `images` is not iterable, or an argument has another type.
 
         See Also
         --------
-        apply_many : One image with one settings after the other.
+        apply_many : One image with many settings.
         upload : Keeps an image on the device.
 
         Notes
         -----
-        The device works on the next images while a frame is used: after the first frame, at most
-        two images are taken ahead of the frame that is given. What goes wrong with an image, or
-        with the iterable, is raised in its turn, after the frames before it, and is the end.
+        The device works on the next images while the caller uses a frame. So after the first frame,
+        up to two images more than the yielded frames are taken. An error of an image or of the
+        iterable is raised after the frames before it, and ends the iteration.
 
         Examples
         --------
@@ -497,7 +501,7 @@ class Renderer:
         mask: NDArray[Any] | None = None,
         emission: NDArray[Any] | None = None,
     ) -> Image:
-        """Copy an image to the device, where it stays for many calls.
+        """Copy an image to the device, to use it in many calls.
 
         Parameters
         ----------
@@ -509,7 +513,7 @@ class Renderer:
         Returns
         -------
         Image
-            Accepted by this renderer wherever an image is. Calls with it compare no bytes.
+            This renderer accepts it in place of an image. Calls with it do not compare bytes.
 
         Raises
         ------
@@ -523,7 +527,7 @@ class Renderer:
 
         See Also
         --------
-        apply_each : One image after the other, copied while the device works on others.
+        apply_each : Many images, each copied while the device works on others.
 
         Examples
         --------
@@ -559,7 +563,7 @@ class Renderer:
         time: float = 0.0,
         attachments: Literal["all"] | str | Sequence[str] = "all",
     ) -> Iterator[Frames]:
-        """Render a scene with one settings after the other.
+        """Render a scene with many settings.
 
         Parameters
         ----------
@@ -575,7 +579,7 @@ class Renderer:
 
         Notes
         -----
-        As for `apply_many`.
+        As of `apply_many`.
         """
         names = check_attachments(attachments)
         return self._run_many(scene_source(scene, size, shading, time), settings_seq, names)
@@ -589,7 +593,7 @@ class Renderer:
         shading: Shading = "forward",
         attachments: Literal["all"] | str | Sequence[str] = "all",
     ) -> Plan:
-        """Tell what a call would do, without rendering anything.
+        """Return what a call would do, without rendering.
 
         Parameters
         ----------
@@ -598,7 +602,7 @@ class Renderer:
         settings : Settings, optional
             By default ``Separable()``.
         size : (int, int), optional
-            Width and height of a scene's frame, by default (1280, 720). An image has its own.
+            Width and height of a scene's frame. Default: (1280, 720). Not for an image.
         shading : {"forward", "deferred"}
             Of a scene.
         attachments
@@ -607,7 +611,7 @@ class Renderer:
         Returns
         -------
         Plan
-            The framebuffers that the call would give, with shapes and dtypes, and its passes in
+            The framebuffers that the call would return, with shapes and dtypes, and its passes in
             the variants that this renderer's device would run.
 
         Raises
@@ -618,16 +622,16 @@ class Renderer:
         TypeError
             An argument has the wrong type.
         Error
-            The device cannot do what the settings ask for.
+            The device does not support the settings.
 
         See Also
         --------
-        render, apply : Do it.
+        render, apply : Do what was planned.
 
         Notes
         -----
-        The device is not asked, and other threads' calls are not waited for. What the pixels of an
-        image are, and a scene's time, changes no plan.
+        This makes no device call and does not wait for other threads' calls. A plan does not depend
+        on the pixels of an image or on a scene's time.
 
         Examples
         --------
@@ -689,45 +693,47 @@ class Renderer:
         Parameters
         ----------
         source : Scene, image, or list or mapping of images
-            Several images add the dimension "image" before all others; a mapping's keys label
-            them. They must have one shape and dtype.
+            Several images add the dimension "image" before all others, with a mapping's keys as
+            labels. They must have the same shape and dtype.
         settings : Settings, optional
-            What the axes vary; by default ``Separable()``.
+            The settings that the axes change. Default: ``Separable()``.
         axes : mapping of str to sequence
-            Values by settings field, or by "time" for a scene. "preset" has names of
-            `vkbloom.presets`, or "settings" a list of Settings, of any methods: these two exclude
-            each other and the argument `settings`, and the other axes change each of them.
+            Values by settings field, or by "time" for a scene. The axis "preset" has names of
+            `vkbloom.presets`, the axis "settings" a list of Settings of any methods. These two axes
+            exclude each other and the argument `settings`. Other axes change each of their
+            settings.
         size : (int, int), optional
-            Width and height of a scene's frames, by default (1280, 720).
+            Width and height of a scene's frames. Default: (1280, 720).
         shading, time
             Of a scene, as for `render`.
         attachments : "all" or sequence of str
-            The framebuffers to keep. Their shape must be the same at all points, and all are of
-            uint8 or all of floats, which become the largest of their dtypes.
+            The framebuffers to keep. Each must have the same shape at all points. Its dtype must be
+            uint8 at all points or a float at all points; floats get the largest of their dtypes.
         reduce : mapping of str to callable, optional
-            Figures to keep, by name: each is called with the `Frames` of a point, and returns a
-            number or a small array. `vkbloom.reductions` has ready ones. With ``attachments=()``
-            no framebuffers are kept beside them. A callable gets the framebuffers that its
-            attribute ``attachments`` names, or all where it has none.
+            Figures to keep, by name. Each callable gets the `Frames` of a point and returns a
+            number or a small array. `vkbloom.reductions` has several. With ``attachments=()`` only
+            the figures are kept. A callable gets the framebuffers that its attribute
+            ``attachments`` names, or all if it has no such attribute.
         progress : bool, optional
-            True: a progress bar in a terminal or a notebook, silent elsewhere. None: the same
-            where tqdm is installed. False: silent.
+            True: a progress bar in a terminal or a notebook, but not elsewhere. None: the same if
+            tqdm is installed. False: no progress bar.
 
         Returns
         -------
         xarray.Dataset
-            One dimension an axis, in the order given, then "y", "x" and "channel"; one variable a
-            framebuffer and a reduction. The attributes hold the remaining settings (as JSON), the
-            adapter, the driver and the version, and how many passes ran ("passes_run") and how
-            many more all points have, each pass of each by itself ("passes_saved").
+            One dimension for each axis, in the given order, then "y", "x" and "channel"; one
+            variable for each framebuffer and each reduction. The attributes have the remaining
+            settings (as JSON), the adapter, the driver, the version, the number of passes that ran
+            ("passes_run"), and how many more would run if each point were rendered alone
+            ("passes_saved").
 
         Raises
         ------
         ValueError
-            An argument is out of range; or, before anything is rendered, a framebuffer has
-            different shapes along an axis, or some point lacks it.
+            An argument is out of range; or a framebuffer has different shapes along an axis, or is
+            missing at a point. This is checked before anything is rendered.
         MemoryError
-            The result is larger than the memory that is left; nothing was rendered.
+            The result does not fit into the free memory. Nothing was rendered.
         TypeError
             An argument has the wrong type.
         ModuleNotFoundError
@@ -737,8 +743,8 @@ class Renderer:
 
         Notes
         -----
-        Points are visited in the order that runs the fewest passes, whatever the order of the
-        axes. For grids that outgrow memory see `vkbloom.grid_to_zarr`.
+        Points are rendered in the order that runs the fewest passes, whatever the order of the
+        axes. For grids that are larger than the memory see `vkbloom.grid_to_zarr`.
 
         Examples
         --------
@@ -785,7 +791,7 @@ class Renderer:
         settings_seq: Iterable[Settings],
         names: tuple[str, ...] | None,
     ) -> Iterator[Frames]:
-        # No generator itself: the arguments are checked at the call, not with the first frame.
+        # Not a generator, so that arguments are checked at the call and not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
         return self._run_work(
@@ -805,13 +811,13 @@ class Renderer:
         return Frames(arrays, timings=timings, settings=settings, info=info)
 
     def _save_pipelines(self) -> None:
-        """Keep the driver's pipeline cache on disk when new pipelines came into it."""
+        """Write the driver's pipeline cache to disk if it has new pipelines."""
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
             from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
-            # Without the cache the next start is slower: no reason to lose a frame that is there.
-            # A ValueError: another thread has closed the renderer.
+            # Errors are ignored: without the cache only the next start is slower. A ValueError
+            # means that another thread has closed the renderer.
             with contextlib.suppress(_core.Error, ValueError):
                 pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
                 self._saved_pipelines = count

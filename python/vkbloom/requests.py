@@ -1,4 +1,4 @@
-"""Many requests in their order: several go to the device at once, while it has others to run."""
+"""Sequences of requests: several are submitted together, while the device runs others."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ if TYPE_CHECKING:
 
 __all__ = ["Result", "Work", "new_array", "new_arrays", "run", "run_one", "uploaded"]
 
-#: Requests in one submission at most.
+#: The most requests in one submission.
 REQUESTS = 32
-#: Bytes of the framebuffers of one submission at most, one request at the least.
+#: The most bytes of framebuffers in one submission. A single request may have more.
 BYTES = 64 << 20
-#: What one submission may take, one request at the least: a device cannot be stopped, so that
-#: whoever is interrupted and closes the renderer waits for what the device has.
+#: The longest time of one submission. A single request may take longer. A device cannot be stopped,
+#: so closing the renderer after an interruption waits for the pending submissions.
 SECONDS = 0.25
-#: Submissions that the device has while the frames of another are taken.
+#: Submissions that are pending while the caller takes the frames of another one.
 AHEAD = 2
-#: The same where each request has an image of its own: the next is copied while the device works.
+#: The same if each request has its own image, since the next one is copied while the device works.
 IMAGES_AHEAD = 3
 
-#: Arrays of so many bytes and more are in a renderer's pages, where the device writes them itself.
-#: NumPy keeps some of the memory of smaller ones for the next.
+#: Arrays of this size or more are in a renderer's pages, to which the device writes directly. For
+#: smaller arrays NumPy recycles some memory.
 LARGE_BYTES = 1 << 20
 
 
 class Result(NamedTuple):
-    """What a request gave.
+    """The result of a request.
 
     Attributes
     ----------
     arrays : dict of str to ndarray
     timings : dict of str to float
     counts : (int, int)
-        How many NaN and infinities the input held.
+        The numbers of NaNs and infinities in the input.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -54,27 +54,27 @@ class Result(NamedTuple):
 
 
 def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
-    """Return an array for a framebuffer; it holds anything.
+    """Return an array for a framebuffer. Its content is undefined.
 
-    A large one is in pages that its `base` owns, and that are used again when it is gone.
+    A large one is in pages that its `base` owns. They are reused when the array is freed.
 
     Raises
     ------
     OutOfMemoryError
-        There is no memory for it.
+        There is not enough memory.
     """
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < LARGE_BYTES:
         return np.empty(shape, dtype)
-    # NumPy's types know the standard library's buffers only.
+    # NumPy's type hints accept only buffers of the standard library.
     return np.ndarray(shape, dtype, buffer=core.pages(size))  # type: ignore[arg-type]
 
 
 def new_arrays(core: _core.Renderer, plan: _core.Plan) -> tuple[NDArray[Any], ...]:
     """Return an array for each of a plan's outputs."""
     arrays = []
-    # A generator would make a cell of `core`. CPython 3.11 leaks all arguments of a call that gets
-    # no memory for a cell, and the plan with them.
+    # Not a generator expression, for which `core` would be a cell. CPython 3.11 leaks all arguments
+    # of a call if it cannot allocate a cell.
     for _, shape, dtype in plan.outputs:
         arrays.append(new_array(core, shape, dtype))
     return tuple(arrays)
@@ -93,24 +93,24 @@ def run_one(
     core : Renderer of the core
     source : Source of the core
     plan : Plan of the core
-        Made for both.
+        Made for this renderer and source.
     arrays : tuple of ndarray
-        To be filled, one for each of the plan's outputs.
+        One for each of the plan's outputs. They are filled.
     """
     (timings,), counts = core.run(source, (plan,), (arrays,)).wait()
     return Result(_named(plan, arrays), timings, counts)
 
 
 def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
-    """Copy each image to the device before the next is asked for.
+    """Copy each image to the device before the next one is taken.
 
-    Images of arrays take the device's memory of those before, whose submissions are over by then.
+    Images reuse the device memory of earlier ones whose submissions have finished.
 
     Parameters
     ----------
     core : Renderer of the core
     sequence : iterable of Work
-        Of images; one that is on the device stays as it is.
+        Its sources are images. An image that is already on the device is not copied.
     """
     kept: deque[_core.Source] = deque()
     for work in sequence:
@@ -120,7 +120,7 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
         spare = kept.popleft() if len(kept) == IMAGES_AHEAD else None
         kept.append(core.upload(work.source, spare, True))
         settings = work.settings
-        # The array is the caller's again while the next is asked for.
+        # The iterable may overwrite the array when it makes the next image.
         del work
         yield Work(kept[-1], settings)
 
@@ -130,7 +130,7 @@ def _named(plan: _core.Plan, arrays: tuple[NDArray[Any], ...]) -> dict[str, NDAr
 
 
 class Work(NamedTuple):
-    """What a request is made of.
+    """The source and the settings of a request.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ class _Submitted(NamedTuple):
 
 
 class _Requests:
-    """A sequence of work, put into submissions in its order.
+    """Divides a sequence of work into submissions, in order.
 
     Parameters
     ----------
@@ -169,12 +169,12 @@ class _Requests:
     core : Renderer of the core
     names : tuple of str or None
     most : int
-        Requests in one submission at most.
+        The most requests in one submission.
 
     Attributes
     ----------
     failure : Exception or None
-        What comes after all that was submitted.
+        To be raised after the results of everything that was submitted.
     """
 
     def __init__(
@@ -188,15 +188,15 @@ class _Requests:
         self._core = core
         self._names = names
         self._ever = most
-        self._waiting: deque[Work] = deque()  # taken from the sequence, and not submitted
-        self._alone = 0  # how many of those go one by one
+        self._waiting: deque[Work] = deque()  # taken from the sequence, not submitted yet
+        self._alone = 0  # how many of these are submitted one by one
         self._limit = 1
-        self._most = most  # in SECONDS, as far as is known
+        self._most = most  # that fit into SECONDS, as far as is known
         self._ended = False
         self.failure: Exception | None = None
 
     def submit(self) -> _Submitted | None:
-        """Hand the next work to the device; None: there are none, or the next one failed."""
+        """Submit the next work. None: there is no more, or the next one failed."""
         while requests := self._take():
             plans = tuple(request.plan for request in requests)
             try:
@@ -207,19 +207,20 @@ class _Requests:
                 if not self._blames_one(error, requests):
                     self._fail(error)
                     return None
-                # Those before it still come, and the error in its turn.
+                # The requests before it are still submitted. The error is raised after their
+                # results.
                 self._waiting.extendleft(request.work for request in reversed(requests))
                 self._alone = len(requests)
             else:
                 self._alone = max(0, self._alone - 1)
-                # The first frame waits for no other, and whoever uses a few has a few made in vain:
-                # twice as many as these, which may be fewer than the limit was.
+                # Double the number, starting with one request. So the first frame waits for no
+                # other, and a caller that stops early wastes little work.
                 self._limit = min(2 * len(requests), REQUESTS)
                 return _Submitted(submission, requests, time.perf_counter())
         return None
 
     def took(self, seconds: float, count: int) -> None:
-        """Learn from a submission of so many requests, which took no longer than that."""
+        """Update the limit after a submission of `count` requests that took at most `seconds`."""
         fit = int(SECONDS * count / max(seconds, SECONDS / REQUESTS))
         self._most = min(max(1, fit), self._ever)
 
@@ -236,7 +237,7 @@ class _Requests:
                 break
             try:
                 plan = self._core.plan(work.source, work.settings, self._names)
-                # Those with another source or other images need another submission.
+                # Another source or other images need another submission.
                 if requests and not (
                     work.source is requests[0].work.source and plan.shares_images(requests[0].plan)
                 ):
@@ -269,7 +270,7 @@ class _Requests:
 
     @staticmethod
     def _blames_one(error: Exception, requests: list[_Request]) -> bool:
-        """Whether one of several requests is to blame, so that the others may do alone."""
+        """Whether one of several requests may have caused the error; then each runs alone."""
         general = _core.ValidationError, _core.DeviceLostError
         return (
             len(requests) > 1 and isinstance(error, _core.Error) and not isinstance(error, general)
@@ -285,27 +286,27 @@ def run(
 ) -> Iterator[tuple[Settings, Result]]:
     """Yield the result of each request, in their order.
 
-    Work is taken ahead of the results, so that the device has some while results are used: none
-    ahead of the first result, then as much as makes `AHEAD` submissions.
+    Work is taken before earlier results are yielded, so that the device is busy while the caller
+    uses results: none before the first result, then enough for `AHEAD` submissions.
 
     Parameters
     ----------
     sequence : iterable of Work
     core : Renderer of the core
     names : tuple of str or None
-        The framebuffers wanted; None: all.
+        The requested framebuffers; None: all.
     alone : bool
-        Each request is a submission: less than `IMAGES_AHEAD` requests are taken ahead.
+        Each request is a submission. Fewer than `IMAGES_AHEAD` requests are taken ahead.
 
     Raises
     ------
     Exception
-        What a request or the sequence raises, after the results before it.
+        The error of a request or of the sequence, after the results before it.
     """
     waiting = _Requests(sequence, core, names, 1 if alone else REQUESTS)
     submitted: deque[_Submitted] = deque()
     ahead = 1
-    before = 0.0  # when the last submission was over
+    before = 0.0  # when the last submission ended
     try:
         while True:
             while len(submitted) < ahead and (added := waiting.submit()) is not None:
@@ -315,23 +316,24 @@ def run(
             submission, requests, since = submitted.popleft()
             timings, counts = submission.wait()
             del submission
-            # The device began with it when it had it and was done with the one before.
+            # The device started it after it was submitted and the one before had ended.
             end = time.perf_counter()
             waiting.took(end - max(since, before), len(requests))
             before = end
-            # A result is the taker's alone: none is kept until its submission is through.
+            # Yielded results are not kept, so that the caller is their only owner.
             requests.reverse()
             timings.reverse()
             while requests:
                 yield _taken(requests.pop(), timings.pop(), counts)
             ahead = IMAGES_AHEAD if alone else AHEAD
     finally:
-        # Whatever nobody takes is waited for here, not when the collector comes round.
+        # Waits here for submissions whose results nobody takes, not at the next garbage
+        # collection.
         submitted.clear()
     failure, waiting.failure = waiting.failure, None
     if failure is not None:
         try:
             raise failure
         finally:
-            # Its traceback holds this frame, and so the arrays, until the collector comes round.
+            # Its traceback would keep this frame and its arrays until the next garbage collection.
             del failure

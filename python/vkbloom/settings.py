@@ -39,8 +39,8 @@ def number_field(
 ) -> Any:
     """Declare a field that is a number in the core's table, which gives its default and range.
 
-    A method whose source has a narrower range gives that one. `option` is the field's name on the
-    command line, where that is another one.
+    A method whose source has a narrower range declares it here. `option` is the field's name on the
+    command line, if it differs.
     """
     initial, _, _ = _core.VALUES[name]
     return dataclasses.field(
@@ -92,12 +92,12 @@ class Settings:
     intensity : float
         The i of the composite, 0 to 65504.
     alpha : {"keep", "max", "blur"}
-        What becomes of the alpha a of an RGBA image, here premultiplied for "max" and "blur".
-        "keep": nothing. "max": max(a, clamp(max over r, g, b of i b, 0, 1)), whatever the
-        `composite`. "blur": alpha is blurred like a colour, with the weights of the colours, and
-        is ``bloom[..., 3]``; a becomes 1 - (1 - a)(1 - clamp(i b_a, 0, 1)). Where a threshold
-        subtracts instead of scaling (`FilamentBloom`), alpha takes the factor of the brightest
-        channel. Scenes ignore it.
+        Treatment of the alpha a of an RGBA image. "max" and "blur" need premultiplied colours.
+        "keep": a does not change. "max": max(a, clamp(max over r, g, b of i b, 0, 1)), for every
+        `composite`. "blur": alpha is blurred like a colour, with the weights of the colours, and is
+        ``bloom[..., 3]``; the result is 1 - (1 - a)(1 - clamp(i b_a, 0, 1)). If a threshold
+        subtracts instead of scaling (`FilamentBloom`), alpha is multiplied by the factor of the
+        brightest channel. Scenes ignore it.
     tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
         The tone curve that is applied to the composite.
     exposure : float
@@ -116,15 +116,15 @@ class Settings:
     bloom_size : (int, int) or None
         Width and height of the bloom buffers in pixels.
     bloom_scale : float
-        The same as a fraction of the frame, 0.001 to 4, where `bloom_size` is None; sides are
-        floored, never under 1. A forward scene with neither (a scale of 1) has 256 x 256.
+        The same as a fraction of the frame, 0.001 to 4, if `bloom_size` is None. Sides are rounded
+        down, but at least 1. A forward scene with neither (a scale of 1) has 256 x 256.
     format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"} or None
-        Of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images,
+        Format of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images,
         "rgba16float" for deferred scenes, the image's own for float images. "rg11b10ufloat" has 6
-        bits of mantissa, 5 for blue, and no negative values: what is stored is rounded to the
-        nearest value, negative and NaN become 0, and larger values than 65024, for blue 64512,
-        become these. Its arrays are float32. Published methods keep only the levels so: ``glow``
-        and ``bloom``, in an engine the frame before and after, are not rounded.
+        bits of mantissa, 5 for blue, and no negative values. Stored values are rounded to the
+        nearest one; negative values and NaN become 0; values above 65024 (64512 for blue) become
+        this limit. Its arrays are float32. Published methods store only their levels in it:
+        ``glow`` and ``bloom``, which are the frame before and after in an engine, are not rounded.
 
     Raises
     ------
@@ -197,12 +197,12 @@ class Settings:
         object.__setattr__(self, field.name, number)
 
     def _check_name(self, field: str, names: tuple[str, ...], of: str = "") -> None:
-        """Check a name and store it as a plain str, of whatever class it is."""
+        """Check a name and store it as a plain str, also from a subclass of str."""
         value = getattr(self, field)
         # An array compares with a name element by element.
         if not isinstance(value, str) or value not in names:
             raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}{of}")
-        # Not by str(), which gives an enum's own name.
+        # Not with str(), which returns an enum's own name.
         object.__setattr__(self, field, names[names.index(value)])
 
     def replace(self, **changes: Any) -> Self:
@@ -238,36 +238,36 @@ class Settings:
         Returns
         -------
         dict
-            Plain values that JSON can hold, tuples as its lists.
+            Values that JSON can represent, with lists instead of tuples.
 
         See Also
         --------
-        from_dict : The way back.
+        from_dict : Makes settings from the result.
         """
         return {"method": self.method, **dataclasses.asdict(self)}
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """Make settings of what `to_dict` gave.
+        """Make settings from the result of `to_dict`.
 
         Parameters
         ----------
         fields : mapping of str to object
-            Values by field; missing ones are the defaults. ``method`` names the class, and may be
-            missing when this is called on a method, such as ``Separable.from_dict``.
+            Values by field. Missing fields have their defaults. ``method`` names the class; it may
+            be missing in calls on a method's class, such as ``Separable.from_dict``.
 
         Returns
         -------
         Settings
-            Of that method.
+            Settings of this method.
 
         Raises
         ------
         ValueError
-            There is no such method or field, the method is not that of the class, or a value is
-            out of range.
+            There is no such method or field, the method is not that of the class, or a value is out
+            of range.
         TypeError
-            `fields` is no mapping, or a value has the wrong type.
+            `fields` is not a mapping, or a value has the wrong type.
 
         Examples
         --------
@@ -302,7 +302,7 @@ class Settings:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Make settings of JSON text that `to_json` gave.
+        """Make settings from the result of `to_json`.
 
         Parameters
         ----------
@@ -316,7 +316,7 @@ class Settings:
         Raises
         ------
         ValueError, TypeError
-            The text is no JSON object, or as for `from_dict`.
+            The text is not a JSON object, or as for `from_dict`.
         """
         import json  # noqa: PLC0415  costs start-up time
 
@@ -426,7 +426,7 @@ class Separable(Settings):
 
 
 def check_level_weights(weights: Sequence[float], count: int) -> tuple[float, ...]:
-    """Return the weights as floats, else raise TypeError, or ValueError: so many finite numbers."""
+    """Return the weights as floats; TypeError or ValueError unless they are `count` numbers."""
     numbers = check_floats("level_weights", weights)
     if len(numbers) != count:
         raise ValueError(
@@ -451,8 +451,8 @@ class Pyramid(Settings):
         In the first downsample the five 2 x 2 groups are weighted by 1 / (1 + luminance of the
         group's mean) and renormalized.
     level_weights : sequence of float or None
-        As many finite numbers w_0, w_1, ... as `levels`, negative ones too; if the chain ends
-        early, the first ones count. None: the mean of the levels.
+        As many finite numbers w_0, w_1, ... as `levels`; they may be negative. If the chain ends
+        early, only the first ones are used. None: the mean of the levels.
     **settings
         The fields of `Settings`.
 
@@ -466,9 +466,8 @@ class Pyramid(Settings):
     Weights of the downsample: centre 0.125; four diagonals 1 texel away 0.125 each; four axials
     2 texels away 0.0625 each; four diagonals 2 texels away 0.03125 each. Upsample: (1 2 1)^2 / 16,
     up_k = down_k + tent(up_k+1). ``bloom`` is tent(up_0) at every pixel of ``final``, divided by
-    the number of levels, so that a flat image keeps its value. In "rgba8unorm", which ends at 1,
-    the images on the way up hold the mean of the levels that went into them instead of their sum;
-    the bloom is the same.
+    the number of levels, so that a flat image keeps its value. In "rgba8unorm", whose largest value
+    is 1, the images up_k hold the mean of their levels instead of the sum; the bloom is the same.
 
     With weights up_k = w_k down_k + tent(up_k+1), where the smallest level is w_N-1 down_N-1, and
     ``bloom`` = tent(up_0) is not divided: a flat image becomes the sum of the weights. In

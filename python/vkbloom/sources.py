@@ -1,4 +1,4 @@
-"""What frames are made from: images and scenes, checked and as the core takes them."""
+"""The sources of frames: images and scenes, checked and converted for the core."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["image_kind", "image_source", "is_image", "scene_arguments", "scene_s
 def image_source(
     image: object, mask: object | None = None, emission: object | None = None
 ) -> _core.Source:
-    """Return an image as the core takes it; the arrays must not change while it is used.
+    """Return the core's Source of an image. Its arrays must not change while it is used.
 
     Raises
     ------
@@ -47,14 +47,14 @@ def image_source(
 
 
 def is_image(source: object) -> bool:
-    """Whether a source is an image, or looks like one; anything else may be a scene."""
+    """Return whether a source is an image, or an object that NumPy can view."""
     return isinstance(source, Image | memoryview) or any(
         hasattr(source, name) for name in ("__array__", "__array_interface__", "__dlpack__")
     )
 
 
 def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Return shape and dtype of an image, or of a handle of one.
+    """Return shape and dtype of an image, which may be on the device.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
 def scene_source(
     scene: Scene, size: tuple[int, int], shading: Shading, time: float
 ) -> _core.Source:
-    """Return a frame of a scene as the core takes it.
+    """Return the core's Source of a scene's frame.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def scene_source(
     Raises
     ------
     TypeError, ValueError
-        One of them is wrong.
+        An argument is wrong.
     """
     check_shading(shading)
     turns = check_time(time)
@@ -92,14 +92,14 @@ def scene_source(
 def scene_arguments(
     scene: Scene, size: tuple[int, int], shading: Shading, turns: float
 ) -> tuple[Any, ...]:
-    """Return the arguments of the core's scene_source, of what was checked."""
+    """Return the arguments of the core's scene_source, from checked values."""
     camera = scene.camera
     return (
         _scene_arrays(scene),
         (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
         size,
         shading,
-        # `time` has period 1; reduced first, large ones keep their float precision.
+        # `time` has period 1. It is reduced first, so that large times keep their float precision.
         math.fmod(turns, 1.0),
         scene.glow_intensity,
     )
@@ -107,7 +107,7 @@ def scene_arguments(
 
 def _scene_arrays(scene: Scene) -> Any:
     """Return the scene's meshes, sky and textures."""
-    # Textures by what they are, not by what they hold: each goes to the device once.
+    # Textures by identity, not by content: each is uploaded once.
     numbers: dict[Texture, int] = {}
     body = _mesh_arrays(scene.body, numbers)
     glow = None if scene.glow is None else _mesh_arrays(scene.glow, numbers)

@@ -2,6 +2,9 @@
 
 bvec3 is_finite(vec3 value)
 {
+#if defined(WORDS) && CHANNEL_BYTES == 1
+    return bvec3(true);
+#endif
     return notEqual(floatBitsToUint(value) & 0x7f800000u, uvec3(0x7f800000u));
 }
 

@@ -3,15 +3,43 @@
 // some adapters (llvmpipe among them) truncate, which darkens the picture with every pass. They are
 // rounded to the nearest 8-bit level, since some GPUs round values near the middle of two levels down.
 
-// The nearest half float, ties to even, including subnormal ones. The last bit of `magic` has the
-// weight of the half float's last bit, so that the addition rounds at this bit.
-vec3 nearest_half(vec3 value)
+// The value with a size of `limit` at the most, which is that of infinity, too. As integers, since
+// llvmpipe takes three operations for each minimum and maximum of floats.
+vec3 limited(vec3 value, float limit)
 {
     uvec3 bits = floatBitsToUint(value);
-    uvec3 exponent = max(bits & 0x7f800000u, 0x38800000u);
-    vec3 magic = uintBitsToFloat(exponent + ((13u << 23) + 0x400000u));
+    uvec3 size = min(bits & 0x7fffffffu, floatBitsToUint(limit));
+    return uintBitsToFloat(size | (bits & 0x80000000u));
+}
+
+// What to add to a size for its last bit to have the weight of the nearest half float's: the power of
+// two 13 places higher. That of subnormal half floats is one for all.
+uvec3 half_magic(uvec3 size)
+{
+    return max(size & 0x7f800000u, 0x38800000u) + (13u << 23);
+}
+
+uvec3 half_size(vec3 value)
+{
+    return min(floatBitsToUint(value) & 0x7fffffffu, floatBitsToUint(HALF_LIMIT));
+}
+
+// The nearest half float, ties to even, including subnormal ones.
+vec3 nearest_half(vec3 value)
+{
+    uvec3 size = half_size(value);
+    vec3 magic = uintBitsToFloat(half_magic(size));
+    uvec3 nearest = floatBitsToUint((uintBitsToFloat(size) + magic) - magic);
     // Keep the sign of zero.
-    return uintBitsToFloat(floatBitsToUint((value + magic) - magic) | (bits & 0x80000000u));
+    return uintBitsToFloat(nearest | (floatBitsToUint(value) & 0x80000000u));
+}
+
+// Its 16 bits: after the sum its mantissa stands at the end of that of `magic`.
+uvec3 nearest_half_bits(vec3 value)
+{
+    uvec3 size = half_size(value), magic = half_magic(size);
+    uvec3 sum = floatBitsToUint(uintBitsToFloat(size) + uintBitsToFloat(magic));
+    return (sum - magic + (magic >> 13) - (126u << 10)) | (floatBitsToUint(value) >> 16 & 0x8000u);
 }
 
 // The nearest of the 256 levels, 0 to 255, ties to even.
@@ -49,12 +77,16 @@ vec3 nearest_ufloat(vec3 value)
 
 vec3 storable(vec3 value)
 {
-    if (params.limit == UFLOAT11_LIMIT)
+#if defined(WORDS) && CHANNEL_BYTES < 4
+    // pixels.glsl rounds where it packs.
+    return value;
+#else
+    if (STORED == STORED_UFLOAT)
         return nearest_ufloat(value);
-    vec3 kept = clamp(value, -params.limit, params.limit);
-    if (params.limit == UNORM_LIMIT)
-        return from_level(nearest_level(kept), STORED_UNORM8);
-    return params.limit == HALF_LIMIT ? nearest_half(kept) : kept;
+    if (STORED == STORED_UNORM8)
+        return from_level(nearest_level(value), STORED_UNORM8);
+    return STORED == STORED_HALF ? nearest_half(value) : limited(value, params.limit);
+#endif
 }
 
 // A value of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
@@ -70,10 +102,10 @@ vec3 as_stored(vec3 value, int format)
     if (format == STORED_UNORM8 || format == STORED_UNORM8_SCALED)
         return from_level(nearest_level(value), format);
     if (format == STORED_HALF)
-        return nearest_half(clamp(value, -HALF_LIMIT, HALF_LIMIT));
+        return nearest_half(value);
     if (format == STORED_UFLOAT)
         return nearest_ufloat(value);
-    return clamp(value, -SINGLE_LIMIT, SINGLE_LIMIT);
+    return limited(value, SINGLE_LIMIT);
 }
 
 vec4 as_stored(vec4 value, int format)

@@ -38,6 +38,7 @@ WRITE_IMAGE(3);
 
 void main()
 {
+    read_words();
     ivec2 size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, TEXEL_ROWS));
     int end = min(first.y + TEXEL_ROWS, size.y);

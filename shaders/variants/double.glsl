@@ -36,6 +36,7 @@ const int KEPT = 5;
 
 void main()
 {
+    read_words();
     ivec2 last = READ_SIZE(smaller, 1) - 1, size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y) / 2;

@@ -47,6 +47,7 @@ vec4 thresholded(vec4 value)
 
 void main()
 {
+    read_words();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);

@@ -14,7 +14,7 @@ void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
     const int BYTES = LOAD_CHANNELS * CHANNEL_BYTES;
     const int BEFORE = (15 - LOAD_FROM * BYTES) / 16;
     const int COUNT = BEFORE + ((LOAD_FROM + LOAD_COUNT) * BYTES + 15) / 16;
-    ivec4 shape = words.reads[LOAD_NUMBER - 1];
+    ivec4 shape = read_shapes[LOAD_NUMBER - 1];
     int last_word = (shape.x * BYTES - 1) / 16;
     uint packed[4 * COUNT + 1];
     [[unroll]] for (int i = 0; i < COUNT; ++i) {

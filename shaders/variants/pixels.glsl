@@ -13,13 +13,25 @@ layout(push_constant) uniform Words {
     uint zero;       // 0, but unknown to compilers
 } words;
 
+// Copies of the members that are used after a store. After a store compilers load a constant again,
+// lane by lane.
+ivec4 target_shape, read_shapes[2];
+uint unknown_zero;
+
+void read_words()
+{
+    target_shape = words.target;
+    read_shapes = words.reads;
+    unknown_zero = words.zero;
+}
+
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
 #define WRITE_IMAGE(number) \
     layout(set = 0, binding = number, std430) writeonly buffer Target { uvec4 row_words[]; } target
-#define READ_SIZE(name, number) (words.reads[number - 1].xy)
-#define TARGET_SIZE() (words.target.xy)
+#define READ_SIZE(name, number) (read_shapes[number - 1].xy)
+#define TARGET_SIZE() (target_shape.xy)
 // The first row of this dispatch, which may cover only some rows of the target.
-#define FIRST_ROW() (words.target.w)
+#define FIRST_ROW() (target_shape.w)
 
 #else
 
@@ -30,6 +42,10 @@ layout(push_constant) uniform Words {
 #define READ_SIZE(name, number) imageSize(name)
 #define TARGET_SIZE() imageSize(target)
 #define FIRST_ROW() 0
+
+void read_words()
+{
+}
 
 #endif
 
@@ -59,7 +75,9 @@ uvec4 raw_of(vec4 value)
     uvec4 level = floatBitsToUint(clamp(value, 0.0, 1.0) * 255.0 + 8388608.0) & 255u;
     return uvec4(level.r | level.g << 8 | level.b << 16 | level.a << 24, 0, 0, 0);
 #elif CHANNEL_BYTES == 2
-    return uvec4(packHalf2x16(value.rg), packHalf2x16(value.ba), 0, 0);
+    uvec3 colour = nearest_half_bits(value.rgb);
+    uint alpha = nearest_half_bits(value.aaa).r;
+    return uvec4(colour.r | colour.g << 16, colour.b | alpha << 16, 0, 0);
 #else
     return floatBitsToUint(value);
 #endif
@@ -71,8 +89,8 @@ uvec4 with_alpha_of(uvec4 own, vec4 value)
 #if CHANNEL_BYTES == 1
     return uvec4((raw_of(value).x & 0xffffffu) | (own.x & 0xff000000u), 0, 0, 0);
 #elif CHANNEL_BYTES == 2
-    uint blue = packHalf2x16(vec2(value.b, 0.0)) & 0xffffu;
-    return uvec4(packHalf2x16(value.rg), blue | (own.y & 0xffff0000u), 0, 0);
+    uvec3 colour = nearest_half_bits(value.rgb);
+    return uvec4(colour.r | colour.g << 16, colour.b | (own.y & 0xffff0000u), 0, 0);
 #else
     return uvec4(floatBitsToUint(value.rgb), own.a);
 #endif
@@ -91,8 +109,18 @@ uvec4 buffer_of(vec4 value)
     return ALPHA == ALPHA_BLUR ? raw_of(stored(value)) : with_alpha_of(one, stored(value));
 }
 
-// A pixel of the finished picture.
+// A pixel of the finished picture: by its own alpha, NaN and infinity, and what the composite made of
+// the rest.
 uvec4 finished(uvec4 own, vec4 value)
 {
-    return ALPHA == ALPHA_KEEP ? with_alpha_of(own, value) : raw_of(value);
+    uvec4 result = ALPHA == ALPHA_KEEP ? with_alpha_of(own, value) : raw_of(value);
+#if CHANNEL_BYTES == 2
+    // A carry is where all bits of the exponent are set.
+    uvec2 special = ((own.xy & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
+    special |= special - (special >> 15);
+    result.xy = (own.xy & special) | (result.xy & ~special);
+#elif CHANNEL_BYTES == 4
+    result = mix(result, own, equal(own & 0x7f800000u, uvec4(0x7f800000u)));
+#endif
+    return result;
 }

@@ -7,8 +7,8 @@ void store(int first, int row, uvec4 raw[STORE_COUNT])
     const int BYTES = STORE_CHANNELS * CHANNEL_BYTES;
     const int COUNT = STORE_COUNT * BYTES / 16;
     int start = first * BYTES / 16;
-    int last = (words.target.x * BYTES - 1) / 16;
-    int row_start = (row - words.target.w) * words.target.z;
+    int last = (target_shape.x * BYTES - 1) / 16;
+    int row_start = (row - target_shape.w) * target_shape.z;
     [[unroll]] for (int i = 0; i < COUNT; ++i) {
         uvec4 word;
         [[unroll]] for (int j = 0; j < 4; ++j) {
@@ -29,7 +29,7 @@ void store(int first, int row, uvec4 raw[STORE_COUNT])
         }
         // Without the maximum, LLVM packs lane by lane in the loop that stores.
         if (start + i <= last)
-            target.row_words[row_start + start + i] = max(word, uvec4(words.zero));
+            target.row_words[row_start + start + i] = max(word, uvec4(unknown_zero));
     }
 #else
     [[unroll]] for (int i = 0; i < STORE_COUNT; ++i) {

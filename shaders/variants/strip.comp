@@ -36,6 +36,7 @@ WRITE_IMAGE(2);
 
 void main()
 {
+    read_words();
     ivec2 size = READ_SIZE(image, 1);
     ivec2 first = first_pixel(ivec2(COLUMNS, STRIP_ROWS));
     int end = min(first.y + STRIP_ROWS, size.y);

@@ -20,7 +20,7 @@ from benchmarks.image import SETTINGS, full_kernel
 from benchmarks.inputs import REC709, THRESHOLD, pictures
 from benchmarks.machine import command
 from benchmarks.ours import contender
-from benchmarks.plan import FORM_VARIABLE
+from benchmarks.plan import VARIANTS_VARIABLE
 from benchmarks.requests import best_order, worst_order
 from benchmarks.results import Curve, Goal, Section, Table, agreement
 from benchmarks.spread import spread
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.conftest import ADAPTER
 
-# The peers are no requirement of the tests; SciPy comes with scikit-image, which is one.
+# The tests do not require the peers. SciPy is installed with scikit-image, which the tests require.
 scipy_peer = importlib.import_module("benchmarks.peers.scipy")
 
 
@@ -252,17 +252,17 @@ def test_no_call_finds_its_passes_done(renderer: vkbloom.Renderer) -> None:
 # Plans
 
 
-def test_a_renderer_is_made_under_the_form(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_renderer_is_made_under_the_variant(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[str, str | None]] = []
     monkeypatch.setattr(
-        vkbloom, "Renderer", lambda name: seen.append((name, os.environ.get(FORM_VARIABLE)))
+        vkbloom, "Renderer", lambda name: seen.append((name, os.environ.get(VARIANTS_VARIABLE)))
     )
-    monkeypatch.delenv(FORM_VARIABLE, raising=False)
+    monkeypatch.delenv(VARIANTS_VARIABLE, raising=False)
     Plan(adapter="software").renderer("fragment")
-    assert FORM_VARIABLE not in os.environ
-    monkeypatch.setenv(FORM_VARIABLE, "mine")
+    assert VARIANTS_VARIABLE not in os.environ
+    monkeypatch.setenv(VARIANTS_VARIABLE, "mine")
     Plan().renderer()
-    assert os.environ[FORM_VARIABLE] == "mine"
+    assert os.environ[VARIANTS_VARIABLE] == "mine"
     assert seen == [("software", "fragment"), ("auto", "auto")]
 
 
@@ -402,7 +402,7 @@ def test_the_best_order_runs_fewer_passes(smoke: tuple[Result, dict[str, Any], s
     (section,) = (each for each in smoke[1]["sections"] if each["id"] == "requests")
     rows = {row[0]: int(row[3].split()[0]) for row in section["tables"][0]["rows"]}
     many, calls, worst = rows.values()
-    # The first single call may find images that the calls before the table left.
+    # The first single call may find images of earlier calls in the cache.
     assert many <= calls <= worst
 
 

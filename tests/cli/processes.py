@@ -1,4 +1,4 @@
-"""Python in a process of its own."""
+"""Python in a separate process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 
 def python(*arguments: str, **changes: str) -> subprocess.CompletedProcess[str]:
-    """Run the interpreter with these arguments, and these variables beside the environment's."""
+    """Run the interpreter with these arguments and additional environment variables."""
     return subprocess.run(
         [sys.executable, *arguments],
         env={**os.environ, **changes},

@@ -37,7 +37,7 @@ def vkb(*arguments: str | Path) -> Result:
 
 
 def one_line(stderr: str) -> str:
-    """Return an error without the program's name, having checked that it is one line."""
+    """Check that an error is one line, and return it without the program's name."""
     assert stderr.startswith("vkbloom: ")
     assert stderr.count("\n") == 1
     assert "Traceback" not in stderr
@@ -131,7 +131,7 @@ def test_an_interrupt_is_status_130(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(vkbloom, "adapters", interrupt)
     result = vkb("adapters")
-    # The first line break ends the line on which a terminal shows ^C.
+    # The first line break ends the line on which the terminal shows ^C.
     assert (result.exit_code, result.stderr) == (130, "\nvkbloom: interrupted\n")
 
 
@@ -507,7 +507,7 @@ def test_render_passes_validation(tmp_path: Path) -> None:
 
 
 def test_validation_is_handed_on(tmp_path: Path) -> None:
-    # In a process without an instance: one that is there keeps its layers.
+    # In a new process, since an existing instance keeps its layers.
     words = ("render", "-o", str(tmp_path / "out.exr"), *SMALL, "--validation")
     ended = python("-m", "vkbloom.cli", *words, VK_LAYER_PATH=str(tmp_path))
     assert ended.returncode == 1
@@ -606,12 +606,12 @@ def test_text_survives_a_plain_terminal(tmp_path: Path, encoding: str, name: str
     ended = python(*("-m", "vkbloom.cli", "render", "-o", out, *SMALL), PYTHONIOENCODING=encoding)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "ms on the " in ended.stdout
-    # To click, ASCII is a terminal that does not say what it is: it gets UTF-8.
+    # click uses UTF-8 if the terminal's encoding is ASCII.
     assert ended.stdout.endswith(f"{name}.exr\n")
 
 
 def test_without_standard_output_and_error(tmp_path: Path) -> None:
-    """Closed by whoever starts the process, as some that start daemons do."""
+    """Some programs that start daemons close them."""
     animation = ["render", "-o", str(tmp_path / "a.png"), "--frames", "2", *SMALL]
     image = ["apply", str(tmp_path / "a_0000.png"), str(tmp_path / "b.png")]
     for words in (animation, image):
@@ -631,7 +631,7 @@ def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:
     ended = subprocess.run(
         [*command, *SMALL, "--frames", "2"], stdout=subprocess.PIPE, stderr=theirs, check=False
     )
-    # So that reading does not wait where there is nothing to read.
+    # Reading must not wait if there is no data.
     os.write(theirs, b"end")
     shown = os.read(ours, 65536).decode()
     os.close(theirs)

@@ -64,7 +64,7 @@ def run(*arguments: str | Path, adapter: str = "auto") -> Result:
 
 
 def done(*arguments: str | Path) -> Result:
-    """Run what must succeed and say nothing on standard error."""
+    """Run a command that must succeed without output on standard error."""
     result = run(*arguments)
     assert (result.exit_code, result.stderr) == (0, "")
     return result
@@ -127,7 +127,8 @@ class TestFormats:
         written = pixels(tmp_path / "b.png")
         assert written.dtype == np.uint16
         expected = levels(applied(linear(image)), 65535)
-        # Floats of 24 bits are good to 1/256 of a step; decoding, bloom and encoding add up.
+        # Floats with 24 bits are accurate to 1/256 of a level; the errors of decoding, bloom and
+        # encoding add up.
         assert np.abs(written - expected).max() <= 0.6
         assert np.array_equal(written[:, :, 3], image[:, :, 3])
 
@@ -211,7 +212,7 @@ class TestFormats:
         whole = np.zeros((20, 24, 3), np.float16)
         whole[3:13, 4:16] = image
         assert np.array_equal(pixels(tmp_path / "b.exr"), applied(whole))
-        # The light goes beyond the data that there was.
+        # The light reaches beyond the original data window.
         assert pixels(tmp_path / "b.exr")[3:13, 3].any()
 
     def test_parts(self, tmp_path: Path) -> None:

@@ -44,7 +44,8 @@ def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:
     image, emission = picture(24, 16, 3), picture(24, 16, 3, seed=1)
     levels = np.arange(16 * 24, dtype=np.uint8).reshape(16, 24)
     source = stored(tmp_path / "a.exr", image)
-    # 128 is half, not what sRGB makes of it; a file of three channels that are equal is grey too.
+    # 128 is one half: masks are not decoded from sRGB. A file with three equal channels is also
+    # grey.
     mask = stored(tmp_path / "mask.png", np.repeat(levels[..., None], 3, axis=2))
     glow = stored(tmp_path / "glow.exr", emission)
     out = tmp_path / "out.exr"
@@ -56,7 +57,7 @@ def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:
 
 
 def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
-    # Files need not have the same channels and numbers.
+    # The files may have different channels and number types.
     images = [picture(24, 16, 4, seed=seed) for seed in (2, 3)]
     emission = picture(24, 16, 3, "float16", seed=4)
     sources = [tmp_path / f"f{i}.exr" for i in range(2)]

@@ -168,9 +168,9 @@ class TestStores:
         np.testing.assert_array_equal(found["final"].values, expected["final"].values)
 
     def test_an_interrupt_of_all_processes(self, tmp_path: Path) -> None:
-        """Ctrl-C on a terminal, which the workers get as well."""
+        """Ctrl-C on a terminal also reaches the workers."""
         out = tmp_path / "a.zarr"
-        # 15 GB of pixels: no machine is through when the signal comes.
+        # 15 GB of pixels, so that no machine has finished when the signal arrives.
         image_file = tmp_path / "a.exr"
         values = np.random.default_rng(5).random((512, 512, 3), dtype=np.float32)
         save(Picture.of_values(values, "float"), image_file)
@@ -580,7 +580,7 @@ class TestOptionFiles:
             tracemalloc.stop()
         assert result.exit_code == 1
         assert "a.yaml: its values are too many, nested too deeply" in result.stderr
-        # The file's own words and modules that the first call loads take some MB.
+        # The file's text, and modules that the first call loads, take some MB.
         assert most < 64 << 20
 
     def test_a_flag_that_is_off(self, tmp_path: Path, image_file: Path) -> None:

@@ -1,4 +1,4 @@
-"""``vkbloom apply`` of large pictures: by bands of rows, as if they were taken as a whole."""
+"""``vkbloom apply`` of large pictures: the same result in bands of rows as in one piece."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
-from vkbloom.banded import BandedImage
+from vkbloom.banded import BloomByBands, ImageByBands
 from vkbloom.cli import large
 from vkbloom.cli.program import program
 from vkbloom.io import rows
@@ -47,17 +47,17 @@ def light(height: int, width: int, channels: int, dtype: str) -> Any:
 
 @pytest.fixture
 def by_rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Take every picture by bands of a few rows; what is returned has the rows of each band."""
+    """Read every picture in bands of a few rows; return the number of rows of each band."""
     monkeypatch.setattr(large, "LARGE", 1)
     monkeypatch.setattr(rows, "_BAND_BYTES", 16 * 41 * 7)
     counts: list[int] = []
-    final = BandedImage.final
+    result = large._Reading.result
 
-    def counted(self: BandedImage, settings: Any, first: int, count: int) -> Any:
-        counts.append(count)
-        return final(self, settings, first, count)
+    def counted(self: Any, final: Any, settings: Any) -> Any:
+        counts.append(len(final))
+        return result(self, final, settings)
 
-    monkeypatch.setattr(BandedImage, "final", counted)
+    monkeypatch.setattr(large._Reading, "result", counted)
     return counts
 
 
@@ -114,17 +114,124 @@ def test_special_values_are_told_once(tmp_path: Path, by_rows: list[int]) -> Non
     assert by_rows
 
 
-def test_turned_pictures_are_taken_as_a_whole(tmp_path: Path, by_rows: list[int]) -> None:
+def same_as_a_whole(
+    monkeypatch: pytest.MonkeyPatch, by_rows: list[int], target: Path, *words: object
+) -> Any:
+    """Run twice, compare, and return the result."""
+    assert run(*words, "-o", target).exit_code == 0
+    assert len(by_rows) > 1
+    monkeypatch.setattr(large, "LARGE", 1 << 40)
+    by_rows.clear()
+    whole = target.with_name(f"whole_{target.name}")
+    assert run(*words, "-o", whole).exit_code == 0
+    assert not by_rows
+    result = vkbloom.read(target)
+    assert np.array_equal(result, vkbloom.read(whole))
+    return result
+
+
+@pytest.mark.parametrize("preset", ["bevy_natural", "kino", "jimenez2014", "tutorial"])
+def test_by_bands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, by_rows: list[int], preset: str
+) -> None:
+    """Of a height that all of these divide."""
+    path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
+    held = []
+    monkeypatch.setattr(ImageByBands, "add", lambda *_: held.append(1))
+    same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path, "--preset", preset)
+    assert not held
+
+
+@pytest.mark.parametrize("orientation", [3, 6])
+def test_turned_pictures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, by_rows: list[int], orientation: int
+) -> None:
     path = tmp_path / "a.tif"
     spec = oiio.ImageSpec(41, 50, 3, "uint8")
-    spec.attribute("Orientation", 6)
+    spec.attribute("Orientation", orientation)
     writer = oiio.ImageOutput.create(str(path))
     assert writer.open(str(path), spec)
     assert writer.write_image(light(50, 41, 3, "uint8"))
     assert writer.close()
-    assert run(path, tmp_path / "b.png").exit_code == 0
+    result = same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path)
+    assert result.shape == ((41, 50, 3) if orientation == 6 else (50, 41, 3))
+
+
+@pytest.mark.parametrize("height", [50, 512])
+@pytest.mark.parametrize("words", [(), ("--alpha", "max"), ("--half",)])
+def test_mask_and_emission(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    by_rows: list[int],
+    height: int,
+    words: tuple[str, ...],
+) -> None:
+    path = stored(tmp_path / "a.png", light(height, 41, 4, "uint8"))
+    mask = stored(tmp_path / "mask.exr", light(height, 41, 1, "uint8") / np.float32(255), 16)
+    emission = stored(tmp_path / "emission.png", light(height, 41, 3, "uint16")[::-1].copy())
+    if "--half" in words:
+        with_half = run(path, "-o", tmp_path / "h.png", "--mask", mask, *words)
+        assert with_half.exit_code == 0, with_half.stderr
+        return
+    given = (path, "--mask", mask, "--emission", emission, *words)
+    same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", *given)
+
+
+def test_layers_and_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, by_rows: list[int]
+) -> None:
+    path = tmp_path / "a.exr"
+    specs = []
+    for name, prefix in (("first", ""), ("second", "glow.")):
+        spec = oiio.ImageSpec(41, 50, 3, "half")
+        spec.channelnames = tuple(f"{prefix}{one}" for one in "RGB")
+        spec.attribute("oiio:subimagename", name)
+        specs.append(spec)
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer.open(str(path), tuple(specs))
+    for index in range(2):
+        if index:
+            assert writer.open(str(path), specs[index], "AppendSubimage")
+        assert writer.write_image((1 + index) * light(50, 41, 3, "float16"))
+    assert writer.close()
+    target = tmp_path / "b.exr"
+    second = same_as_a_whole(monkeypatch, by_rows, target, path, "--subimage", 1)
+    monkeypatch.setattr(large, "LARGE", 1)
+    layer = same_as_a_whole(monkeypatch, by_rows, target, path, "--layer", "glow")
+    assert np.array_equal(second, layer)
+    monkeypatch.setattr(large, "LARGE", 1)
+    first = run(path, "-o", target)
+    assert "the first of its parts 0 first, 1 second" in first.stderr
+    assert not np.array_equal(vkbloom.read(target), layer)
+
+
+@pytest.mark.parametrize(
+    ("kind", "pixels", "reason"),
+    [
+        ("mask", light(50, 40, 1, "uint8"), "40 x 50 pixels are not the image's 41 x 50"),
+        ("emission", light(49, 41, 3, "uint8"), "41 x 49 pixels are not the image's 41 x 50"),
+        ("mask", light(50, 41, 3, "uint8"), "a mask is grey"),
+    ],
+)
+def test_what_does_not_go_with_it(
+    tmp_path: Path, by_rows: list[int], kind: str, pixels: Any, reason: str
+) -> None:
+    path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
+    other = stored(tmp_path / "other.png", pixels)
+    result = run(path, tmp_path / "b.png", f"--{kind}", other)
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert reason in result.stderr
+    assert not (tmp_path / "b.png").exists()
     assert not by_rows
-    assert vkbloom.read(tmp_path / "b.png").shape == (41, 50, 3)
+
+
+def test_no_bloom_is_told(tmp_path: Path, by_rows: list[int]) -> None:
+    path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
+    result = run(path, tmp_path / "b.png", "--method", "pyramid", "--threshold", "1")
+    assert result.exit_code == 0
+    assert "nothing lies above the threshold 1" in result.stderr
+    assert by_rows
 
 
 @pytest.mark.parametrize("where", ["add", "final"])
@@ -140,7 +247,8 @@ def test_what_ends_it_leaves_no_file(
         raise error
 
     path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
-    monkeypatch.setattr(BandedImage, where, fail)
+    monkeypatch.setattr(ImageByBands, where, fail)
+    monkeypatch.setattr(BloomByBands, "reduce" if where == "add" else "finals", fail)
     result = run(path, tmp_path / "b.png")
     assert result.exit_code == (130 if error is KeyboardInterrupt else 1)
     assert [file.name for file in tmp_path.iterdir()] == ["a.png"]

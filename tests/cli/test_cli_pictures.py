@@ -169,7 +169,7 @@ class TestJpeg:
         assert run(tmp_path / "a.jpg", tmp_path / "b.jpg").exit_code == 0
         with image.open(tmp_path / "b.jpg") as made:
             assert plugin.get_sampling(made) == stored
-        # Of a file that says nothing, colours stay as sharp as brightness.
+        # Without an attribute, colours are not subsampled.
         store_png(tmp_path / "c.png", IMAGE)
         assert run(tmp_path / "c.png", tmp_path / "c.jpg").exit_code == 0
         with image.open(tmp_path / "c.jpg") as made:
@@ -187,7 +187,7 @@ class TestJpeg:
         assert run(tmp_path / "a.jpg", tmp_path / "b.jpg", "--quality", 90).exit_code == 0
         with image.open(tmp_path / "b.jpg") as made:
             assert made.info["dpi"] == (240, 240)
-            # The pixels are turned, so that no orientation may be left that turns them again.
+            # The pixels are rotated, so the orientation must be removed.
             assert made.size == picture.size[::-1]
             found = made.getexif()
             assert (found[maker], found.get(orientation, 1)) == ("Maker", 1)

@@ -152,7 +152,8 @@ def test_a_broken_driver_beside_one_that_works(
 
 @pytest.fixture
 def without_loader(tmp_path: Path) -> dict[str, str]:
-    """Return an environment in which the loader does not open: a damaged file comes first."""
+    """Return an environment in which the loader does not open, because a damaged file comes
+    first."""
     for name in ("libvulkan.so.1", "libvulkan.so"):
         (tmp_path / name).touch()
     return {"LD_LIBRARY_PATH": str(tmp_path)}

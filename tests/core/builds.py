@@ -1,4 +1,5 @@
-"""Builds of the core, and of programs beside it, that tests make; what they need, or a skip."""
+"""Builds of the core and of other programs for tests. A test is skipped if the build is not
+possible."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# Prints the folder of volk, or ends with what is missing for a build of the core.
+# Prints the folder of volk, or exits with the name of what is missing for a build of the core.
 PROBE = """
 import shutil, sys
 import setuptools
@@ -29,7 +30,7 @@ if not (shutil.which("glslangValidator") or shutil.which("glslang")):
 
 
 def compiler() -> list[str]:
-    """Return the command of the C compiler; without one the test is skipped."""
+    """Return the command of the C compiler, or skip the test."""
     command = os.environ.get("CC", "cc").split()
     if os.name == "nt" or shutil.which(command[0]) is None:
         pytest.skip(f"there is no C compiler here: {command[0]}")
@@ -37,7 +38,7 @@ def compiler() -> list[str]:
 
 
 def require_header(name: str) -> None:
-    """Skip the test where the compiler does not find the header."""
+    """Skip the test if the compiler does not find the header."""
     done = subprocess.run(
         [*compiler(), "-fsyntax-only", "-x", "c", "-"],
         input=f"#include <{name}>\n",
@@ -60,7 +61,7 @@ def _probe() -> tuple[str, str]:
 
 
 def volk_folder() -> str:
-    """Return where volk is; the test is skipped where the core cannot be built."""
+    """Return the folder of volk, or skip the test if the core cannot be built."""
     require_header("stdio.h")
     folder, missing = _probe()
     if missing:
@@ -92,7 +93,7 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def core_with_faults(temporary: Path) -> Path:
-    """Build a core that fails on demand (VKBLOOM_FAULTS), once in a run of the tests.
+    """Build a core that can be made to fail (VKBLOOM_FAULTS), once for each test run.
 
     Parameters
     ----------

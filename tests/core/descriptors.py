@@ -6,9 +6,9 @@ import os
 
 
 def open_descriptors() -> int:
-    """Count them, where there is /proc, without those of the driver's cache of compiled shaders.
+    """Count them if /proc exists, without those of the driver's shader cache.
 
-    A thread of Mesa's writes its files whenever it comes round.
+    A thread of Mesa writes these files at any time.
     """
     count = 0
     for name in os.listdir("/proc/self/fd"):

@@ -1,9 +1,9 @@
-"""Make every call of workloads fail once, and print what came of each as one line of JSON.
+"""Make every call of some workloads fail once, and print the results as one line of JSON.
 
 Runs over a core built with VKBLOOM_FAULTS: ``python fault_walk.py STRIDE [WORKLOAD ...]``. Point n
-is the n-th Vulkan call or allocation; the walk ends where the workload passes without reaching it.
-Of STRIDE points one is walked (1: all of them). Without workloads, all of them are walked; where
-STRIDE is above 1, each method with one set of variants, by turns.
+is the n-th Vulkan call or allocation; the walk ends when the workload finishes without reaching it.
+One of STRIDE points is walked (1: all points). Without names, all workloads are walked; if STRIDE
+is above 1, each method with one of the sets of variants in turn.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from vkbloom.scene.textures import Texture
 
 OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4
-#: The calls that find out that a device is lost.
+#: The calls that report a lost device.
 CAN_LOSE = "vkQueueSubmit vkWaitForFences vkGetQueryPoolResults"
 SIZE = (24, 16)
 
@@ -53,7 +53,7 @@ def method(settings: vkbloom.Settings) -> Work:
 
 
 def accompanied(renderer: Renderer) -> Arrays:
-    """Another mask, then another emission, to an image that stays."""
+    """The same image with another mask, then with another emission."""
     image, emission = picture(*SIZE), picture(*SIZE, seed=1)
     mask = picture(*SIZE, 1, seed=2)[..., 0]
     settings = vkbloom.Separable(layers=((1, 1), (2, 1)), composite="mix", alpha="blur")
@@ -77,9 +77,9 @@ def grid(renderer: Renderer) -> Arrays:
 
 
 def readback(renderer: Renderer) -> Arrays:
-    """Large enough for the device to write into the arrays themselves.
+    """Large enough for the device to write directly into the arrays.
 
-    The caller's own array, the renderer's new pages, and the same pages once their array is gone.
+    The caller's array, new pages of the renderer, and the same pages after their array was freed.
     """
     image = picture(512, 512, dtype="uint8")
 
@@ -98,13 +98,35 @@ def readback(renderer: Renderer) -> Arrays:
 
 
 def handles(renderer: Renderer) -> Arrays:
-    """Images that stay, one after the other on the memory of those before, of two sizes."""
+    """Uploaded images of two sizes, each in the memory of earlier ones."""
     kept = renderer.upload(picture(*SIZE, seed=9))
     images = [picture(24 + seed // 3, 16, seed=seed) for seed in range(6)]
     frames = renderer.apply_each([*images, kept], vkbloom.Separable(threshold=0.5))
     arrays = {f"{i} final": one["final"] for i, one in enumerate(frames)}
     arrays["twice"] = renderer.apply(kept, vkbloom.Separable())["final"]
     return arrays
+
+
+def presented(renderer: Renderer) -> Arrays:
+    """Frames on two surfaces, of which one changes its size and is left to the renderer."""
+    shown = []
+    with vkbloom.Surface(renderer, size=SIZE) as closed:
+        shown += [closed.present(UFO, time=step / 9) for step in range(3)]
+    left = vkbloom.Surface(renderer, size=SIZE)
+    shown += [left.present(UFO, size=(16, 16)) for _ in range(2)]
+    left.size = (32, 16)
+    shown += [left.present(UFO) for _ in range(4)]
+    return {"shown": np.array(shown), "final": renderer.render(UFO, size=SIZE)["final"]}
+
+
+def presents() -> bool:
+    """Return whether there is a surface without a window."""
+    with open_renderer() as renderer:
+        try:
+            vkbloom.Surface(renderer).close()
+        except vkbloom.Error:
+            return False
+    return True
 
 
 def variables(dataset: Any) -> Arrays:
@@ -119,12 +141,12 @@ def grid_in_memory(renderer: Renderer) -> Arrays:
     return variables(renderer.grid(picture(*SIZE), base, AXES, progress=False))
 
 
-#: Where the grid lies that a fault has ended; the next call goes on with it.
+#: The folder of the grid that a fault has ended. The next call continues it.
 FOLDER = Path(tempfile.gettempdir()) / f"vkbloom-fault-walk-{os.getpid()}"
 
 
 def grid_to_zarr(_: Renderer) -> Arrays:
-    """Opens its own renderer. What is whole is removed, so that the next one begins anew."""
+    """Opens its own renderer. A complete store is removed, so that the next run starts again."""
     base = vkbloom.Pyramid(levels=2)
     dataset = vkbloom.grid_to_zarr(
         picture(*SIZE),
@@ -159,16 +181,17 @@ WORK: dict[str, Work] = {
     "grid to Zarr": grid_to_zarr,
     "readback": readback,
     "handles": handles,
+    "present": presented,
     **{
-        f"apply {preset} {form}": method(settings)
+        f"apply {preset} {variant}": method(settings)
         for preset, settings in PRESETS.items()
-        for form in ("fragment", "cpu", "gpu")
+        for variant in ("fragment", "cpu", "gpu")
     },
 }
 
 
 def state() -> dict[str, int]:
-    """Return what must be as before when all renderers are closed."""
+    """Return the counts that must be unchanged when all renderers are closed."""
     _, _, blocks, messages = core.fault_state()
     count = {"blocks": blocks, "messages": messages}
     if Path("/proc/self/fd").is_dir():
@@ -181,7 +204,7 @@ def open_renderer() -> Renderer:
 
 
 def check_error(error: BaseException, failed: str, result: int) -> None:
-    """The exception says what failed, and is of the class that fits."""
+    """The exception has the right class and names the failed call."""
     if failed == "vkb_alloc":
         assert isinstance(error, MemoryError), error
         return
@@ -210,9 +233,10 @@ class Walk:
     Attributes
     ----------
     walked, raised, survived : int
-        Points; those that raised; those that the workload did without.
+        The numbers of points walked, of points that raised, and of points that did not end the
+        call.
     calls : dict
-        How often each call was the one to fail.
+        How often each call failed.
     """
 
     def __init__(self, name: str, work: Work | None) -> None:
@@ -231,14 +255,15 @@ class Walk:
     def _at(
         self, n: int, result: int, names: str, call: Callable[[], Result]
     ) -> tuple[Result | None, BaseException | None, bool]:
-        """Call with a fault at the n-th point: what is returned, raised, and whether it was met."""
+        """Call with a fault at the n-th point; return the result, the exception, and whether it was
+        reached."""
         value: Result | None = None
         error: BaseException | None = None
         core.arm_fault(n, result, names)
         try:
             value = call()
         except Exception as raised:
-            # Without its frames, which hold the batch and this variable.
+            # Without its frames, which refer to the batch and to this variable.
             error = raised.with_traceback(None)
         passed, failed, *_ = core.fault_state()
         core.arm_fault(0, 0, "")
@@ -260,7 +285,7 @@ class Walk:
         return failed
 
     def close_at(self, n: int, result: int, names: str) -> bool:
-        """Closing a renderer while the device is at work for it."""
+        """Closing a renderer while its device is busy."""
         renderer = open_renderer()
         frames = renderer.apply_many(picture(64, 64), [vkbloom.Separable()] * 9)
         next(frames)
@@ -270,7 +295,7 @@ class Walk:
         return failed
 
     def work_at(self, n: int, right: Arrays, result: int, names: str) -> bool:
-        """A workload in a new renderer; afterwards the same without a fault, if that can be."""
+        """A workload in a new renderer, and afterwards the same without a fault, if possible."""
         assert self.work is not None
         work, renderer = self.work, open_renderer()
         arrays, error, failed = self._at(n, result, names, lambda: work(renderer))
@@ -310,7 +335,7 @@ def walk(point: Callable[[int], bool], first: int, stride: int, before: dict[str
 def walk_one(name: str, stride: int) -> None:
     os.environ["VKBLOOM_FORM"] = name.rsplit(" ", 1)[1] if name.startswith("apply ") else "auto"
     one = Walk(name, WORK.get(name))
-    # Strides start elsewhere for each workload, so that they do not leave out the same calls.
+    # Each workload starts at another point, so that the strides do not skip the same calls.
     start = 1 + zlib.crc32(name.encode()) % stride
     before = state()
     if name == "create":
@@ -334,16 +359,18 @@ def walk_one(name: str, stride: int) -> None:
 
 
 def workloads(stride: int) -> list[str]:
-    """Return the names of those that are walked where none is given."""
+    """Return the names of the workloads that are walked by default."""
     methods = [name for name in WORK if name.startswith("apply ")]
     others = [name for name in WORK if name not in methods]
+    if not presents():
+        others.remove("present")
     # Three for each preset: of the first preset the first, of the next one the second.
     some = [name for i, name in enumerate(methods) if i % 3 == i // 3 % 3]
     return ["create", "close", *others, *(methods if stride == 1 else some)]
 
 
 def main(stride: int, names: list[str]) -> None:
-    # What is made once in a process is there before anything is counted.
+    # Objects that a process creates once must exist before the count.
     with open_renderer() as renderer:
         WORK["render forward"](renderer)
     try:

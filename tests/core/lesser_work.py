@@ -18,7 +18,7 @@ from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, Unr
 from vkbloom.scene import skybox
 
 DTYPES = ("uint8", "float16", "float32")
-# One of each form: lines, strips and tiles, levels half and twice as large, sums of all levels.
+# One of each variant: lines, strips and tiles, levels half and twice as large, sums of all levels.
 SETTINGS = {
     "whole": Separable(threshold=0.4),
     "smaller": Separable(bloom_scale=0.5),
@@ -28,7 +28,7 @@ SETTINGS = {
     "gathered": UnrealBloom(),
 }
 
-#: Beyond it images come back past the staging memory, where the device can do that.
+#: From this size on, images are read back without staging memory, if the device supports it.
 LARGE = (600, 500)
 
 
@@ -48,7 +48,7 @@ def use_handles(renderer: Renderer) -> None:
 
 
 def try_all(renderer: Renderer) -> dict[str, str]:
-    """Return what went wrong, by what it was."""
+    """Return the errors by workload."""
     wrong: dict[str, str] = {}
 
     def attempt(name: str, call: Callable[[], object]) -> None:

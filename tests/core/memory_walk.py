@@ -26,7 +26,7 @@ BEYOND = 40  # a frame that does without one refused block may stop at the next
 def collected(
     renderer: Renderer, image: NDArray[Any], n: int
 ) -> tuple[bool, dict[str, Any] | None]:
-    """Return whether request n was refused (0: none is), and the frame, or None after an error."""
+    """Return whether request n was refused (0: refuse none), and the frame; None after an error."""
     settings = Separable()
     result = None
     failed = False

@@ -1,4 +1,4 @@
-"""Adapters: the list, the choice, and what is said where there is none."""
+"""Adapters: the list, the selection, and the errors if none fits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ VK_ERROR_INCOMPATIBLE_DRIVER = -9
 
 TYPES = {"cpu", "integrated", "discrete", "virtual", "other"}
 
-# Prints what a process without adapters, or with another choice of them, sees.
+# Prints the adapters of a process in another environment.
 PROGRAM = """
 import json, vkbloom
 result = {"adapters": [adapter.name for adapter in vkbloom.adapters()]}
@@ -177,7 +177,8 @@ def test_no_driver_at_all(tmp_path: Path) -> None:
 
 
 def test_a_damaged_manifest_beside_a_good_one(tmp_path: Path) -> None:
-    """Debian 12's loader says that there is no memory; others pass over the damaged one."""
+    """Debian 12's loader reports that there is no memory; other loaders ignore the damaged
+    manifest."""
     damaged = tmp_path / "damaged.json"
     damaged.write_text("{ no JSON")
     icds = [str(damaged), *map(str, Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))]
@@ -200,7 +201,7 @@ def test_a_damaged_manifest_beside_a_good_one(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="hides the loader as Linux finds it")
 def test_no_loader(tmp_path: Path) -> None:
-    # Files that are no libraries end the search for libraries of their name.
+    # A file that is not a library ends the loader's search for this name.
     for name in ("libvulkan.so.1", "libvulkan.so"):
         (tmp_path / name).write_text("no library")
     result = run(LD_LIBRARY_PATH=str(tmp_path))

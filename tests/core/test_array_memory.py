@@ -1,4 +1,4 @@
-"""Large arrays: NumPy's own, in pages that the device writes to and that are used again."""
+"""Large arrays: they are in pages that the device writes to, and that are reused."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.images import picture
 from vkbloom import OutOfMemoryError, Renderer, Separable, _core
 from vkbloom.requests import new_array
 
-#: Of 1.3 MiB at least in every dtype: the device writes them past the staging memory.
+#: At least 1.3 MiB in every dtype, so that the device writes without staging memory.
 SIDE = 600
 
 
@@ -106,7 +106,7 @@ def test_an_array_given_back_is_written_in_place(own: Renderer) -> None:
     np.testing.assert_array_equal(array, expected)
 
 
-# Slices of one array's pages, at multiples of a pixel and between them.
+# Slices of an array's pages, at multiples of a pixel and between them.
 @pytest.mark.parametrize("start", [0, 4, 1, 2])
 def test_slices_of_an_array_are_written_in_place(own: Renderer, start: int) -> None:
     image = picture(SIDE - 1, SIDE, dtype="float16")

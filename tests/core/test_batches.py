@@ -1,4 +1,5 @@
-"""Many settings over one source: the same frames as one by one, in order, whatever happens."""
+"""Many settings for one source: the frames equal those of single calls, in order, also after
+errors."""
 
 from __future__ import annotations
 
@@ -62,11 +63,11 @@ def test_images_one_by_one_and_many(
     assert len(frames) == len(sequence)
     for got, right in zip(frames, expected, strict=True):
         assert_same(got, right)
-        # Each point runs what is out of date at its place, and has times of its own.
+        # Each request runs the passes that are out of date at its turn, and has its own times.
         assert list(got.timings) == list(right.timings)
         assert all(seconds >= 0.0 for seconds in got.timings.values())
         assert got.info == right.info
-    # The device is where the last single call would have left it.
+    # The device has the images of the last single call.
     assert_same(together.apply(image, SEQUENCE[-1]), alone.apply(image, SEQUENCE[-1]))
 
 
@@ -84,7 +85,7 @@ def test_scenes_one_by_one_and_many(
 
 
 class CountingCore:
-    """A renderer's core that notes how many plans it is given at once, and their bytes."""
+    """A renderer's core that records the number of plans in each submission, and their bytes."""
 
     def __init__(self, core: _core.Renderer) -> None:
         self.core = core
@@ -175,7 +176,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
     took = requests._Requests.took
 
     def took_long(waiting: Any, seconds: float, count: int) -> None:
-        # The first batches, on whose time the next ones' size depends.
+        # The times of the first batches determine the size of the next ones.
         nonlocal collected
         collected += 1
         took(waiting, 1e6 if collected <= slow else seconds, count)
@@ -196,7 +197,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
     for given in range(2, 300):
         next(frames)
         assert given <= taken <= given + limit
-        # The batches grow with what was used: of few frames few are made in vain.
+        # Batches grow with the number of frames taken, so that few frames are wasted.
         assert taken < 4 * given
     frames.close()  # type: ignore[attr-defined]
 
@@ -213,7 +214,7 @@ def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> Non
     calls: list[Callable[[], None]] = [
         lambda: assert_same(renderer.apply(other), of_other),
         lambda: assert_same(renderer.render(scene, None, SIZE), of_scene),
-        # Of the same size: what lies on the device and in staging memory is written over.
+        # The same size, so that images on the device and in staging memory are overwritten.
         lambda: assert_same(renderer.apply(1.0 - image), last),
         lambda: None,
     ]
@@ -313,7 +314,7 @@ def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Rend
     expected = [renderer.apply(image, settings) for settings in SEQUENCE]
     frames = renderer.apply_many(image, SEQUENCE)
     got = [next(frames) for _ in range(4)]
-    # Under validation: what is in the air is waited for, and nothing is left behind.
+    # With validation: pending submissions are waited for, and all objects are destroyed.
     renderer.close()
     with pytest.raises(ValueError, match="closed"):
         got.extend(frames)
@@ -403,7 +404,7 @@ class Submitted:
 
 
 class FailingCore:
-    """A core whose submission fails where it holds one of the settings given."""
+    """A core whose submission fails if it has one of the given settings."""
 
     def __init__(self, failing: dict[Settings, Exception]) -> None:
         self.failing = failing
@@ -448,13 +449,13 @@ def test_a_setting_that_the_device_cannot_run(place: int) -> None:
 def test_errors_that_no_setting_is_to_blame_for(
     kind: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # However slow the machine is, batches double up to the most there can be.
+    # Batches double up to the largest size, however slow the machine is.
     monkeypatch.setattr(requests, "SECONDS", 1e6)
     settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
     blame = kind("all")
     results, error = run_failing(settings, {settings[50]: blame})
     assert error is blame
-    # All of the batch that it was in, which begins after 1 + 2 + 4 + 8 + 16, are lost, no others.
+    # Only the frames of its batch, which begins after 1 + 2 + 4 + 8 + 16, are lost.
     assert [point for point, _ in results] == settings[:31]
 
 
@@ -507,7 +508,7 @@ def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
 
 
 def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
-    # Scenes cannot have them; the device must never.
+    # A Scene cannot have them, and the device must never get them.
     arrays, *others = scene_arguments(scene, SIZE, "forward", 0.0)
     serial, (vertices, indices, *mesh), *rest = arrays
     wrong = indices.copy()

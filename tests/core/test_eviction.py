@@ -1,4 +1,4 @@
-"""What is cached has bounds, and what is used again stays."""
+"""Caches are bounded, and objects that are used again stay in them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom import Pyramid, Renderer, Separable, Settings, _core
 
-#: The core's bounds (csrc/run/age.h, pipeline.h, slots.h).
+#: The core's bounds (csrc/run/age.h, pipeline.h, image_cache.h).
 LEAST_AGE = 64
 PIPELINES = 256
 IMAGE_BYTES = 256 << 20
@@ -39,11 +39,11 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
         renderer.apply(image[:height, :width], Pyramid(levels=1 + side % 16), attachments="final")
         cached.append(renderer._core.cached)
         created.append(renderer._core.pipeline_count)
-    # The sixteen numbers of levels come round in both halves.
+    # Both halves have all sixteen numbers of levels.
     early, late = (np.max(half, axis=0) for half in (cached[:500], cached[500:]))
     pipelines, framebuffers, image_bytes = late
     assert pipelines <= early[0]
-    # Of each image that is there: six levels down, five up, glow, bloom, final and the input.
+    # The images: six levels down, five levels up, glow, bloom, final and the input.
     assert framebuffers <= 2 * 15
     # 3 images of the size and the levels, all of them smaller.
     assert image_bytes <= 6 * 70 * 70 * 16
@@ -70,7 +70,8 @@ def test_images_that_are_old_go(new_renderer: Callable[[], Renderer]) -> None:
 def test_pipelines_that_are_old_go(
     new_renderer: Callable[[], Renderer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Of this form a setting of the final pass is one pipeline, which drivers compile quickly.
+    # In this variant each setting of the final pass has one pipeline, which drivers compile
+    # quickly.
     monkeypatch.setenv("VKBLOOM_FORM", "fragment")
     renderer = new_renderer()
     composites = Separable.composites
@@ -100,7 +101,7 @@ def test_pipelines_that_are_old_go(
 def test_pipelines_do_not_go_under_submissions_that_wait(
     new_renderer: Callable[[], Renderer],
 ) -> None:
-    """Frames are taken late, while many others are made; the validation layer watches."""
+    """Frames are taken late, while many others are made, under the validation layer."""
     renderer = new_renderer()
     image = noise(8, 8)
     waiting = renderer.apply_many(image, [Separable(exposure=step / 8) for step in range(40)])

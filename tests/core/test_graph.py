@@ -28,8 +28,8 @@ def describe(settings: Separable, has_sky: bool = True) -> _core.Plan:
 
 
 def test_the_three_dependencies_of_the_offscreen_render_pass() -> None:
-    # The order of the seed's page. The second and third are not by region: a blur reads the
-    # neighbours of its pixel, so it must wait for all of the image.
+    # The order of the forward system's source. The second and third are not by region: a blur reads
+    # neighbouring pixels, so it must wait for the complete image.
     assert dependencies(describe(Separable()), "glow") == [
         DEPTH_BEFORE_DEPTH,
         READ_BEFORE_WRITE,

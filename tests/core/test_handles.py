@@ -1,4 +1,4 @@
-"""Images that stay on the device, and one image after the other: upload and apply_each."""
+"""Images that stay on the device, and sequences of images: upload and apply_each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.framebuffers import assert_same
 from tests.images import picture
 from vkbloom import Pyramid, Renderer, Separable, _core, requests
 
-#: Changes of size, dtype and channels, and sizes past 1 MiB, which travel another way.
+#: Changes of size, dtype and channels, and sizes above 1 MiB, which are copied in another way.
 IMAGES: list[tuple[int, int, int, str]] = [
     (40, 30, 3, "float32"),
     (40, 30, 3, "float32"),
@@ -132,7 +132,7 @@ def test_a_handle_has_its_mask_and_emission(
 
 
 def test_rows_of_an_image(renderer: Renderer) -> None:
-    """The core takes an image in bands, and gives bands of a framebuffer."""
+    """The core accepts an image in bands, and returns bands of a framebuffer."""
     core = renderer._core
     image = picture(33, 21, 3, "float32", seed=13)
     image[18, 3] = np.nan
@@ -287,7 +287,7 @@ def test_images_one_by_one_and_in_a_row(new_renderer: Callable[[], Renderer]) ->
 
 
 def test_one_array_filled_again_and_again(renderer: Renderer) -> None:
-    """Each image is copied before the next is asked for, and two are read ahead at most."""
+    """Each image is copied before the next one is taken, and at most two are taken ahead."""
     array = np.zeros((21, 33, 4), np.float32)
     asked = given = 0
 

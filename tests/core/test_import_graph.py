@@ -1,4 +1,4 @@
-"""The package's modules import in one direction, and none imports what another keeps private."""
+"""The package's modules import in one direction, and none imports private names of another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What ``import vkbloom`` loads: what a program that renders one frame does not need comes late."""
+"""The modules that ``import vkbloom`` loads: only those that a program needs to render one
+frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signals, limits of time and forks: whoever waits is answered, and the renderer goes on."""
+"""Signals, time limits and forks: every wait ends, and the renderer can be used again."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ RIGHT_SIZE = (24, 16)
 
 
 class Alarm(BaseException):
-    """What the signal's handler raises: no Exception, as KeyboardInterrupt is none."""
+    """The exception of the signal handler. It is not an Exception, like KeyboardInterrupt."""
 
 
 @pytest.fixture
 def alarm() -> Iterator[Callable[[float], None]]:
-    """A signal in so many seconds, whose handler raises Alarm in the main thread."""
+    """A signal after some seconds, whose handler raises Alarm in the main thread."""
 
     def handler(number: int, frame: object) -> None:
         raise Alarm
@@ -55,13 +55,14 @@ def alarm() -> Iterator[Callable[[float], None]]:
 
 @pytest.fixture(scope="module")
 def large() -> NDArray[np.float32]:
-    """A square image that LONG takes more than half a second for, so that there is a wait to leave.
+    """A square image for which LONG takes more than half a second, so that there is a wait to
+    interrupt.
 
-    Of 1 MiB at least, which the device writes into the array itself.
+    It has at least 1 MiB, so that the device writes directly into the array.
     """
     with Renderer() as renderer:
         side = 256
-        # Another image of this size: the time of the next call is not that of compiling shaders.
+        # Another image of this size first, so that the next call does not compile shaders.
         renderer.apply(picture(side, side)[::-1], LONG, attachments="final")
         while side <= 4096:
             image = picture(side, side)
@@ -70,7 +71,7 @@ def large() -> NDArray[np.float32]:
             seconds = time.perf_counter() - begin
             if seconds > 0.5:
                 return image
-            # No larger than it must be: all of these tests wait for it several times.
+            # No larger than necessary, since all of these tests wait for it several times.
             side = int(side * min(2.0, max(1.1, math.sqrt(0.6 / seconds))))
     pytest.skip("this device is done before a wait can be interrupted")
 
@@ -119,7 +120,7 @@ def test_a_long_frame_is_interrupted(
 def test_an_interrupted_frame_keeps_its_arrays(
     new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], large: NDArray[np.float32]
 ) -> None:
-    # The device writes into the array itself, after nobody else has it.
+    # The device writes into the array when no one else refers to it.
     renderer = new_renderer()
     image = large
     expected = renderer.apply(image, LONG, attachments="final")["final"]
@@ -138,7 +139,7 @@ def test_an_interrupted_frame_keeps_its_arrays(
 def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
     new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], large: NDArray[np.float32]
 ) -> None:
-    """Once the array of an interrupted call was given up with the renderer's lock held."""
+    """Regression: the array of an interrupted call was released with the renderer's lock held."""
     renderer = new_renderer()
     renderer.apply(picture(8, 8), LONG)
     finished: list[bool] = []
@@ -157,7 +158,7 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
     del array
     gc.collect()
     assert not finished
-    # The next submission waits for the abandoned one, which is finished then.
+    # The next submission waits for the abandoned one, which has then finished.
     renderer.apply(picture(9, 9), SHORT)
     assert finished == [True]
 
@@ -242,13 +243,13 @@ def test_an_interrupted_store_is_gone_on_with(
     first, second = Stopper(alarm), Stopper(None)
     with pytest.raises(Alarm):
         to_store(first)
-    # Whoever interrupts does not wait for what the device has.
+    # The caller does not wait for pending submissions after an interruption.
     assert threading.main_thread() not in closers
     done = int(xarray.open_zarr(tmp_path / "grid")["done"].sum())
     assert 2 <= done <= first.points < 24
     got = to_store(second)
     assert closers[1:] == [threading.main_thread()]
-    # And the first point, for its shape; a block may be whole without its mark.
+    # And the first point, for its shape. A block may be complete without a mark.
     assert second.points <= 24 - done + 1
     right = new_renderer().grid(
         quarter(large), LONG, STRENGTHS, reduce={"mean": Stopper(None)}, progress=False
@@ -348,7 +349,7 @@ def test_a_device_that_takes_too_long(
     assert hung.value.vk_result == 2  # VK_TIMEOUT
     with pytest.raises(DeviceLostError):
         renderer.render(scene, SHORT, RIGHT_SIZE)
-    # What the device is at work on cannot be destroyed, and nobody waits for it.
+    # Objects that the busy device uses cannot be destroyed, and there is no wait for them.
     with pytest.raises(DeviceLostError, match="still busy"):
         renderer.close()
     assert renderer.closed
@@ -400,7 +401,7 @@ except KeyboardInterrupt:
 def test_collecting_a_renderer_at_work(
     large: NDArray[np.float32], how: str, limit: str, words: str
 ) -> None:
-    """Once the wait in it had no limit and no end by Ctrl-C."""
+    """Regression: this wait had no limit, and Ctrl-C did not end it."""
     # Twice the side: four times as long as half a second.
     done = subprocess.run(
         [sys.executable, "-c", COLLECT, str(2 * len(large)), how],
@@ -486,7 +487,7 @@ def test_a_forked_process(how: str, tmp_path: Path) -> None:
     ), done.stdout + done.stderr
 
 
-# Prints what a child is told where its driver does not give it a device.
+# Prints the error of a child whose driver opens no device.
 ADVICE = """
 import os, sys
 import vkbloom

@@ -1,6 +1,7 @@
-"""What other adapters lack, or have less of: another form or a clear error, and the same pictures.
+"""Devices without some features or with lower limits: another variant or a clear error, and the
+same pictures.
 
-A layer between the validation layer and the adapter takes it away (lesser_device.c).
+A layer between the validation layer and the adapter removes features (lesser_device.c).
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from vkbloom import AdapterInfo
 
 SOURCE = Path(__file__).with_name("lesser_device.c")
 
-# Where the validation layer is, which must be found first to lie above the one of these tests.
+# The folder of the validation layer, which must come first to be above the layer of these tests.
 EXPLICIT_LAYERS = tuple(
     str(folder / "vulkan/explicit_layer.d")
     for folder in (Path("/usr/share"), Path("/usr/local/share"), Path("/etc"))
@@ -32,7 +33,7 @@ pytestmark = [
     ),
 ]
 
-#: What goes wrong, by the name that lesser_work.py has for it.
+#: The expected errors, by the names in lesser_work.py.
 LAYERS = {
     "layers float32": "Error: .* cannot add up layers in rgba32float images, but in rgba16float"
 }
@@ -72,7 +73,7 @@ def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def name(software: AdapterInfo) -> str:
-    """A name that finds the software adapter also where it is no longer one."""
+    """A name that finds the software adapter, also if the layer changes its type."""
     return software.name
 
 
@@ -157,15 +158,17 @@ def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
     assert "whole uint8" not in wrong
 
 
-def test_a_form_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
+def test_a_variant_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
     done = run(layer, name, "storage", VKBLOOM_FORM="tiles")
     assert "ValueError: VKBLOOM_FORM: tiles is not one of auto" in done.stderr
 
 
-@pytest.mark.parametrize("form", ["cpu", "gpu"])
-def test_a_form_that_the_device_cannot_run_is_refused(layer: Path, name: str, form: str) -> None:
-    done = run(layer, name, "storage", VKBLOOM_FORM=form)
-    words = f"ValueError: VKBLOOM_FORM: the compute shaders of .* cannot write .* {form} needs"
+@pytest.mark.parametrize("variant", ["cpu", "gpu"])
+def test_a_variant_that_the_device_cannot_run_is_refused(
+    layer: Path, name: str, variant: str
+) -> None:
+    done = run(layer, name, "storage", VKBLOOM_FORM=variant)
+    words = f"ValueError: VKBLOOM_FORM: the compute shaders of .* cannot write .* {variant} needs"
     assert re.search(words, done.stderr), done.stderr
 
 
@@ -178,7 +181,7 @@ def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> No
     assert findings["validation layer"]["status"] == "ok"
 
 
-# Prints what is raised where Ctrl-C and a message of the validation layer come in the same wait.
+# Prints the exception if Ctrl-C and a validation message come in the same wait.
 INTERRUPTED = """
 import os
 import numpy as np
@@ -211,7 +214,8 @@ print(renderer.closed)
 
 
 def test_an_interruption_is_raised_before_what_validation_says(layer: Path, name: str) -> None:
-    """Once the ValidationError replaced the exception of the signal's handler: a SystemError."""
+    """Regression: the ValidationError replaced the exception of the signal handler, a
+    SystemError."""
     done = run(layer, name, "", ("-c", INTERRUPTED))
     assert done.returncode == 0, done.stderr
     lines = [line.split(" (")[0].strip() for line in done.stdout.splitlines()]

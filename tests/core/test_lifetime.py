@@ -1,4 +1,4 @@
-"""Renderers come and go: nothing is left behind, nothing is taken along; threads share one."""
+"""The lifetime of renderers: nothing leaks, arrays stay valid, and threads can share a renderer."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_two_renderers_do_not_know_each_other(scene: Scene) -> None:
         assert_same(one.render(scene, None, SIZE), right)
 
 
-# Prints what a renderer under validation raises where the layer has something to say.
+# Prints the exception of a renderer if there is a validation message.
 OBJECTION = """
 import vkbloom
 try:
@@ -263,7 +263,7 @@ def test_close_while_other_threads_render(scene: Scene) -> None:
 
 
 def ticks_during(work: Callable[[], object]) -> int:
-    """Return how often another Python thread came round, a millisecond apart, during the work."""
+    """Return how often another Python thread ran during the work; it sleeps for a millisecond."""
     stop = threading.Event()
     ticking = threading.Event()
     ticks = 0

@@ -1,4 +1,4 @@
-"""Validation messages reach the renderer whose call caused them, whoever else is at work."""
+"""Validation messages reach the renderer whose call caused them, also with others at work."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def test_bloom(bloom_renderer, frame_regression):
 
 @dataclasses.dataclass(frozen=True)
 class Mutation:
-    """What is changed, seen by which test, in which framebuffer first."""
+    """A change, the test that finds it, and the first framebuffer that differs."""
 
     shader: str
     original: str
@@ -107,7 +107,7 @@ setup.write_spirv()
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A tree with everything built, without a mutation; its faults are not asked for."""
+    """A tree with a complete build without a mutation. Its fault injection is not used."""
     return core_with_faults(tmp_path_factory.getbasetemp())
 
 
@@ -139,7 +139,7 @@ def test_is_found_and_named(
     pytester.makepyfile(test_one=mutation.test)
     # Without other plugins, which take most of such a short run's time.
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
-    # The form whose shaders the mutations change.
+    # The variant whose shaders the mutations change.
     monkeypatch.setenv("VKBLOOM_FORM", "fragment")
     options = ("-p", "no:cacheprovider", "-p", "vkbloom", "--bloom-adapter=software")
     pytester.runpytest_subprocess(*options, "--bloom-update").assert_outcomes(passed=1)

@@ -1,4 +1,4 @@
-"""Plans: what they say is what a call does, and nothing is done to say it."""
+"""Plans: a call does what its plan states, and planning makes no device call."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def assert_planned(plan: Plan, frames: Any) -> None:
     for name, array in frames.items():
         assert plan.outputs[name] == (array.shape, array.dtype)
     assert list(dict.fromkeys(one.name for one in plan.passes)) == list(frames.timings)
-    # Every image is made before it is read, and everything wanted is made.
+    # Every image is written before it is read, and every requested one is written.
     made = {"image"} if plan.source == "image" else set()
     # A convolution's kernel comes from the host.
     made |= {"kernel"}
@@ -47,11 +47,11 @@ def assert_planned(plan: Plan, frames: Any) -> None:
 
 
 @pytest.mark.parametrize("attachments", ["all", ("final",)], ids=["all", "final"])
-@pytest.mark.parametrize("form", ["fragment", "cpu", "gpu"])
+@pytest.mark.parametrize("variant", ["fragment", "cpu", "gpu"])
 def test_a_plan_of_an_image_is_what_runs(
-    monkeypatch: pytest.MonkeyPatch, form: str, attachments: str | Sequence[str]
+    monkeypatch: pytest.MonkeyPatch, variant: str, attachments: str | Sequence[str]
 ) -> None:
-    monkeypatch.setenv("VKBLOOM_FORM", form)
+    monkeypatch.setenv("VKBLOOM_FORM", variant)
     with Renderer() as renderer:
         for number, (name, method) in enumerate(METHODS.items()):
             dtype = ("uint8", "float16", "float32")[number % 3]
@@ -60,8 +60,8 @@ def test_a_plan_of_an_image_is_what_runs(
             frames = renderer.apply(image, method, attachments=attachments)
             assert_planned(plan, frames)
             assert (plan.source, plan.size, plan.dtype) == ("image", SIZE, image.dtype), name
-            if form == "fragment":
-                # Fourier transforms are compute shaders in every form.
+            if variant == "fragment":
+                # Fourier transforms are compute shaders in every column.
                 assert {one.variant for one in plan.passes} <= {"fragment", "dispatch"}
 
 

@@ -1,6 +1,6 @@
-"""Large framebuffers, which the device writes to the arrays themselves: to the last byte, no other.
+"""Large framebuffers, which the device writes directly into arrays: all their bytes and no others.
 
-Arrays that the device cannot have, and small ones, go through staging memory; both must agree.
+Arrays that the device cannot import, and small ones, use staging memory. Both ways must agree.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def test_every_framebuffer_both_ways(renderer: Renderer, scene: Scene, shading: 
     out = {name: placed(array.shape, array.dtype.name, 1)[0] for name, array in whole.items()}
     # Without its alignment an array cannot be the device's.
     apart = renderer.render(scene, settings, size, shading=shading, time=0.1, out=out)
-    # (What a pass stored to the array was not kept.)
+    # (A result that a pass stored to the array is not in the cached image.)
     assert apart.timings.keys() <= {"final"}
     for name, array in whole.items():
         np.testing.assert_array_equal(apart[name], array, err_msg=name)
@@ -107,7 +107,7 @@ def test_large_frames_in_the_air(new_renderer: Callable[[], Renderer]) -> None:
         for name, array in got.items():
             np.testing.assert_array_equal(array, right[name])
             array[:] = 0
-    # Arrays that the device may still write to are waited for before they go.
+    # Arrays that the device may still write to are freed only after a wait.
     for taken in range(4):
         frames = renderer.apply_many(image, settings)
         for _ in range(taken):

@@ -1,4 +1,4 @@
-"""Settings: defaults, ranges, what they store, and the kernels and presets made for them."""
+"""Settings: defaults, ranges, stored values, kernels and presets."""
 
 from __future__ import annotations
 
@@ -260,7 +260,7 @@ def test_the_number_of_weights() -> None:
         (math.nan,),
         (1.0, math.inf),
         pytest.param((10**400,), id="huge"),
-        # Finite here, infinite in the 32 bits that the device has.
+        # Finite as a double, infinite in the device's 32 bits.
         (1e39,),
     ],
     ids=str,

@@ -1,4 +1,4 @@
-"""The shaders in the core, as SPIR-V: what every compiler has to be told."""
+"""The SPIR-V of the core's shaders: the decorations that every compiler needs."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def one(renderer: Renderer, scene: Scene, kind: str, which: int, size: tuple[int
         renderer.apply(picture(*size), settings, attachments="final", out={"final": out})
         return [out]
     if kind == "left":
-        # A sequence that is left half taken: its flights are still in the air.
+        # A sequence that is dropped half way: some of its submissions are still pending.
         return [next(iter(renderer.apply_many(picture(*size), [settings] * 5)))["final"]]
     return [
         frames["final"]
@@ -62,7 +62,7 @@ KINDS = ("render", "apply", "out", "left", "many")
 def play(right: Mapping[Key, Any], scene: Scene, seed: int, *, closing: bool) -> int:
     """Play one round; return the calls that were made.
 
-    In a closing round one thread closes what the others are using.
+    In a closing round one thread closes the renderer that the others use.
     """
     renderer = Renderer(validation=True)
     start = threading.Barrier(THREADS)

@@ -1,4 +1,4 @@
-"""The documentation: its code is run as it stands there, and so are the example notebooks."""
+"""The documentation: its code runs unchanged, and so do the example notebooks."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ PAGES = [
     if page.name != "testing.md" and "```python" in page.read_text()
 ]
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
-# Commands of `sh` blocks that do not end, or take long, or want a cluster: only their arguments
-# are read.
+# Commands of `sh` blocks that do not end, take long, or need a cluster: only their arguments are
+# parsed.
 ENDLESS = ("explore",)
 
 
@@ -56,10 +56,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-# As test_grid_cluster.py says: what Dask's cluster leaves behind is its own.
+# As in test_grid_cluster.py: objects that Dask's cluster leaves behind are its own.
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-# And so is what it says where something else on this machine is served at its usual port.
+# And so is its warning if its usual port is in use.
 @pytest.mark.filterwarnings("ignore:Port:UserWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_code_of_a_page(page: Path, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What shows the explorer's page to a browser: its own server, and JupyterLab."""
+"""The hosts of the explorer's page: its own server, and JupyterLab."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PATIENCE = 60.0  # seconds: waiting costs nothing where a busy machine answers a
 
 @contextmanager
 def served(new_viewer: Callable[[], Viewer]) -> Iterator[str]:
-    """Serve the page from a thread, and yield where."""
+    """Serve the page from a thread, and yield its address."""
     started: queue.Queue[tuple[str, asyncio.AbstractEventLoop, asyncio.Event]] = queue.Queue()
 
     async def main() -> None:
@@ -48,8 +48,7 @@ def served(new_viewer: Callable[[], Viewer]) -> Iterator[str]:
 def jupyterlab(folder: Path, cells: Sequence[str], environment: Mapping[str, str]) -> Iterator[str]:
     """Run JupyterLab on a notebook of some cells, and yield where it is open.
 
-    Nothing of the user's is read or written; the theme is what the system, or the browser, asks
-    for.
+    No file of the user is read or written. The theme is that of the system or the browser.
     """
     notebook = {
         "cells": [

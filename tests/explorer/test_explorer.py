@@ -30,7 +30,7 @@ EXAMPLES = [
 
 
 def ask(viewer: Viewer, **message: Any) -> tuple[dict[str, Any], list[bytes]]:
-    """Ask as a page does: what goes through JSON comes out the same."""
+    """Send a message as a page does. JSON must not change it or the answer."""
     answer, buffers = viewer.answer(json.loads(json.dumps(message, allow_nan=False)))
     return json.loads(json.dumps(answer, allow_nan=False)), buffers
 
@@ -81,9 +81,9 @@ class TestControls:
                     assert 0 < field["step"] <= field["to"] - field["from"]
                     # Of 1, 2 and 5 times powers of ten, neighbours are 2.5 times apart at the most.
                     steps = (field["to"] - field["from"]) / field["step"]
-                    assert field["whole"] or 200 <= steps * (1 + 1e-9) <= 500
+                    assert field["integer"] or 200 <= steps * (1 + 1e-9) <= 500
                     assert value is None or field["low"] <= value <= field["high"]
-                    assert field["whole"] == (type(value) is int)
+                    assert field["integer"] == (type(value) is int)
                 elif field["kind"] == "choice":
                     assert value in field["choices"] or (value is None and field["optional"])
                 else:

@@ -1,7 +1,7 @@
 """The explorer's page in a browser: Debian's Chromium, run by playwright.
 
-What is shown is compared, to the pixel, with what the renderer gives: in the page that
-`vkbloom.explorer.server` serves, and in JupyterLab.
+The shown pixels are compared with those of the renderer: in the page of `vkbloom.explorer.server`,
+and in JupyterLab.
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ def scene_url(
 
 @contextmanager
 def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
-    """Open a page and wait for its first picture; whatever it complains about fails the test."""
+    """Open a page and wait for its first picture. An error or warning of the page fails the
+    test."""
     page = browser.new_page(viewport={"width": 980, "height": 640}, **options)
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text))
@@ -88,7 +89,7 @@ def page(browser: Browser, scene_url: str) -> Iterator[Page]:
 
 
 def see(page: Page, folder: Path) -> NDArray[np.uint8]:
-    """Return what is on the screen where the framebuffer is shown, but for the wipe's handle."""
+    """Return the part of the screen that shows the framebuffer, without the wipe's handle."""
     visibility = 'document.querySelector(".vkb-divider").style.visibility = '
     page.evaluate(visibility + '"hidden"')
     # To hide the caret, a style sheet would be put into the page, which lets none in.
@@ -98,7 +99,7 @@ def see(page: Page, folder: Path) -> NDArray[np.uint8]:
 
 
 def read(page: Page, folder: Path) -> NDArray[np.uint8]:
-    """Return what the canvas holds, for where it may lie between the pixels of the screen."""
+    """Return the content of the canvas, for cases where it is between pixels of the screen."""
     url = page.evaluate('document.querySelector(".vkbloom canvas").toDataURL("image/png")')
     return decode(base64.b64decode(url.partition(",")[2]), folder)[:, :, :3]
 
@@ -119,7 +120,7 @@ def size_of(picture: NDArray[Any]) -> tuple[int, int]:
 
 
 def drive(page: Page, renderer: Renderer, scene: Scene, shown: Callable[[], Any]) -> None:
-    """Move the controls, and hold each picture against the renderer's."""
+    """Move the controls, and compare each picture with the renderer's."""
 
     def assert_shows(settings: Any, name: str = "final", **options: Any) -> None:
         picture = shown()
@@ -275,7 +276,7 @@ def test_code_is_copied(browser: Browser, scene_url: str) -> None:
 
 
 def test_the_newest_wins(page: Page) -> None:
-    """Of many changes at once a few are rendered, and the last is what is shown."""
+    """Of many changes at once only some are rendered, and the last one is shown."""
     page.evaluate(
         """() => {
             window.drawn = window.sent = 0;

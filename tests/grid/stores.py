@@ -1,4 +1,4 @@
-"""What a grid's folder holds."""
+"""The content of a grid's folder."""
 
 from __future__ import annotations
 

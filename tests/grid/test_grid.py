@@ -1,4 +1,4 @@
-"""Grids in memory: right values, few passes, named dimensions, clear refusals."""
+"""Grids in memory: values, number of passes, names of dimensions, errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vkbloom.grid.progress import Progress
 
 xr = pytest.importorskip("xarray")
 
-# For images and scenes that no renderer has seen.
+# For images and scenes that no renderer has rendered.
 UNSEEN = itertools.count(1000)
 
 AXES: dict[str, list[Any]] = {

@@ -1,4 +1,4 @@
-"""The ready reductions: what they say of frames whose figures are known."""
+"""The built-in reductions, on frames whose figures are known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Grids on disk: complete, resumable, refused where they differ, mended where they are damaged."""
+"""Grids on disk: complete, resumable, rejected if they differ, repaired if they are damaged."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ class TestWhole:
 
 
 class _Stop(Exception):
-    """The end of a process, as far as a test can have it within its own."""
+    """The end of a process, as far as a test can imitate it."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What else than an ndarray can be given bloom, and what is said of what cannot."""
+"""Objects other than ndarrays as images, and the errors for objects that are none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Image files of framebuffers: what they hold, where they lie, and what failures leave."""
+"""Image files of framebuffers: their content, their paths, and the state after failures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Readers of outside data under changed files: a short run of each target, and what was found."""
+"""Readers of untrusted files: a short run of each fuzz target, and tests of earlier findings."""
 
 from __future__ import annotations
 

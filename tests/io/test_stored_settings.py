@@ -1,4 +1,4 @@
-"""Settings and frames come back from what they were written to."""
+"""Settings and frames are read back from files as they were written."""
 
 from __future__ import annotations
 

@@ -1,13 +1,17 @@
-"""The settings and formats that every way through the core is tried with."""
+"""The settings and formats with which all paths through the core are tested."""
 
 from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from typing import Any
 
 from vkbloom import DualKawase, Pyramid, Separable, Settings, gaussian_weights
 
 DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
 
-# No level of an 8-bit image has this luminance: a sum of whole multiples of 1e-4 / 255 never
-# meets it, so that rounding cannot lift a pixel over it.
+# No colour of an 8-bit image has this luminance, since it is not a multiple of 1e-4 / 255. So
+# rounding cannot move a pixel across the threshold.
 HARD_THRESHOLD = 0.30001
 
 METHODS: dict[str, Settings] = {
@@ -41,3 +45,17 @@ METHODS: dict[str, Settings] = {
 }
 
 DTYPES = ("uint8", "float16", "float32")
+
+
+def by_turns(*columns: Iterable[Any], turns: Iterable[Any]) -> list[tuple[Any, ...]]:
+    """Return the product of the columns; each row ends with one of `turns`.
+
+    Every two values of two columns, or of a column and of `turns`, meet in some row. The product
+    with all turns finds little more, and takes as many times as long as there are turns.
+    """
+    last = list(turns)
+    rows = itertools.product(*(enumerate(column) for column in columns))
+    return [
+        (*(value for _, value in row), last[sum(index for index, _ in row) % len(last)])
+        for row in rows
+    ]

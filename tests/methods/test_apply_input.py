@@ -1,4 +1,5 @@
-"""What `apply` takes: dtypes, strides, sizes, NaN and infinity, repeats, `out`; and what not."""
+"""The arguments of `apply`: dtypes, strides, sizes, NaN and infinity, repeated images, `out`; and
+errors."""
 
 from __future__ import annotations
 
@@ -130,7 +131,7 @@ def test_image_changed_in_place(renderer: Renderer, dtype: str, channels: int) -
 
 
 def test_images_of_all_kinds_by_turns(renderer: Renderer) -> None:
-    """What is left of one image must not show in the next one."""
+    """Data of one image must not appear in the next one."""
     images = [
         picture(18, 12, 3, "float32"),
         picture(18, 12, 4, "float32"),

@@ -1,4 +1,5 @@
-"""The dither of `final`: its noise, what it leaves alone, and what it does to a dark gradient."""
+"""The dither of `final`: its noise, values that it does not change, and its effect on a dark
+gradient."""
 
 from __future__ import annotations
 
@@ -33,7 +34,7 @@ def final(renderer: Renderer, image: Array, settings: Settings) -> Array:
 
 
 def mixed(place: int, row: int, seed: int) -> list[int]:
-    """Return the three numbers of pcg3d in Python's whole numbers."""
+    """Return the three numbers of pcg3d, computed with Python's integers."""
     x, y, z = (number * 1664525 + 1013904223 & 0xFFFFFFFF for number in (place, row, seed))
     for shift in (16, 32):
         x = x + y * z & 0xFFFFFFFF

@@ -1,6 +1,6 @@
-"""The presets against frames that the engines' own shaders drew of the same images.
+"""The presets against frames that the engines' own shaders rendered from the same images.
 
-The frames lie beside the repository, in shared/data/engines; its README says how they were made.
+The frames are beside the repository, in shared/data/engines. Its README states how they were made.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def test_a_bloom_is_its_engines(renderer: Renderer, engine_frames: Path, key: st
 
 
 class Cut(Storage):
-    """R11G11B10 as lavapipe stores it: bits beyond the mantissa are cut off, not rounded."""
+    """R11G11B10 as lavapipe stores it: values are truncated, not rounded."""
 
     def __call__(self, image: Array) -> Array:
         kept = np.maximum(image, 0)

@@ -1,4 +1,4 @@
-"""What glows and what becomes of alpha: masks, emissions, and the field `alpha`."""
+"""Masks, emissions, and the field `alpha`."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def given_of(case: Case) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module", params=("fragment", "cpu", "gpu"))
-def formed(request: pytest.FixtureRequest) -> Iterator[Renderer]:
-    """A renderer that is held to one column of the table of variants."""
+def varied(request: pytest.FixtureRequest) -> Iterator[Renderer]:
+    """A renderer that uses one column of the table of variants."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VKBLOOM_FORM", str(request.param))
         opened = Renderer(validation=True)
@@ -113,14 +113,14 @@ def formed(request: pytest.FixtureRequest) -> Iterator[Renderer]:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_against_the_reference(formed: Renderer, name: str) -> None:
+def test_against_the_reference(varied: Renderer, name: str) -> None:
     case = CASES[name]
     image, given = image_of(case.size, case.dtype), given_of(case)
-    frames = formed.apply(image, case.settings, **given)
+    frames = varied.apply(image, case.settings, **given)
     assert_matches_reference(frames, image, case.settings, **given)
-    # A fused pass may stand for several.
-    formed.apply(image[::-1], case.settings, attachments=("glow",), **given)
-    alone = formed.apply(image, case.settings, attachments=("final",), **given)
+    # A fused pass may replace several.
+    varied.apply(image[::-1], case.settings, attachments=("glow",), **given)
+    alone = varied.apply(image, case.settings, attachments=("final",), **given)
     assert_array_equal(alone["final"], frames["final"])
 
 

@@ -1,4 +1,4 @@
-"""Godot's glow, Blender's bloom and pygfx' bloom: the formulas by hand, and what each refuses."""
+"""Godot's glow, Blender's bloom and pygfx' bloom: formulas worked out by hand, and errors."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.methods.cases import DTYPES, by_turns
 from vkbloom import (
     BlenderGlare,
     GodotBloom,
@@ -262,15 +263,14 @@ NEW: list[Settings] = [
 ]
 
 
-@pytest.mark.parametrize("settings", NEW)
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+@pytest.mark.parametrize(("settings", "dtype"), by_turns(NEW, turns=DTYPES))
 def test_all_variants_give_the_same(
     settings: Settings, dtype: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     image = lights((75, 46), dtype)
     results = []
-    for form in ("fragment", "cpu", "gpu"):
-        monkeypatch.setenv("VKBLOOM_FORM", form)
+    for variant in ("fragment", "cpu", "gpu"):
+        monkeypatch.setenv("VKBLOOM_FORM", variant)
         with Renderer(validation=True) as renderer:
             results.append(renderer.apply(image, settings))
     for name, values in results[0].items():

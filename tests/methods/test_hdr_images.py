@@ -1,4 +1,4 @@
-"""Bloom on real HDR images: equal to the reference, and none of what spoils a photo."""
+"""Bloom on real HDR images: equal to the reference, and without visible artefacts."""
 
 from __future__ import annotations
 

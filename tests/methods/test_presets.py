@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.methods.cases import by_turns
 from tests.tolerance import real
 from vkbloom import (
     BevyBloom,
@@ -82,9 +83,7 @@ def check(renderer: Renderer, image: Array, settings: Settings) -> None:
         assert_allclose(actual, values, rtol=0, atol=largest, err_msg=name)
 
 
-@pytest.mark.parametrize("dtype", FORMATS)
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-@pytest.mark.parametrize("name", PUBLISHED)
+@pytest.mark.parametrize(("name", "size", "dtype"), by_turns(PUBLISHED, SIZES, turns=FORMATS))
 def test_a_preset_is_its_reference(
     renderer: Renderer, name: str, size: tuple[int, int], dtype: Any
 ) -> None:

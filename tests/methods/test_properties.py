@@ -1,4 +1,4 @@
-"""Laws that bloom keeps whatever the picture, tried on pictures that hypothesis draws."""
+"""Laws that hold for all pictures, tested with pictures that hypothesis generates."""
 
 from __future__ import annotations
 

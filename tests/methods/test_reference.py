@@ -34,7 +34,7 @@ FIREFLY = pytest.param(Pyramid(levels=3, firefly_filter=True), id="firefly")
 
 
 def assert_close(actual: Any, expected: Any) -> None:
-    """Equal but for the rounding of doubles in sums of a few hundred products."""
+    """Equal except for the rounding of doubles in sums of a few hundred products."""
     assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)
 
 

@@ -1,7 +1,6 @@
-"""The built-in saucer and a picture against references that were looked at.
+"""The built-in saucer and a picture against references that were checked by eye.
 
-Small ones: they notice what changes without being meant to, where the laws and the reference in
-NumPy say what is right.
+They are small, and find unintended changes. The laws and the NumPy reference test correctness.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ def test_of_an_image(
     method: str,
     dtype: str,
 ) -> None:
-    # The scene alone: nothing that forms of a bloom may round in another way.
+    # Only the scene, since variants of a bloom may round differently.
     picture = renderer.render(scene, size=SIZE, attachments=("scene",))["scene"]
     if dtype == "float16":
         # Brighter than 1, as a picture before its tone map is.

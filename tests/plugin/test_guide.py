@@ -1,4 +1,4 @@
-"""The code of docs/testing.md, run as it stands there."""
+"""The code of docs/testing.md runs unchanged."""
 
 from __future__ import annotations
 

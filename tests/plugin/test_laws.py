@@ -1,4 +1,4 @@
-"""The laws of `vkbloom.testing`, on blurs that keep them and on blurs that break one."""
+"""The laws of `vkbloom.testing`, on blurs that obey all of them and on blurs that violate one."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ SEEING_BLACK = kernel([[1 / 9] * 3] * 3, mode="constant")
 
 
 def fails(assertion: Callable[..., None], *arguments: Any, **options: Any) -> str:
-    """Return the message, having looked for its parts: assertion, figure, place and law."""
+    """Check the parts of a message (assertion, figure, position and law), and return it."""
     with pytest.raises(AssertionError) as caught:
         assertion(*arguments, **options)
     message = str(caught.value)

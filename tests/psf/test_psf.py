@@ -1,4 +1,4 @@
-"""Point-spread functions against what their sources and their mathematics say."""
+"""Point-spread functions against their sources and against mathematical identities."""
 
 from __future__ import annotations
 

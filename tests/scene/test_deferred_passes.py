@@ -1,4 +1,4 @@
-"""The passes of the deferred system: which there are, which run, and what waits for what."""
+"""The passes of the deferred system: which exist, which run, and their dependencies."""
 
 from __future__ import annotations
 

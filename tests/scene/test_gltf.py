@@ -1,4 +1,4 @@
-"""Meshes from glTF: the rules of loading, damaged files, and files that point elsewhere."""
+"""Meshes from glTF: the rules of loading, damaged files, and files that refer to other files."""
 
 from __future__ import annotations
 

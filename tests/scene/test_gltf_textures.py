@@ -1,4 +1,4 @@
-"""Textures from glTF: images wherever they lie, samplers, texture coordinates, damaged files."""
+"""Textures from glTF: images in all places, samplers, texture coordinates, damaged files."""
 
 from __future__ import annotations
 

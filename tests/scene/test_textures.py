@@ -1,4 +1,4 @@
-"""Textures: what a fragment gets of them, against NumPy; mip levels; draws; what is refused."""
+"""Textures: sampled values against NumPy; mip levels; draws; errors."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def deferred(renderer: Renderer, body: Mesh, size: tuple[int, int], **more: Any)
 
 
 def wrapped(texel: Array, side: int, mode: str) -> Array:
-    """Return the texels of 0..side-1 that stand for any whole numbers."""
+    """Return the texels in 0..side-1 for any integer coordinates."""
     if mode == "repeat":
         return texel % side
     if mode == "clamp-to-edge":

@@ -40,14 +40,14 @@ from vkbloom.cli.image_files import (
     subimage_option,
 )
 from vkbloom.cli.in_a_row import read_ahead, rendered, written_behind
-from vkbloom.cli.large import apply_by_rows, is_large
+from vkbloom.cli.large import Large, apply_by_rows, is_large
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.sequences import PIPE, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.interruptible import opened_renderer
-from vkbloom.io import image_reading, image_writing
+from vkbloom.io import image_writing
 from vkbloom.io.array_files import divided
-from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage
+from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.settings import Encoding
 
 
@@ -153,8 +153,8 @@ def command(  # noqa: PLR0915  one step after the other
     is read, or --subimage, and of several layers the one that --layer names; channels other than
     R, G, B and A are left out.
 
-    Pictures of 16 million pixels and more are read and written by bands of rows, unless they are
-    turned; --half holds them in half floats.
+    Pictures of 16 million pixels and more are read and written by bands of rows, but those of a
+    pipe; --half holds them in half floats.
 
     OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
     """
@@ -191,12 +191,11 @@ def command(  # noqa: PLR0915  one step after the other
                 for path in written:
                     click.echo(f"wrote {path}")
 
-        def decode(rows: StoredImage) -> Picture:
-            return image_reading.decode(rows, input_colour, raw=raw)
+        how = Large(mask, emission, layer, subimage, input_colour, raw, half)
 
         def by_rows(name: str) -> bool:
-            others = (layer, subimage, raw, mask, emission, is_blended, out == PIPE)
-            return attachments == "final" and not any(others) and is_large(name)
+            is_piped = PIPE in (name, out)
+            return attachments == "final" and not is_piped and is_large(name, subimage, layer)
 
         def write_large(renderer: vkbloom.Renderer, name: str, target: str) -> None:
             if several:
@@ -206,8 +205,7 @@ def command(  # noqa: PLR0915  one step after the other
                 name,
                 Path(target),
                 settings,
-                decode=decode,
-                half=half,
+                how,
                 colour=output_colour,
                 quality=quality,
                 disable=disable,
@@ -215,7 +213,12 @@ def command(  # noqa: PLR0915  one step after the other
             if not several:
                 click.echo(f"wrote {target}")
 
-        given_with = accompanying(mask, emission, input_colour, raw=raw, is_blended=is_blended)
+        # Read once, before the first picture that is taken as a whole.
+        given_with = functools.cache(
+            functools.partial(
+                accompanying, mask, emission, input_colour, raw=raw, is_blended=is_blended
+            )
+        )
         # None: shown where standard error is a terminal.
         disable = None if sys.stderr is not None else True
         with ExitStack() as stack:
@@ -231,7 +234,7 @@ def command(  # noqa: PLR0915  one step after the other
                     for name, target in files:
                         write_large(renderer, name, target)
                     continue
-                prepared = functools.partial(_prepared, renderer, given_with)
+                prepared = functools.partial(_prepared, renderer, given_with())
                 with as_wrong_use():
                     renderer.plan(prepared(first), settings, attachments=wanted)
                 ahead = read_ahead(taken, [name for name, _ in files[1:]])

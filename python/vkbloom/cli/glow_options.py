@@ -16,7 +16,15 @@ from vkbloom.cli.image_files import read_picture
 from vkbloom.io.array_files import multiplied
 from vkbloom.io.images import Colour, Picture
 
-__all__ = ["accompanying", "glow_options", "has_straight", "premultiplied", "uploaded"]
+__all__ = [
+    "accompanying",
+    "alike",
+    "glow_options",
+    "grey_mask",
+    "has_straight",
+    "premultiplied",
+    "uploaded",
+]
 
 Array = NDArray[Any]
 
@@ -62,15 +70,15 @@ def accompanying(
     OSError, ValueError
         A file cannot be read, or the mask has colours.
     """
-    mask_values = None if mask is None else _read_mask(mask)
+    values = None if mask is None else grey_mask(read_picture(mask, 0, "linear"), mask)
     glow = None
     if emission is not None:
         read = read_picture(emission, 0, colour, raw=raw)
         glow = (premultiplied(read) if is_blended else read).pixels
 
     def arguments(image: Array) -> dict[str, Array]:
-        given = {} if mask_values is None else {"mask": mask_values}
-        return given if glow is None else {**given, "emission": _alike(glow, image)}
+        given = {} if values is None else {"mask": values}
+        return given if glow is None else {**given, "emission": alike(glow, image)}
 
     return arguments
 
@@ -87,14 +95,15 @@ def premultiplied(picture: Picture) -> Picture:
     return dataclasses.replace(picture, pixels=multiplied(picture.pixels))
 
 
-def _read_mask(file: str) -> Array:
-    pixels = read_picture(file, 0, "linear").pixels
+def grey_mask(picture: Picture, file: str) -> Array:
+    """Return the values of a mask; a ValueError for one with colours names the file."""
+    pixels = picture.pixels
     if (pixels[..., :3] != pixels[..., :1]).any():
         raise ValueError(f"{file}: a mask is grey, and this image has colours")
     return pixels[..., 0]
 
 
-def _alike(emission: Array, image: Array) -> Array:
+def alike(emission: Array, image: Array) -> Array:
     """Return an emission with the channels and the dtype of an image; files may differ in both."""
     channels = image.shape[2]
     if emission.shape[2] < channels:

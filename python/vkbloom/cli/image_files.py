@@ -109,26 +109,45 @@ def read_picture(
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
-        raise click.UsageError(
-            f"--raw: {source} is not a file of 8-bit integers but of {stored.numbers[0]}; leave "
-            "out --raw"
-        )
+        raise not_of_bytes(source, stored.numbers[0])
+    picture = decoded(stored, source, colour, raw=raw)
+    note_parts(source, stored, layer)
+    note_specials(source, int(np.isnan(picture.values).sum()), int(np.isinf(picture.values).sum()))
+    for text in picture.notes:
+        note(f"{source}: {text}")
+    return picture
+
+
+def decoded(
+    stored: StoredImage, source: str, colour: Colour | None, *, raw: bool = False
+) -> Picture:
+    """Decode an image as `image_reading.decode` does; a ValueError names the file."""
     try:
-        picture = image_reading.decode(stored, colour, raw=raw)
+        return image_reading.decode(stored, colour, raw=raw)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
+
+
+def not_of_bytes(source: str, numbers: str) -> click.UsageError:
+    """Return the error for --raw of a file of other numbers than bytes."""
+    return click.UsageError(
+        f"--raw: {source} is not a file of 8-bit integers but of {numbers}; leave out --raw"
+    )
+
+
+def note_parts(source: str, stored: StoredImage, layer: str | None) -> None:
+    """Say it if the first of several parts was read, and nobody chose it."""
     if len(stored.parts) > 1 and layer is None and not given("subimage"):
         note(f"{source}: the first of its {_listed(stored)}; --subimage reads another")
-    nan = int(np.isnan(picture.values).sum())
-    infinite = int(np.isinf(picture.values).sum())
+
+
+def note_specials(source: str, nan: int, infinite: int) -> None:
+    """Say how many values of a file are not finite, if there are any."""
     if nan or infinite:
         note(
             f"{source} has {nan} NaN and {infinite} infinite values; the bloom counts them as 0, "
             "and their own pixels keep them"
         )
-    for text in picture.notes:
-        note(f"{source}: {text}")
-    return picture
 
 
 _quiet = threading.Lock()

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 import vkbloom
-from vkbloom.banded import BandedImage
-from vkbloom.cli.image_files import note
-from vkbloom.io.images import Picture, SavedColour, StoredImage
-from vkbloom.io.rows import RowReader, opened_rows, written_rows
+from vkbloom.banded import Band, BloomByBands, ImageByBands
+from vkbloom.checks import check_emission, check_mask
+from vkbloom.cli import no_bloom
+from vkbloom.cli.glow_options import alike, grey_mask, has_straight, premultiplied
+from vkbloom.cli.image_files import decoded, not_of_bytes, note, note_parts, note_specials
+from vkbloom.io.array_files import divided
+from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage
+from vkbloom.io.rows import Rows, opened_rows, written_rows
 
-__all__ = ["apply_by_rows", "is_large"]
+__all__ = ["Large", "apply_by_rows", "is_large"]
 
 #: Pixels from which on a picture is taken by rows.
 LARGE: Final = 1 << 24
@@ -26,11 +32,34 @@ LARGE: Final = 1 << 24
 HALVED: Final = 1 << 26
 
 
-def is_large(path: str) -> bool:
-    """Whether a file is read by rows; a file that cannot be opened is not."""
+class Large(NamedTuple):
+    """How pictures are read: the arguments of the command of these names.
+
+    Attributes
+    ----------
+    mask, emission, layer : str or None
+    subimage : int
+    colour : str or None
+        `input_colour`.
+    raw : bool
+    half : bool or None
+        By default floats of files of 8 bits from `HALVED` pixels on become half floats.
+    """
+
+    mask: str | None = None
+    emission: str | None = None
+    layer: str | None = None
+    subimage: int = 0
+    colour: Colour | None = None
+    raw: bool = False
+    half: bool | None = None
+
+
+def is_large(path: str, subimage: int = 0, layer: str | None = None) -> bool:
+    """Whether a file is taken by rows; a file that cannot be opened is not."""
     try:
-        with opened_rows(path) as rows:
-            return rows is not None and rows.size[0] * rows.size[1] >= LARGE
+        with opened_rows(path, subimage, layer) as rows:
+            return rows.size[0] * rows.size[1] >= LARGE
     except (OSError, ValueError):
         return False
 
@@ -40,9 +69,8 @@ def apply_by_rows(
     source: str,
     target: Path,
     settings: vkbloom.Settings,
+    how: Large,
     *,
-    decode: Callable[[StoredImage], Picture],
-    half: bool | None,
     colour: SavedColour | None,
     quality: int | None,
     disable: bool | None,
@@ -55,67 +83,154 @@ def apply_by_rows(
     source, target, colour, quality
         As for the command.
     settings : Settings
-    decode : callable
-        Makes a picture of rows as they are stored.
-    half : bool, optional
-        Whether floats become half floats; by default those of files of 8 bits from `HALVED` pixels
-        on.
+    how : Large
     disable : bool, optional
         Of the progress bar; None: shown on a terminal.
     """
+    is_blended = settings.alpha != "keep"
+    reading = _Reading(source, how, is_blended)
+    height = reading.height
     with ExitStack() as stack:
-        rows = stack.enter_context(opened_rows(source))
-        if rows is None:
-            raise ValueError(f"{source}: has changed while it was read")
-        width, height = rows.size
-        if half is None:
-            half = rows.numbers == "uint8" and width * height >= HALVED
         bar = stack.enter_context(tqdm(total=2 * height, unit="row", leave=False, disable=disable))
-        notes = _Notes(source)
-        image: BandedImage | None = None
-        first: Picture | None = None
-        for picture in _bands(rows, decode):
-            notes.add(picture)
-            pixels = picture.pixels
-            if half and pixels.dtype == np.float32:
-                pixels = pixels.astype(np.float16)
-            if image is None or first is None:
-                first = dataclasses.replace(picture, pixels=pixels[:1])
-                image = BandedImage(renderer._core, pixels, height)
-            else:
-                image.add(pixels)
-            bar.update(len(pixels))
-        assert image is not None
-        assert first is not None
-        notes.tell()
+        bands = stack.enter_context(closing(reading.bands()))
+        first = next(bands)
+        taken = itertools.chain([first], bands)
+        bloom = BloomByBands.of(renderer._core, settings, first, height, len(first.image))
+        if bloom is None:
+            finals = _held_whole(renderer, settings, taken, height, bar)
+        else:
+            for count in bloom.reduce(taken):
+                bar.update(count)
+            if bloom.is_without:
+                note(f"{source}: {no_bloom.reason(settings)}")
+            finals = bloom.finals(stack.enter_context(closing(reading.bands())))
         facts = {
             "Software": f"vkbloom {vkbloom.__version__}",
             "vkbloom:settings": json.dumps(settings.to_dict()),
         }
         write = stack.enter_context(written_rows(target, height, colour, facts, quality))
-        done = first.encoding if settings.encoding == "none" else settings.encoding
         losses: dict[str, None] = {}
-        for top in range(0, height, rows.band):
-            final = image.final(settings, top, min(rows.band, height - top))
-            losses.update(
-                dict.fromkeys(write(dataclasses.replace(first, pixels=final, encoding=done)))
-            )
+        for final in finals:
+            picture = reading.result(final, settings)
+            losses.update(dict.fromkeys(write(picture)))
             bar.update(len(final))
     for text in losses:
         note(text)
 
 
-def _bands(rows: RowReader, decode: Callable[[StoredImage], Picture]) -> Iterator[Picture]:
-    height = rows.size[1]
-    for top in range(0, height, rows.band):
-        yield decode(rows.read(top, min(rows.band, height - top)))
+def _held_whole(
+    renderer: vkbloom.Renderer,
+    settings: vkbloom.Settings,
+    bands: Iterator[Band],
+    height: int,
+    bar: tqdm[Any],
+) -> Iterator[NDArray[Any]]:
+    """Yield the rows of `final` of an image that the device holds."""
+    first = next(bands)
+    image = ImageByBands(renderer._core, first, height)
+    bar.update(len(first.image))
+    for band in bands:
+        image.add(band)
+        bar.update(len(band.image))
+    for top in range(0, height, len(first.image)):
+        yield image.final(settings, top, min(len(first.image), height - top))
+
+
+class _Reading:
+    """A picture with its mask and its emission, as often as it is read, and what is said of it.
+
+    Parameters
+    ----------
+    source : str
+    how : Large
+    is_blended : bool
+        Whether colours are multiplied by alpha.
+    """
+
+    def __init__(self, source: str, how: Large, is_blended: bool) -> None:
+        self._source = source
+        self._how = how
+        self._is_blended = is_blended
+        self._picture: Picture | None = None
+        self._is_told = False
+        with opened_rows(source, how.subimage, how.layer) as rows:
+            self._size = rows.size
+        if how.raw and rows.numbers != "uint8":
+            raise not_of_bytes(source, rows.numbers)
+        half = how.half
+        if half is None:
+            half = rows.numbers == "uint8" and rows.size[0] * rows.size[1] >= HALVED
+        self._half = half and not how.raw
+
+    @property
+    def height(self) -> int:
+        """Rows in all."""
+        return self._size[1]
+
+    def bands(self) -> Generator[Band]:
+        """Read it from the top to the bottom; notes about it are printed at the first end."""
+        how = self._how
+        notes = [_Notes(file) for file in (self._source, how.emission or "", how.mask or "")]
+        with ExitStack() as stack:
+            rows = stack.enter_context(opened_rows(self._source, how.subimage, how.layer))
+            emission, mask = (
+                None if file is None else stack.enter_context(opened_rows(file))
+                for file in (how.emission, how.mask)
+            )
+            for name, other in (("emission", emission), ("mask", mask)):
+                if other is not None and other.size != self._size:
+                    raise ValueError(
+                        f"{name}: {other.size[0]} x {other.size[1]} pixels are not the image's "
+                        f"{self._size[0]} x {self._size[1]}"
+                    )
+            for stored in rows.bands():
+                picture = self._decoded(stored, how.colour, notes[0])
+                if self._picture is None:
+                    note_parts(self._source, stored, how.layer)
+                    self._picture = dataclasses.replace(picture, pixels=picture.pixels[:1])
+                yield self._band(picture.pixels, emission, mask, notes)
+        if not self._is_told:
+            self._is_told = True
+            for one in notes:
+                one.tell()
+
+    def _band(
+        self, image: NDArray[Any], emission: Rows | None, mask: Rows | None, notes: list[_Notes]
+    ) -> Band:
+        """Return rows of the image with the next rows of the others."""
+        glow = values = None
+        if emission is not None:
+            picture = self._decoded(emission.take(len(image)), self._how.colour, notes[1])
+            glow = check_emission(alike(picture.pixels, image), image)
+        if mask is not None:
+            read = decoded(mask.take(len(image)), self._how.mask or "", "linear")
+            notes[2].add(read)
+            values = check_mask(grey_mask(read, self._how.mask or ""), image.shape[:2])
+        return Band(image, glow, values)
+
+    def _decoded(self, stored: StoredImage, colour: Colour | None, notes: _Notes) -> Picture:
+        picture = decoded(stored, notes.file, colour, raw=self._how.raw)
+        notes.add(picture)
+        if self._is_blended:
+            picture = premultiplied(picture)
+        if self._half and picture.pixels.dtype == np.float32:
+            picture = dataclasses.replace(picture, pixels=picture.pixels.astype(np.float16))
+        return picture
+
+    def result(self, final: NDArray[Any], settings: vkbloom.Settings) -> Picture:
+        """Return rows of `final` as a picture like that which was read."""
+        assert self._picture is not None
+        if self._is_blended and has_straight(self._picture):
+            final = divided(final)
+        done = self._picture.encoding if settings.encoding == "none" else settings.encoding
+        return dataclasses.replace(self._picture, pixels=final, encoding=done)
 
 
 class _Notes:
     """What is to be said of a picture, of all bands once."""
 
-    def __init__(self, source: str) -> None:
-        self._source = source
+    def __init__(self, file: str) -> None:
+        self.file = file
         self._nan = self._infinite = 0
         self._texts: dict[str, None] = {}
 
@@ -125,10 +240,6 @@ class _Notes:
         self._texts.update(dict.fromkeys(picture.notes))
 
     def tell(self) -> None:
-        if self._nan or self._infinite:
-            note(
-                f"{self._source} has {self._nan} NaN and {self._infinite} infinite values; the "
-                "bloom counts them as 0, and their own pixels keep them"
-            )
+        note_specials(self.file, self._nan, self._infinite)
         for text in self._texts:
-            note(f"{self._source}: {text}")
+            note(f"{self.file}: {text}")

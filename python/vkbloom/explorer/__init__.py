@@ -41,8 +41,8 @@ def explore(
     """Explore a bloom in a notebook, with controls for all settings.
 
     Every change renders a new picture at the size at which it is shown. While a picture is being
-    rendered, only the newest change is kept. A wipe compares the settings with a second one, B.
-    Values under the pointer are those of the framebuffer, not of the picture.
+    rendered, only the newest change is kept. A wipe compares the settings with other settings, B.
+    The values under the pointer are those of the framebuffer, not of the picture.
 
     Parameters
     ----------
@@ -51,18 +51,18 @@ def explore(
         shown is reduced first by averaging, unless the page selects its own size. Default:
         ``Scene.ufo()`` with lights 6 times as bright as white.
     settings : Settings, optional
-        To begin with; by default ``presets["bevy_natural"]`` for an image and
-        ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and ``encoding="srgb"`` if
-        the shading is deferred.
+        The initial settings. Default: ``presets["bevy_natural"]`` for an image and
+        ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and ``encoding="srgb"`` if the
+        shading is deferred.
     mask, emission : ndarray, optional
-        Of an image, as for `Renderer.apply`; they are reduced with it.
+        For an image, as for `Renderer.apply`. They are reduced with the image.
     against : Settings, optional
         The initial settings of B. Default: `settings` without bloom.
     size : (int, int)
-        Width and height of a scene's frame: its aspect, and its size if the page selects that.
-        Not used for an image.
+        Width and height of a scene's frame. They give the aspect ratio, and the size if the page
+        selects the source's own size. Not used for an image.
     shading : {"deferred", "forward"}
-        Shading of a scene to begin with; the page has a control for it.
+        Initial shading of a scene. The page has a control for it.
     renderer : Renderer, optional
         Default: a new renderer, which `Explorer.close` closes.
 

@@ -49,7 +49,7 @@ _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
 # Fields that come first, in addition to the numbers that only this method has.
 _FIRST: Final = ("bloom", "threshold", "intensity", "exposure", "tonemap")
 _STEPS_OF_A_SLIDER: Final = 200
-# How a picture is developed: what stays on the page when another preset or method is chosen.
+# Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
 
@@ -59,12 +59,12 @@ def controls() -> dict[str, Any]:
     Returns
     -------
     dict
-        "methods": by name, the "defaults" and, for each field that has a control, its "name",
-        "kind" ("bool", "number", "choice"), "help", whether it stands "first", and whether it is
-        "optional", which is to say may be None. Numbers have "from", "to" and "step" of their
-        slider, "low" and "high" of what is accepted, and "whole"; choices have "choices".
-        "presets": settings by name, as `Settings.to_dict` gives them. "look": the fields that say
-        how a picture is developed.
+        "methods": for each method its "defaults", and for each field with a control its "name",
+        "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
+        "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
+        range from "low" to "high", and "integer"; choices have "choices". "presets": settings by
+        name, as from `Settings.to_dict`. "look": the fields that keep their values when another
+        preset or method is selected.
     """
     return {
         "methods": {
@@ -121,16 +121,16 @@ def _control(
     start, end = (low, high) if is_narrowed else _SLIDERS.get(field.name, (low, high))
     if not (_takes(kind, field.name, start) and _takes(kind, field.name, end)):
         return None
-    whole = annotation is int
+    integer = annotation is int
     return {
         "kind": "number",
         "optional": optional,
-        "whole": whole,
+        "integer": integer,
         "low": low,
         "high": high,
         "from": start,
         "to": end,
-        "step": 1 if whole else _round_step((end - start) / _STEPS_OF_A_SLIDER),
+        "step": 1 if integer else _round_step((end - start) / _STEPS_OF_A_SLIDER),
     }
 
 
@@ -154,24 +154,24 @@ def _round_step(step: float) -> float:
 
 
 def settings_from(fields: object) -> Settings:
-    """Return the settings that a page asks for.
+    """Return the settings that a page sent.
 
     Parameters
     ----------
     fields : mapping of str to object
-        As `Settings.to_dict` gives them, and JSON keeps them; what is missing is the default.
+        As from `Settings.to_dict`, after JSON. Missing fields have their defaults.
 
     Raises
     ------
     TypeError, ValueError
-        There is no such method or field, or a value is of another type or out of range.
+        There is no such method or field, or a value has another type or is out of range.
     """
     made: Settings = Settings.from_dict(fields)  # type: ignore[arg-type]
     return made
 
 
 def as_code(settings: Settings) -> str:
-    """Return Python that makes some settings, given ``import vkbloom``.
+    """Return Python code that makes the settings, after ``import vkbloom``.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def as_code(settings: Settings) -> str:
     Returns
     -------
     str
-        A preset by its name, where need be with another look, else the method with the fields
+        A preset by its name, with changed fields if needed; otherwise the method with the fields
         that are not the default.
     """
     look = {name: getattr(settings, name) for name in _LOOK}

@@ -1,11 +1,11 @@
-// The explorer's page: a picture, and the controls that change it. `mount` puts it into an element;
-// a notebook's widget (the default export) and the page on its own (start.js) differ in what
-// carries the messages, and in that the page has its state in its address.
-// vkbloom/explorer/viewer.py says what the messages are.
+// The explorer's page: a picture, and the controls that change it. `mount` puts it into an element.
+// It is used by a notebook's widget (the default export) and by the stand-alone page (start.js).
+// They differ in how messages are sent, and only the stand-alone page stores its state in its
+// address. vkbloom/explorer/viewer.py documents the messages.
 
 const TURNS_PER_SECOND = 0.25; // of the forward system's animation
-const HIGHEST = 0.72; // of the window, that a picture takes
-const HIGHEST_NARROW = 0.45; // of a window where the controls are below the picture
+const HIGHEST = 0.72; // the largest part of the window's height for the picture
+const HIGHEST_NARROW = 0.45; // the same if the controls are below the picture
 const NARROW = 720; // CSS pixels, as in page.css
 const LARGEST_ZOOM = 64; // device pixels of a framebuffer's pixel
 const SIDES = ["a", "b"];
@@ -51,7 +51,7 @@ function control(field, changed) {
     type: "number",
     min: field.low,
     max: field.high,
-    step: field.whole ? 1 : "any",
+    step: field.integer ? 1 : "any",
     ariaLabel: `${field.name}, as a number`,
   });
   slider.addEventListener("input", () => {
@@ -86,7 +86,7 @@ async function copy(text) {
   try {
     await navigator.clipboard.writeText(text);
   } catch {
-    // Pages that are neither local nor encrypted have no clipboard but this.
+    // Pages that are neither local nor encrypted have no other clipboard function.
     const area = make("textarea", { value: text });
     document.body.append(area);
     area.select();
@@ -98,26 +98,26 @@ async function copy(text) {
 function download(blob, name) {
   const link = make("a", { href: URL.createObjectURL(blob), download: name });
   link.click();
-  // The browser needs the address until the download has begun.
+  // The browser needs the address until the download starts.
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-// `send(message, files)` carries a message, with the contents of files. `store` keeps the page's
-// state: `read()` gives an object or null, `write(object)` keeps one, `watch(listener)` tells when
-// the user puts another in its place. `heading` is the tag of the title.
+// `send(message, files)` sends a message with the contents of files. `store` keeps the page's
+// state: `read()` returns an object or null, `write(object)` stores one, and `watch(listener)`
+// reports changes by the user. `heading` is the tag of the title.
 export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   const view = Math.random().toString(36).slice(2);
   const root = make("div", { className: "vkbloom" });
   const layout = make("div", { className: "vkb-layout" });
   root.append(layout);
-  root.dataset.lmSuppressShortcuts = "true"; // JupyterLab's: letters are for the inputs here
-  // An element of a notebook may else be as narrow as what it holds, which adapts to it.
+  root.dataset.lmSuppressShortcuts = "true"; // no JupyterLab shortcuts for letters in these inputs
+  // Otherwise the element of a notebook may shrink with its content, which adapts to its width.
   parent.style.width = "100%";
   parent.append(root);
 
   let setup; // the answer to "setup": controls, presets, source
   const settings = {}; // by side
-  const shown = {}; // by side: picture, and what the answer says of it
+  const shown = {}; // by side: the picture, and the data in its answer
   const errors = {};
   let editing = "a";
   let comparing = false;
@@ -130,20 +130,20 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   let shading = null; // of a scene
   let glow = null;
   let zoom = 1; // 1: the picture fits
-  let centre = [0.5, 0.5]; // of what is seen of the picture, 0..1 across and down
-  let pointer = null; // its place, 0..1 across and down
+  let centre = [0.5, 0.5]; // of the visible part of the picture, 0..1 from left and top
+  let pointer = null; // its position, 0..1 from left and top
 
   let drawn = 0;
   let asked = 0;
-  let waiting = 0; // the id of the frame that is under way, 0: none
-  const sent = new Map(); // id to when, and where the pointer was
+  let waiting = 0; // the id of the requested frame, 0: none
+  const sent = new Map(); // by id: the time, and the position of the pointer
   const outdated = new Set();
   let probing = false;
   let probeAgain = false;
-  let box = [0, 0]; // what the picture may take, in CSS pixels
-  let nextZoom = null; // what is done when the picture of another size is there
+  let box = [0, 0]; // the space for the picture, in CSS pixels
+  let nextZoom = null; // called when the picture with another size has arrived
 
-  // The parts that stay; what depends on the setup is filled in by `build`.
+  // The constant parts. `build` adds those that depend on the setup.
   const canvas = make("canvas", { width: 1, height: 1, role: "img", ariaLabel: "picture" });
   const divider = make("div", {
     className: "vkb-divider",
@@ -220,8 +220,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     flush();
   }
 
-  // One frame is under way at a time. What changes meanwhile is asked for when it has come, in the
-  // state that it then has: the newest wins, and nothing queues.
+  // One frame is requested at a time. Changes in between are requested together when it has
+  // arrived, so that there is no queue.
   function flush() {
     const sides = visible().filter((side) => outdated.has(side));
     if (waiting || !sides.length || !setup || !box[0]) return;
@@ -282,7 +282,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       flush();
       await showFrame(message, buffers);
     } else {
-      // Of a frame that is under way, or of a file.
+      // The error of a requested frame, or of a file.
       if (message.id) waiting = 0;
       probing = false;
       pause();
@@ -303,7 +303,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     );
     const began = sent.get(message.id);
     sent.delete(message.id);
-    // Pictures may be decoded in another order than they came.
+    // Pictures may be decoded in another order than they arrived.
     if (message.id < drawn) return;
     drawn = message.id;
     sides.forEach(([side, facts], index) => {
@@ -316,7 +316,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     nextZoom?.();
     nextZoom = null;
     showFacts(performance.now() - began.when, began.framebuffer);
-    // The values that came with it are of where the pointer was.
+    // Its values are those at the position of the pointer at the time of the request.
     if (pointer !== began.pointer) probe();
     root.dispatchEvent(new CustomEvent("vkbloom:drawn", { detail: { id: message.id } }));
   }
@@ -346,14 +346,14 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   const ratioOf = () => window.devicePixelRatio || 1;
   const fitting = () => Math.min(box[0] / canvas.width, box[1] / canvas.height);
 
-  // Framebuffers keep their own aspect within the box, enlarged ones show their pixels.
+  // Framebuffers keep their aspect ratio in the box. Enlarged ones show their pixels.
   function place() {
     stage.style.width = `${box[0]}px`;
     stage.style.height = `${box[1]}px`;
     if (!shown.a) return;
     const scale = fitting() * zoom;
     const sides = [canvas.width * scale, canvas.height * scale];
-    // A picture that is larger than the box leaves none of it empty, a smaller one is in the middle.
+    // A picture that is larger than the box covers it completely. A smaller one is centred.
     const corner = sides.map((side, axis) => {
       if (side <= box[axis]) {
         centre[axis] = 0.5;
@@ -376,7 +376,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     zoomed.textContent = `${percent >= 10 ? percent.toFixed(0) : percent.toPrecision(2)} %`;
   }
 
-  // Show a part of the picture, so that a place of it (0..1) stays where it is on the screen.
+  // Show a part of the picture, such that a position in it (0..1) keeps its position on the screen.
   function zoomTo(next, at = centre) {
     const whole = 1 / ratioOf() / fitting(); // the zoom of 100 %
     const before = zoom;
@@ -397,8 +397,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
           ...a.names.map((name) => make("option", { value: name, textContent: name })),
         );
       }
-      // The settings may not have the framebuffer that was looked at. Another may have been chosen
-      // since this one was asked for.
+      // The settings may not have the selected framebuffer. Another one may have been selected
+      // since the request.
       if (wanted === framebuffer) framebuffer = a.framebuffer;
       frameSelect.value = framebuffer;
       canvas.ariaLabel = `picture: ${a.framebuffer}, ${a.size[0]} × ${a.size[1]}`;
@@ -442,7 +442,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       clamp((event.clientY - area.top) / area.height, 0, 1),
     ];
   }
-  const held = new Map(); // pointers that are down on the picture, by id: the latest event
+  const held = new Map(); // by id of a pointer that is pressed on the picture: its latest event
   const distance = () => {
     const [one, other] = [...held.values()];
     return Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
@@ -478,7 +478,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   stage.addEventListener(
     "wheel",
     (event) => {
-      // In a notebook, the wheel alone is for the notebook.
+      // In a notebook, the wheel without a key scrolls the notebook.
       if (!store && !event.ctrlKey) return;
       event.preventDefault();
       zoomTo(zoom * 2 ** (-clamp(event.deltaY, -120, 120) / 240), placeOf(event));
@@ -536,7 +536,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     }
   }
 
-  // The server says what is wrong with values; here the method alone must be known.
+  // The server checks the values. Only the method must be known here.
   async function readSettings(file) {
     const read = JSON.parse(await file.text());
     const method = setup.methods[read?.method];
@@ -544,7 +544,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     return { ...method.defaults, ...read };
   }
 
-  // Another source is looked at. A scene's settings do not stay with an image.
+  // The source is another one. A scene's settings are not kept for an image.
   function opened(source) {
     Object.assign(setup, source);
     for (const side of SIDES) settings[side] = setup.sides[side];
@@ -575,7 +575,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   // --- state ----------------------------------------------------------------------------------
 
-  // What differs from how the page begins, so that an address stays short.
+  // The differences from the initial state, so that the address is short.
   function state() {
     const kept = {};
     for (const side of SIDES) {
@@ -611,7 +611,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   const numberOf = (value, otherwise) => (Number.isFinite(value) ? value : otherwise);
 
-  // An address may be of anyone's making: what makes no sense in it is as if it were not there.
+  // An address may contain anything. Invalid parts are ignored.
   function restore(kept) {
     kept ??= {};
     for (const side of SIDES) {
@@ -698,7 +698,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     measure();
   }
 
-  // The controls of the picture, as the source has them.
+  // The controls of the picture, which depend on the source.
   function buildBar() {
     const sizeSelect = choose(
       [
@@ -707,7 +707,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       ],
       () => {
         ownSize = sizeSelect.value === "own";
-        // Its own size is that: a pixel of the screen for each of the picture.
+        // The source's own size: one screen pixel for each pixel of the picture.
         nextZoom = ownSize ? showPixels : showWhole;
         request(...visible());
       },
@@ -738,7 +738,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     if (setup.glow !== null) bar.append(...sceneControls());
   }
 
-  // What a scene is drawn with: the glow mesh's brightness is that of deferred shading.
+  // The controls of a scene. The glow mesh's brightness has an effect only in deferred shading.
   function sceneControls() {
     const field = { name: "glow", kind: "number", from: 0, to: 24, step: 0.5, low: 0, high: 1e4 };
     const [parts, show, slider] = control(field, (value) => {
@@ -766,7 +766,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     presetSelect = choose([["", "preset …"], ...plainly(Object.keys(setup.presets))], () => {
       const preset = setup.presets[presetSelect.value];
       if (!preset) return;
-      // The picture is developed as before, but bloom that was chosen is seen.
+      // Keeps the fields that change only the look, but enables the bloom.
       const { defaults } = setup.methods[preset.method];
       const look = setup.look.filter((name) => name !== "bloom" && preset[name] === defaults[name]);
       use({ ...preset, ...Object.fromEntries(look.map((name) => [name, settings[editing][name]])) });
@@ -864,7 +864,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       Math.max(1, side),
     );
     if (room[0] < 1 || (next[0] === box[0] && next[1] === box[1])) return;
-    // What is not fitted keeps its size on the screen.
+    // A zoomed picture keeps its size on the screen.
     const kept = zoom === 1 || !shown.a ? 0 : zoom * fitting();
     box = next;
     if (kept) zoom = kept / fitting();

@@ -1,9 +1,9 @@
-"""The page on a server of its own, for this machine's user alone.
+"""A server that serves the page only to this machine's user.
 
-It listens on 127.0.0.1. That keeps other machines out, but neither other users of this machine nor
-other sites in the user's own browser, so that every address has a token in it that nobody can
-guess, requests must name the server as their host (a foreign name that points here does not), and
-the socket must be opened by the page itself.
+It listens on 127.0.0.1, which excludes other machines, but not other users of this machine or other
+sites in the user's browser. So every address contains a token that cannot be guessed, requests must
+name the server as their host (which excludes foreign names that point here), and only the page
+itself can open the socket.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ _TYPES: Final = {
     "start.js": ("start.js", "text/javascript; charset=utf-8"),
     "page.css": ("page.css", "text/css; charset=utf-8"),
 }
-# Nothing from elsewhere is loaded, and nobody frames the page.
+# Nothing is loaded from other sites, and no site can frame the page.
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-# A page's messages are settings, as text: longer ones are no page's. Files come as bytes.
+# The longest text message in bytes. Settings are shorter. Files are sent as binary messages.
 _LARGEST_MESSAGE: Final = 1 << 16
 _LARGEST_FILE: Final = 1 << 30
 
@@ -52,23 +52,23 @@ class Server:
     Parameters
     ----------
     new_viewer : callable
-        Makes the viewer of each page that is opened. They may share a renderer.
+        Makes a viewer for each page that is opened. Viewers may share a renderer.
     port : int, default 0
-        To listen on; 0: any that is free.
+        The port to listen on; 0: any free port.
 
     Attributes
     ----------
     url : str
-        Of the page.
+        The address of the page.
 
     Raises
     ------
     OSError
-        The port is taken.
+        The port is in use.
 
     Notes
     -----
-    To be made and used in a running event loop.
+    Create and use it in a running event loop.
     """
 
     def __init__(self, new_viewer: Callable[[], Viewer], port: int = 0) -> None:
@@ -114,7 +114,7 @@ class Server:
 
 
 class _File(RequestHandler):
-    """The page and what it is made of."""
+    """The files of the page."""
 
     def initialize(self, server: Server) -> None:
         self._server = server
@@ -138,7 +138,7 @@ class _File(RequestHandler):
 
 
 class _Socket(WebSocketHandler):
-    """One page: its newest message is answered, older ones that still wait are dropped."""
+    """The socket of one page. Its newest message is answered; older waiting ones are dropped."""
 
     def initialize(
         self, server: Server, new_viewer: Callable[[], Viewer], worker: ThreadPoolExecutor
@@ -154,13 +154,13 @@ class _Socket(WebSocketHandler):
         return self._server.is_origin(origin)
 
     def prepare(self) -> None:
-        # A browser always names the origin of who opens a socket; tornado lets those without pass.
+        # A browser always sends the origin. Tornado accepts sockets without one.
         token, origin = self.path_args[0], self.request.headers.get("Origin", "")
         if not (self._server.allows(self.request, token) and self.check_origin(origin)):
             raise HTTPError(403)
 
     def open(self, *arguments: str) -> None:
-        # Pictures are small messages that somebody waits for.
+        # Pictures are small messages, which must not be delayed.
         self.set_nodelay(True)
         self._viewer = self._new_viewer()
 
@@ -181,10 +181,10 @@ class _Socket(WebSocketHandler):
         older = self._waiting.get(kind, {}).get("sides")
         newer = newest.get("sides")
         if isinstance(older, dict) and isinstance(newer, dict):
-            # A side that the newest leaves out has still not been shown.
+            # A side that is missing in the newest message still has to be shown.
             newest["sides"] = older | newer
         self._waiting[kind] = newest
-        # Not awaited here, where the next message would not be read until the answer is sent.
+        # Not awaited here, so that the next message is read before the answer is sent.
         if self._answers is None or self._answers.done():
             self._answers = asyncio.ensure_future(self._answer())
 
@@ -203,7 +203,7 @@ class _Socket(WebSocketHandler):
         except WebSocketClosedError:
             self._waiting.clear()
         except Exception:
-            # Not one of those that a viewer answers with: the page shall not wait for ever.
+            # An error that the viewer does not answer. Closing the socket ends the page's wait.
             self.close(1011, "the server failed")
             raise
 
@@ -212,7 +212,7 @@ class _Socket(WebSocketHandler):
 
 
 def _unpacked(message: bytes) -> tuple[bytes, list[bytes]]:
-    """Return the header and the file of a message as `_packed` makes them."""
+    """Return the header and the file of a message from `_packed`."""
     (length,) = struct.unpack_from("<I", message)
     if length > _LARGEST_MESSAGE:
         raise ValueError(f"message: its header has {length} bytes")

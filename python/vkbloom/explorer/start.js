@@ -1,4 +1,4 @@
-// The page on its own: its messages go through a socket of the server that it came from.
+// The stand-alone page: its messages go through a socket to its server.
 
 import { mount } from "./page.js";
 
@@ -20,7 +20,7 @@ function unpack(data) {
   return [message, buffers];
 }
 
-// As the server packs its own messages: the header's length, the header, the file.
+// The server's message format: the header's length, the header, the file.
 function pack(message, [file]) {
   const header = new TextEncoder().encode(JSON.stringify(message));
   const packed = new Uint8Array(4 + header.length + file.length);
@@ -30,7 +30,7 @@ function pack(message, [file]) {
   return packed;
 }
 
-// The page's state is the fragment of its address, which is not sent to the server.
+// The page's state is in the fragment of its address, which is not sent to the server.
 const store = {
   read() {
     try {

@@ -47,8 +47,8 @@ if TYPE_CHECKING:
 __all__ = ["GLOW", "SIDES", "Viewer"]
 
 SIDES: Final = ("a", "b")
-#: Of the scene that is shown where none is given: its lights are so bright that the blooms of all
-#: presets are told apart.
+#: The glow's intensity in the default scene: bright enough to show the differences between the
+#: presets' blooms.
 GLOW: Final = 6.0
 
 _LARGEST_SIDE: Final = 8192
@@ -56,7 +56,7 @@ _LARGEST_SIDE: Final = 8192
 _VIEWS_KEPT: Final = 8
 _FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError)
 _LARGEST_GLOW: Final = 1e4
-# A deferred scene is light above white, which a screen shows by a tone map.
+# A deferred scene has light above white, which needs a tone map.
 _DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
 
 Answer = tuple[dict[str, Any], list[bytes]]
@@ -77,12 +77,12 @@ class Viewer:
     settings : dict of str to Settings
         Of the sides "a" and "b".
     frames : dict of str to Frames
-        The latest of each side that was shown.
+        The latest ones of each side.
 
     Raises
     ------
     TypeError, ValueError
-        As `vkbloom.explore`.
+        As for `vkbloom.explore`.
     """
 
     def __init__(
@@ -124,12 +124,12 @@ class Viewer:
         self._shown: dict[object, dict[str, NDArray[Any]]] = {}
 
     def close(self) -> None:
-        """Close the renderer, unless the caller passed it; may be called twice."""
+        """Close the renderer, unless the caller passed it. May be called twice."""
         if self._owned:
             self.renderer.close()
 
     def _begin(self, settings: Settings | None) -> None:
-        """Set A to settings or the source's own, and B to the same without bloom."""
+        """Set A to the settings or to the source's default, and B to the same without bloom."""
         if settings is None:
             settings = presets["bevy_natural" if self._scene is None else "tutorial"]
             if self._scene is not None and self._shading == "deferred":
@@ -149,21 +149,21 @@ class Viewer:
         if emission is not None:
             given["emission"] = np.array(check_emission(emission, image), order="C")
         if mask is not None:
-            # One channel, since what is reduced has channels.
+            # With a channel axis, as `reduced` requires.
             given["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
         self._scene, self._image = None, given
         self._own_size = (image.shape[1], image.shape[0])
         self._reduced = (self._own_size, self._image)
 
     def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
-        """Return what a message asks for.
+        """Return the answer to a message.
 
         Parameters
         ----------
         message : mapping of str to object
             See the table above.
         files : sequence of bytes
-            Content of the file that the message is about.
+            Content of the file that belongs to the message.
 
         Returns
         -------
@@ -191,7 +191,7 @@ class Viewer:
         return {**controls(), **self._source(), "adapter": self.renderer.info.summary}, []
 
     def _source(self) -> dict[str, Any]:
-        """Return what is looked at, and the settings to begin with."""
+        """Return a description of the source, and the initial settings."""
         scene = self._scene
         return {
             "sides": {side: settings.to_dict() for side, settings in self.settings.items()},
@@ -204,14 +204,14 @@ class Viewer:
         }
 
     def _open(self, message: Mapping[str, Any], files: Sequence[bytes]) -> Answer:
-        """Look at an image file from now on."""
+        """Replace the source by an image file."""
         from vkbloom.io.array_files import read  # noqa: PLC0415  needs OpenImageIO
 
         name = PurePath(str(message.get("name", ""))).name
         if len(files) != 1:
             raise ValueError("open: the content of one file is needed")
         with tempfile.TemporaryDirectory() as folder:
-            # Of a name, which may be anything, the extension tells the format.
+            # The file name may be anything. Only its extension is used, for the format.
             path = Path(folder, f"image{PurePath(name).suffix[:8]}")
             path.write_bytes(files[0])
             try:
@@ -223,7 +223,7 @@ class Viewer:
         self._name = name
         self._shown.clear()
         if was_scene:
-            # A scene's settings turn a photograph white.
+            # With a scene's settings a photograph would be white.
             self._begin(None)
         return self._source(), []
 
@@ -288,7 +288,7 @@ class Viewer:
         return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
 
     def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float]:
-        """Return time, shading and glow as a message has them; what it leaves out stays."""
+        """Return the time, shading and glow of a message; missing ones stay as they are."""
         own = 1.0 if self._scene is None else self._scene.glow_intensity
         time = check_number("time", message.get("time", 0.0), -1e9, 1e9)
         shading, glow = message.get("shading"), message.get("glow")
@@ -301,14 +301,14 @@ class Viewer:
     def _render(
         self, settings: Settings, size: tuple[int, int], message: Mapping[str, Any]
     ) -> tuple[Frames, list[str]]:
-        """Return the framebuffer that is named, or `final` if there is none, and all names."""
+        """Return the named framebuffer (`final` if there is none of this name), and all names."""
         name = message.get("framebuffer", "final")
         time, self._shading, glow = self._looked_at(message)
         if self._scene is None:
             given: dict[str, Any] = dict(self._image_of(size))
             image = given.pop("image")
             if "mask" in given:
-                # Averages of 0 to 1 can be beyond it by a rounding.
+                # Rounding may move averages of 0..1 out of this range.
                 given["mask"] = given["mask"][..., 0].clip(0, 1)
             names = list(self.renderer.plan(image, settings).outputs)
             chosen = str(name) if name in names else "final"

@@ -20,7 +20,7 @@ _FILES: Final = resources.files("vkbloom.explorer")
 
 
 class Explorer(anywidget.AnyWidget):
-    """What `vkbloom.explore` returns: shown by the notebook, read and set by code.
+    """The widget that `vkbloom.explore` returns. Code can read and set its settings.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Explorer(anywidget.AnyWidget):
     Attributes
     ----------
     settings, against : Settings
-        Of A and of B, as they are on the page; setting them changes the page.
+        The settings of A and B on the page. Setting them changes the page.
     frames : Frames or None
         The framebuffer of A that was shown last.
     """
@@ -74,6 +74,6 @@ class Explorer(anywidget.AnyWidget):
         return self._viewer.frames.get("a")
 
     def close(self) -> None:
-        """Remove the page from the notebook, and close the renderer unless it was given."""
+        """Remove the page from the notebook, and close the renderer unless the caller passed it."""
         super().close()
         self._viewer.close()

@@ -39,7 +39,7 @@ class Axis:
         The values as the settings store them; floats for "time", labels for "image", names for
         "preset", Settings for "settings".
     kind : {"settings", "time", "image", "preset"}
-        "preset" is the kind of the axis "settings", too: its values are settings of any methods.
+        The axis "settings" also has the kind "preset": its values are settings of any methods.
     unit : str
         "1" for a number without a unit.
     description : str
@@ -59,7 +59,7 @@ class Axis:
         """Attributes of the coordinate."""
         described = {"long_name": self.name, "units": self.unit, "description": self.description}
         if self.name == "preset":
-            # What the names meant when the grid was rendered.
+            # The settings of these names at the time of rendering.
             found = {name: presets[name].to_dict() for name in self.values}
             described["settings"] = json.dumps(found)
         return {name: text for name, text in described.items() if text}

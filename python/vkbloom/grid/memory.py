@@ -42,7 +42,7 @@ def chunk_of(grid: Grid, layout: Layout) -> tuple[int, ...]:
 
 
 def check_fits(grid: Grid, variables: Mapping[str, Variable]) -> None:
-    """Raise MemoryError for a grid that is larger than the memory that is left."""
+    """Raise MemoryError for a grid that does not fit into the free memory."""
     points = math.prod(grid.shape)
     size = points * sum(variable.size for variable in variables.values())
     left = _memory_left()
@@ -59,7 +59,7 @@ def _gigabytes(size: int) -> str:
 
 
 def _memory_left() -> int | None:
-    """Return the bytes that this process may still get; None where that is not known."""
+    """Return the bytes that this process can still allocate; None if this is not known."""
     left = []
     try:
         for line in Path("/proc/meminfo").read_text("ascii").splitlines():
@@ -69,7 +69,7 @@ def _memory_left() -> int | None:
         if "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ()):
             left.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     try:
-        # Of a container.
+        # The limits of a container.
         most, used = (
             int(Path(f"/sys/fs/cgroup/memory.{name}").read_text("ascii"))
             for name in ("max", "current")

@@ -153,12 +153,12 @@ def walk(shape: Index, *, backwards: bool) -> Iterator[tuple[int | None, Index]]
     shape : tuple of int
         Number of values by axis.
     backwards : bool
-        From the last values on, else from the first.
+        Whether to start from the last values instead of the first.
 
     Yields
     ------
     (int or None, tuple of int)
-        The axis of the step, None for the corner; and the place along each axis.
+        The axis of the step (None for the corner), and the index along each axis.
     """
     index = [count - 1 if backwards else 0 for count in shape]
     yield None, tuple(index)
@@ -169,13 +169,13 @@ def walk(shape: Index, *, backwards: bool) -> Iterator[tuple[int | None, Index]]
 
 
 def ranking_of(costs: Sequence[int], later: Sequence[bool]) -> tuple[int, ...]:
-    """Return the axes from the one with the highest costs a step to the one with the lowest.
+    """Return the axes from the highest cost of a step to the lowest.
 
     Parameters
     ----------
     costs : sequence of int
         By axis.
     later : sequence of bool
-        Of axes that cost the same, these come after the others.
+        By axis: among axes with equal costs, these come last.
     """
     return tuple(sorted(range(len(costs)), key=lambda axis: (-costs[axis], later[axis])))

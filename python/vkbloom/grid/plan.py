@@ -28,7 +28,7 @@ __all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out"]
 
 Reduce = Mapping[str, Callable[[Frames], Any]]
 
-#: The variants in which each pass runs by itself.
+#: The variants without fused passes.
 UNFUSED: Final = "fragment"
 
 _CHANNELS: Final = ("r", "g", "b", "a")
@@ -42,7 +42,7 @@ class Grid:
     ----------
     source : Source
     settings : Settings
-        The settings that the axes vary, unless one of them has them all.
+        The settings that the axes change, unless an axis has the settings.
     axes : tuple of Axis
         The axes, in the order of the result's dimensions.
     attachments : "all" or tuple of str
@@ -93,7 +93,7 @@ class Grid:
 
     @property
     def remaining_settings(self) -> dict[str, Any]:
-        """The settings that no axis varies, and the method; none where an axis has them all."""
+        """The settings that no axis changes, and the method; empty if an axis has the settings."""
         if any(axis.kind == "preset" for axis in self.axes):
             return {}
         varied = {axis.name for axis in self.axes}
@@ -192,7 +192,7 @@ def ask(
     Raises
     ------
     TypeError, ValueError
-        One of them is wrong.
+        An argument is wrong.
     """
     if settings is not None:
         settings = check_settings(settings)
@@ -222,7 +222,7 @@ def lay_out(
     renderer: FrameRenderer,
     check: Callable[[Mapping[str, Variable]], object] = lambda variables: None,
 ) -> Layout:
-    """Ask a renderer for all that has to be known of a grid before its points are rendered.
+    """Determine the layout of a grid on a renderer before its points are rendered.
 
     Parameters
     ----------
@@ -275,10 +275,10 @@ def lay_out(
 def ranking(grid: Grid) -> tuple[int, ...]:
     """Return the axes from the one whose steps run the most passes to the one with the fewest.
 
-    Visiting one step at a time, the sum of all passes is least when the axis with the more passes
-    a step is always the slower one, whatever the numbers of values: of two neighbours a, b with
-    n_a, n_b values and c_a, c_b passes a step, a outside costs c_a (n_a - 1) + n_a c_b (n_b - 1),
-    and that is less than the other way round just where c_a > c_b.
+    The sum of all passes is smallest if axes with more passes for a step are slower, whatever their
+    numbers of values. Proof: let two adjacent axes a, b have n_a, n_b values and c_a, c_b passes
+    for a step. With a as the slower one, the cost is c_a (n_a - 1) + n_a c_b (n_b - 1). This is
+    less than for the other order exactly if c_a > c_b.
 
     Parameters
     ----------
@@ -287,12 +287,12 @@ def ranking(grid: Grid) -> tuple[int, ...]:
     Returns
     -------
     tuple of int
-        Of axes that cost the same, images and times come first, then the order given.
+        Among axes with equal costs, images and times come first, then the given order.
     """
     costs = [0] * len(grid.axes)
     if sum(len(axis) > 1 for axis in grid.axes) > 1:
-        # From both corners: from one of them an axis may be without effect, such as a blur's while
-        # the bloom is off.
+        # From both corners, since an axis may have no effect at one of them, such as a field of the
+        # blur while the bloom is off.
         for backwards in (False, True):
             steps = list(walk(grid.shape, backwards=backwards))
             names = _core.dry_run(_planned(grid, [index for _, index in steps]))
@@ -313,7 +313,7 @@ def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.P
 
 
 class PassCounter:
-    """Counts what the points of a grid would cost alone.
+    """Counts the passes of a grid's points if each were rendered alone.
 
     Parameters
     ----------
@@ -329,9 +329,9 @@ class PassCounter:
         self._known: dict[Index, int] = {}
 
     def alone(self, index: Index) -> int:
-        """Return the passes of a point that nothing was rendered before.
+        """Return the number of passes of a point on a new renderer.
 
-        As `Frames.timings` counts them where no fused pass stands for several.
+        As in `Frames.timings`, without fused passes.
         """
         key = tuple(index[number] for number in self._structural)
         if key not in self._known:
@@ -342,7 +342,7 @@ class PassCounter:
 def _graph_of(
     grid: Grid, renderer: FrameRenderer, index: Index
 ) -> tuple[Mapping[str, Framebuffer], int]:
-    """Return the framebuffers of a point, and its passes alone."""
+    """Return the framebuffers and the passes of a point that is rendered alone."""
     point = grid.point(index)
     found = grid.source.plan(renderer, point.settings, point.place).outputs
     wanted = grid.wanted
@@ -355,10 +355,10 @@ def _graph_of(
 def _survey(
     grid: Grid, renderer: FrameRenderer
 ) -> tuple[Mapping[str, Framebuffer], tuple[int, ...]]:
-    """Return the framebuffers to keep, and the axes that change what there is.
+    """Return the framebuffers to keep, and the axes that change the set of framebuffers or passes.
 
-    Every value of every axis is looked at from the first and from the last corner of the grid, and
-    then every combination along the axes that change anything. Nothing is rendered.
+    Plans every value of every axis from the first and from the last corner of the grid, then every
+    combination along the axes that change something. Nothing is rendered.
     """
     first = tuple(0 for _ in grid.axes)
     structural: set[int] = set()
@@ -391,9 +391,9 @@ def _survey(
 
 
 def _common(one: Framebuffer | None, other: Framebuffer | None) -> Framebuffer | None:
-    """Return what holds both framebuffers: floats of the larger dtype; None: nothing does.
+    """Return a framebuffer that can hold both: floats of the larger dtype; None if there is none.
 
-    A level of uint8 is another value than the same number as a float.
+    uint8 and floats have no common one, since a level is not the same value as a float.
     """
     if one is None or other is None or one[0] != other[0]:
         return None
@@ -427,7 +427,7 @@ def _frame_variables(
 ) -> dict[str, Variable]:
     if not framebuffers:
         return {}
-    # Of their arrays only the shapes count, and untouched memory costs nothing.
+    # Only the shapes are used. Memory that is never touched costs nothing.
     shapes = {name: np.empty(shape, dtype) for name, (shape, dtype) in framebuffers.items()}
     dims = dimensions(shapes)
     lead = leading(shapes)

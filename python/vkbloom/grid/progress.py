@@ -32,8 +32,8 @@ class Progress:
     done : int
         Number of points that were done before.
     shown : bool or None
-        True: in a terminal or a notebook, silent elsewhere. None: the same, if tqdm is installed.
-        False: silent.
+        True: shown in a terminal or a notebook, but not elsewhere. None: the same if tqdm is
+        installed. False: not shown.
     """
 
     def __init__(self, total: int, done: int = 0, *, shown: bool | None = None) -> None:

@@ -46,7 +46,7 @@ class Point:
 class FrameRenderer(Protocol):
     """The part of a `Renderer` that grids use.
 
-    A renderer imports the grids for `Renderer.grid`, so that they do not import it.
+    A protocol, because the renderer's module imports the grids.
     """
 
     @property
@@ -68,7 +68,7 @@ class FrameRenderer(Protocol):
         *,
         shading: Shading = "forward",
     ) -> Plan:
-        """Tell what a call would do, without rendering anything."""
+        """Return what a call would do, without rendering."""
 
 
 def visit(
@@ -104,10 +104,10 @@ def visit(
 
 
 class ImageSource:
-    """One image or several of one shape."""
+    """One image, or several images of the same shape."""
 
     has_time = False
-    #: Of points where no axis gives another.
+    #: The place of points without an image axis.
     place = 0.0
 
     def __init__(
@@ -115,7 +115,7 @@ class ImageSource:
     ) -> None:
         self.images = tuple(images)
         self.labels = labels
-        #: Images that a renderer's device has, by place, the latest last.
+        #: Images on a renderer's device by place, the latest last.
         self._uploaded: tuple[_core.Renderer | None, dict[int, _core.Source]] = None, {}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -123,7 +123,7 @@ class ImageSource:
         return type(self), (self.images, self.labels)
 
     def on(self, renderer: FrameRenderer, place: float) -> _core.Source:
-        """Return an image on a renderer's device, where the latest stay."""
+        """Return an image on a renderer's device. The latest images are kept there."""
         image = self.images[int(place)]
         if isinstance(image, Image):
             return image_source(image)
@@ -136,16 +136,16 @@ class ImageSource:
         return held[int(place)]
 
     def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
-        """Tell what would be made of an image, without rendering."""
+        """Return the plan of an image."""
         return renderer.plan(self.images[int(place)], settings)
 
     def for_core(self, place: float) -> _core.Source:
-        """Return an image as the core takes it."""
+        """Return the core's Source of an image."""
         return image_source(self.images[int(place)])
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
-        """What identifies the source: shapes, dtypes and digests."""
+        """The identity of the source: shapes, dtypes and digests."""
         return {
             "kind": "image",
             "images": [
@@ -175,23 +175,23 @@ class SceneSource:
         return type(self), (self.scene, self.size, self.shading, self.place)
 
     def on(self, renderer: FrameRenderer, place: float) -> _core.Source:
-        """Return the scene at a time; what the device has of it stays there by itself."""
+        """Return the scene at a time. The renderer keeps its data on the device."""
         # One object for each time, so that requests of the same time share submissions.
         if self._latest is None or self._latest[0] != place:
             self._latest = place, self.for_core(place)
         return self._latest[1]
 
     def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
-        """Tell what would be made of the scene, without rendering."""
+        """Return the plan of the scene."""
         return renderer.plan(self.scene, settings, self.size, shading=self.shading)
 
     def for_core(self, place: float) -> _core.Source:
-        """Return the scene at a time as the core takes it."""
+        """Return the core's Source of the scene at a time."""
         return scene_source(self.scene, self.size, self.shading, place)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
-        """What identifies the source: size, shading, time and a digest of the scene."""
+        """The identity of the source: size, shading, time and a digest of the scene."""
         return {
             "kind": "scene",
             "sha256": digest(self.scene),

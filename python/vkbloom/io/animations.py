@@ -1,4 +1,4 @@
-"""Animations: the frames of a scene in one GIF."""
+"""Animations: many frames in one GIF."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ __all__ = ["animation"]
 
 @contextmanager
 def animation(file: Path, rate: int) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """Give a function that adds a frame to a GIF, which is there when all are.
+    """Yield a function that adds a frame to a GIF.
 
     Parameters
     ----------
     file : Path
-        Its extension is .gif. An existing file is replaced when the new one is complete.
+        Its extension is .gif. It is created or replaced when all frames are written.
     rate : int
-        Frames a second. A GIF has whole hundredths of a second for each frame.
+        Frames per second. A GIF rounds the time of each frame to hundredths of a second.
 
     Raises
     ------
@@ -37,17 +37,11 @@ def animation(file: Path, rate: int) -> Iterator[Callable[[NDArray[Any]], None]]
         OpenImageIO is missing.
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
-    temporary = safe_writing.reserve(file, 0)
-    writer = oiio.ImageOutput.create(str(temporary))
-    first: tuple[int, ...] | None = None
-
-    def check(done: bool) -> None:
-        if not done:
-            raise safe_writing.write_error(writer, temporary, file)
+    shape: tuple[int, ...] | None = None
 
     def add(array: NDArray[Any]) -> None:
-        nonlocal first
-        if array.dtype != np.uint8 or array.ndim != 3 or array.shape != (first or array.shape):
+        nonlocal shape
+        if array.dtype != np.uint8 or array.ndim != 3 or array.shape != (shape or array.shape):
             raise ValueError(
                 f"{file}: {array.dtype} of shape {array.shape} is no frame of an animation; name "
                 "a framebuffer of uint8"
@@ -56,16 +50,9 @@ def animation(file: Path, rate: int) -> Iterator[Callable[[NDArray[Any]], None]]
         spec = oiio.ImageSpec(width, height, channels, "uint8")
         spec.attribute("FramesPerSecond", oiio.TypeRational, (rate, 1))
         name = str(temporary)
-        check(writer.open(name, spec, "AppendSubimage") if first else writer.open(name, spec))
+        check(writer.open(name, spec, "AppendSubimage") if shape else writer.open(name, spec))
         check(writer.write_image(np.ascontiguousarray(array)))
-        first = array.shape
+        shape = array.shape
 
-    try:
+    with safe_writing.writing(oiio, file) as (writer, temporary, check):
         yield add
-        check(writer.close())
-        safe_writing.check_complete(oiio, temporary, file)
-        safe_writing.put_in_place(temporary, file)
-    finally:
-        # Read, so that OpenImageIO does not print it.
-        writer.geterror()
-        temporary.unlink(missing_ok=True)

@@ -63,53 +63,54 @@ def read(
     Parameters
     ----------
     path : str or path-like
-        Of any format that OpenImageIO reads: PNG, JPEG, OpenEXR, Radiance HDR, TIFF and others.
+        A file of any format that OpenImageIO reads: PNG, JPEG, OpenEXR, Radiance HDR, TIFF and
+        others.
     layer : str, optional
         The layer of an OpenEXR file, such as ``"ViewLayer.Combined"``: the channels ``layer.R``,
-        ``layer.G`` and so on. A file with one layer needs none.
+        ``layer.G`` and so on. Not needed for files with one layer.
     subimage : int, default 0
-        Which part of a file that has several, from 0 on.
+        The part of a file with several parts, from 0.
     premultiplied : bool, default False
-        Whether the colours shall be multiplied by alpha. Files have them either way; by default
-        they are divided where the file has them multiplied. Where alpha is 0 they stay as they
-        are: for flames and glows of an OpenEXR file, read it with ``premultiplied=True``.
+        Whether to return colours multiplied by alpha. Some files have them multiplied, others not.
+        By default multiplied ones are divided, except where alpha is 0. Flames and glows in OpenEXR
+        files have colours with an alpha of 0: read them with ``premultiplied=True``.
     metadata : bool, default False
-        Give what the file says as well.
+        Whether to also return the file's metadata.
 
     Returns
     -------
     array : ndarray, shape (H, W, 3) or (H, W, 4)
-        Top row first and upright; grey has three equal colours. Files of 8 and 16 bit integers
-        become float32 of linear Rec. 709 colours: decoded by what the file says (a cICP chunk, an
-        ICC profile, a gamma), else from sRGB, and not clipped, so that colours outside of Rec. 709
-        have negative components. Half becomes float16 and float float32, the values as they are.
+        Top row first and upright; a grey image has three equal colours. Files of 8 and 16 bit
+        integers become float32 of linear Rec. 709 colours. They are decoded as the file states (by
+        a cICP chunk, an ICC profile or a gamma), otherwise from sRGB. They are not clipped: colours
+        outside of Rec. 709 have negative components. Half becomes float16 and float becomes
+        float32, with unchanged values.
     metadata : dict
-        If asked for. The file's attributes by OpenImageIO's names ("chromaticities",
-        "XResolution", "Exif:LensModel", ...), which `write` takes, and "numbers" (of the file,
-        such as "uint8"), "colour" (what the colours were taken as), "alpha" ("straight",
-        "premultiplied", or None without alpha), "parts" (their names) and "notes" (what was
-        assumed).
+        Only with ``metadata=True``. The file's attributes by OpenImageIO's names ("chromaticities",
+        "XResolution", "Exif:LensModel", ...), which `write` accepts; "numbers" (the number type in
+        the file, such as "uint8"), "colour" (the colour space from which colours were decoded),
+        "alpha" ("straight", "premultiplied", or None without alpha), "parts" (the names of the
+        parts) and "notes" (assumptions).
 
     Raises
     ------
     OSError
-        The file is not there, or cannot be opened; it names the file.
+        The file does not exist or cannot be opened. The error names it.
     ValueError
-        The file is damaged or no image, has no such part or layer, or has several layers and
-        none is named (the message lists them); it names the file.
+        The file is damaged or not an image; it has no such part or layer; or it has several layers
+        and `layer` is missing (the message lists them). The error names the file.
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
 
     See Also
     --------
-    write : The way back.
-    Renderer.apply : Takes what this gives.
+    write : Writes image files. Renderer.apply : Accepts the array.
 
     Notes
     -----
-    Profiles and colour spaces are converted by OpenColorIO's built-in configuration, as
-    OpenImageIO carries it. A profile that is not of a matrix and curves (of CMYK, of grey, of
-    tables) is not used: colours are taken as sRGB, which "notes" say.
+    Profiles and colour spaces are converted with OpenColorIO's built-in configuration, which is
+    part of OpenImageIO. Only profiles with a matrix and curves are used. With others (CMYK, grey,
+    tables) the colours are decoded as sRGB, and "notes" says so.
 
     Examples
     --------
@@ -157,27 +158,28 @@ def write(
     Parameters
     ----------
     path : str or path-like
-        With an extension that OpenImageIO writes. What is there is replaced, when the whole file
-        is written under another name.
+        A file name with an extension that OpenImageIO writes. The file is first written under
+        another name. An existing file is replaced when the new one is complete.
     array : ndarray, shape (H, W), (H, W, 1), (H, W, 2), (H, W, 3) or (H, W, 4)
-        Grey, grey with alpha, RGB or RGBA. uint8 and uint16 are written as they are. Floats are
-        linear light: encoded and clipped to 0..1 where the file holds integers (PNG, JPEG, ...),
-        as they are where it holds floats (OpenEXR, Radiance HDR, TIFF).
+        Grey, grey with alpha, RGB or RGBA. uint8 and uint16 are written unchanged. Floats are
+        linear light: encoded and clipped to 0..1 in files of integers (PNG, JPEG, ...), unchanged
+        in files of floats (OpenEXR, Radiance HDR, TIFF).
     encoding : {"srgb", "gamma22", "linear", "none"}, optional
-        The curve of the file's colours, for floats: by default "srgb" for files of integers and
-        "linear" for files of floats. "none": the values are encoded already, such as a `final`
-        that was made with an `encoding`.
+        The curve of the file's colours, for floats. Default: "srgb" for files of integers and
+        "linear" for files of floats. "none": the values are encoded already, such as those of a
+        `final` with an `encoding`.
     bits : {8, 16, 32}, optional
-        Of one number in the file, for floats: by default 8 in files of integers and the array's
-        own in files of floats.
+        Size of a number in the file, for floats. Default: 8 in files of integers, and that of the
+        array's dtype in files of floats.
     quality : int, optional
-        Of JPEG, WebP and JPEG XL, 1 to 100. Their colours are not subsampled, unless the metadata
-        say so.
+        Quality of JPEG, WebP and JPEG XL, 1 to 100. Colours are not subsampled, unless the metadata
+        contain a subsampling.
     premultiplied : bool, default False
-        Whether the array's colours are multiplied by alpha. OpenEXR holds such, other formats
-        straight ones; colours are multiplied or divided where they differ.
+        Whether the array's colours are multiplied by alpha. OpenEXR files have multiplied colours,
+        other formats straight ones. Colours are converted if needed.
     metadata : mapping of str to object, optional
-        What `read` gave, or attributes by OpenImageIO's names: text, numbers, sequences of them.
+        Metadata from `read`, or attributes by OpenImageIO's names: text, numbers, or sequences of
+        them.
 
     Returns
     -------
@@ -187,26 +189,25 @@ def write(
     Raises
     ------
     TypeError
-        The array is not of uint8, uint16 or floats.
+        The array's dtype is not uint8, uint16 or a float.
     ValueError
-        The array's shape, or an argument, is not one of the above; the format cannot hold the
-        array: JPEG and Radiance HDR have no alpha, and OpenEXR has no integers.
+        The array's shape or an argument is not one of the above; or the format cannot store the
+        array: JPEG and Radiance HDR have no alpha, OpenEXR has no integers.
     OSError
-        The file cannot be written; it names the file, and no half file is left.
+        The file cannot be written. The error names it, and no partial file is left.
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
 
     See Also
     --------
-    read : The way back.
-    Frames.save : Every framebuffer, with settings and timings.
+    read : Reads image files. Frames.save : Every framebuffer, with settings and timings.
 
     Notes
     -----
-    Colours are written in the primaries of Rec. 709, which are those of `read`, and not converted
-    to others: there is no ``write`` of Display P3. A photograph of Display P3 that is read and
-    written as PNG or JPEG is a Rec. 709 file; its colours outside of Rec. 709 are clipped. OpenEXR
-    keeps them, as negative components, and an OpenColorIO tool converts them.
+    Colours are written with the primaries of Rec. 709, as `read` returns them. Other primaries,
+    such as Display P3, cannot be written. If a Display P3 photograph is read and written as PNG or
+    JPEG, the result is a Rec. 709 file, in which colours outside of Rec. 709 are clipped. OpenEXR
+    keeps them as negative components, which OpenColorIO tools can convert.
 
     Examples
     --------
@@ -250,7 +251,7 @@ def write(
 
 
 def _checked(array: NDArray[Any]) -> NDArray[Any]:
-    """Return an array of (H, W, C) and a dtype that files hold."""
+    """Return the array as (H, W, C), after a check of its shape and dtype."""
     values = np.asarray(array)
     if values.dtype == np.float64:
         values = values.astype(np.float32)
@@ -271,12 +272,12 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
 def _numbers(
     oiio: ModuleType, values: NDArray[Any], bits: int | None, temporary: Path, target: Path
 ) -> str:
-    """Return OpenImageIO's name of the numbers to write.
+    """Return OpenImageIO's name of the number type to write.
 
     Raises
     ------
     ValueError
-        The format cannot hold them; the message says what it can.
+        The format does not support it. The message says what it supports.
     """
     own = PIXEL_TYPES[values.dtype.name]
     wanted: Sequence[str] = [own]
@@ -309,14 +310,14 @@ def multiplied(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def divided(values: NDArray[Any]) -> NDArray[Any]:
-    """Return colours divided by alpha, in the same dtype; as they are where that is 0."""
+    """Return colours divided by alpha, in the same dtype; unchanged where alpha is 0."""
     alpha = values[:, :, -1:].astype(np.float32)
     one = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
     return _with_alpha(values, np.where(alpha == 0, one, one * one / np.where(alpha, alpha, one)))
 
 
 def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
-    """Return values whose colours are multiplied by a factor; of integers, by factor / largest."""
+    """Return values with colours times a factor; for integers, times factor / largest value."""
     made = values.astype(np.float32)
     made[:, :, :-1] *= factor
     if values.dtype.kind == "u":

@@ -1,7 +1,7 @@
-"""Colours of image files turned into linear Rec. 709, by OpenColorIO as OpenImageIO carries it.
+"""Convert colours of image files to linear Rec. 709, with the OpenColorIO that is in OpenImageIO.
 
-The spaces are those of OpenColorIO's built-in configuration, so that a result does not depend on
-the machine's own.
+The colour spaces are those of OpenColorIO's built-in configuration, so that results do not depend
+on the machine's configuration.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ __all__ = ["check_space", "from_profile", "from_space", "is_srgb_profile"]
 
 _CONFIGURATION: Final = "ocio://default"
 _LINEAR: Final = "lin_rec709_scene"
-# What OpenColorIO makes of an ICC profile ends there.
+# The colour space to which OpenColorIO converts from an ICC profile.
 _CONNECTION: Final = "CIE XYZ-D65 - Scene-referred"
-# Half a level of 8 bits, encoded: a profile that differs from sRGB by less is sRGB.
+# Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
 _SAME: Final = 0.5 / 255
 
 
 def check_space(name: str) -> None:
-    """Raise ValueError where the built-in configuration has no colour space of that name."""
+    """Raise ValueError if the built-in configuration has no colour space of this name."""
     oiio = import_extra("OpenImageIO", "images", "Converting colours")
     config = oiio.ColorConfig(_CONFIGURATION)
     if not config.resolve(name) or config.getColorSpaceIndex(name) < 0:
@@ -85,10 +85,10 @@ def from_profile(colours: NDArray[np.float32], profile: bytes) -> NDArray[np.flo
     Raises
     ------
     ValueError
-        The profile is damaged or of another kind.
+        The profile is damaged or has another kind.
     """
     oiio = import_extra("OpenImageIO", "images", "Converting colours")
-    # A new name each time: OpenColorIO keeps what it has read of a file by its name.
+    # A new name each time, since OpenColorIO caches files by name.
     with tempfile.NamedTemporaryFile(suffix=".icc") as file:
         file.write(profile)
         file.flush()
@@ -96,7 +96,7 @@ def from_profile(colours: NDArray[np.float32], profile: bytes) -> NDArray[np.flo
             oiio.ImageBuf(np.ascontiguousarray(colours)),
             file.name,
             unpremult=False,
-            # The other direction goes from XYZ to the device.
+            # The other direction is from XYZ to the device.
             inverse=True,
             colorconfig=_CONFIGURATION,
         )
@@ -114,7 +114,7 @@ def is_srgb_profile(profile: bytes) -> bool:
     levels = np.linspace(0, 1, 6, dtype=np.float32)
     probe = np.stack(np.meshgrid(levels, levels, levels), -1).reshape(6, 36, 3)
     expected = decode_srgb(probe)
-    # The same difference is smaller in linear values where the curve is flat.
+    # Where the curve is flat, the same encoded difference is a smaller linear one.
     slope = np.maximum((decode_srgb(probe + np.float32(0.01)) - expected) / 0.01, 1 / 12.92)
     difference = np.abs(from_profile(probe, profile) - expected)
     return bool((difference <= _SAME * slope).all())

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["load", "save"]
 
-# Before the JSON of a description.
+# The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
-# What `_spec` writes beside the entries of `info`.
+# Attributes that `_spec` writes in addition to the entries of `info`.
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place")
 
 
@@ -98,7 +98,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
 
 
 def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read framebuffers from what `save` wrote: what `Frames.load` does and describes.
+    """Read framebuffers from files that `save` wrote, as `Frames.load` documents.
 
     Returns
     -------
@@ -109,14 +109,14 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     Raises
     ------
     OSError, ValueError
-        A file is not there, is damaged or is none of `save`'s; names the file.
+        A file is missing, damaged or not written by `save`. The error names it.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
     found: dict[str, tuple[int, NDArray[Any], Path]] = {}
     facts: dict[str, Any] = {}
     target = Path(path)
-    # Of other files beside them, those that say nothing of `save` are left out.
+    # In a folder, files without the attributes of `save` are ignored.
     is_one = target.is_file()
     for file in _files_of(target):
         for index in range(_parts_of(file)):
@@ -148,12 +148,12 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
 
 
 def _parts_of(file: Path) -> int:
-    """Return how many framebuffers a file holds."""
+    """Return the number of framebuffers in a file."""
     return len(image_reading.load(file).parts)
 
 
 def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
-    """Return whether `save` gave a framebuffer this file's name for the sake of a target."""
+    """Return whether `save` of `target` wrote a framebuffer to this file."""
     if "framebuffer" not in said:
         return False
     name = said["framebuffer"]
@@ -163,7 +163,7 @@ def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
 
 
 def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
-    """Return the pixels of a part, without what its window leaves open, and what is said of it."""
+    """Return the pixels of a part without the padding of its window, and its attributes."""
     with image_reading.opened(file, "Frames.load") as reader:
         reader.seek_subimage(index, 0)
         spec = reader.spec()
@@ -181,7 +181,7 @@ def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
 
 
 def _described(text: str) -> dict[str, str]:
-    """Return what a description says, in formats that have no attributes of their own (TIFF)."""
+    """Return the attributes from a description, for formats without other attributes (TIFF)."""
     with contextlib.suppress(ValueError, AttributeError):
         return {
             str(name): str(value)
@@ -191,7 +191,7 @@ def _described(text: str) -> dict[str, str]:
 
 
 def _files_of(path: Path) -> list[Path]:
-    """Return the files that `save` may have made of a name."""
+    """Return the files that `save` may have written for a path."""
     if path.is_dir():
         found = sorted(
             file for file in path.iterdir() if file.is_file() and file.suffix in (".png", ".exr")
@@ -209,7 +209,7 @@ def _files_of(path: Path) -> list[Path]:
 
 
 def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
-    """Return pixels in the dtype that they had, depth without a channel."""
+    """Return pixels in their original dtype, depth without a channel."""
     if dtype not in ("uint8", "float16", "float32"):
         raise ValueError(f"{dtype!r} is no dtype of a framebuffer")
     if dtype == "uint8" and pixels.dtype != np.uint8:
@@ -232,7 +232,7 @@ def _write_image(
     if not safe_writing.holds(oiio, temporary, pixels.shape[2], PIXEL_TYPES[str(pixels.dtype)]):
         return False
     spec = _spec(oiio, frames, name, pixels, file)
-    # Otherwise OpenImageIO takes the colours for premultiplied and divides them by alpha.
+    # Otherwise OpenImageIO assumes premultiplied colours and divides them by alpha.
     spec.attribute("oiio:UnassociatedAlpha", 1)
     if not (
         writer.open(str(temporary), spec)
@@ -255,7 +255,7 @@ def _write_exr(
         if pixels.dtype == np.uint8:
             pixels = (pixels / np.float32(255)).astype(np.float16)
         spec = _spec(oiio, frames, name, pixels, file)
-        # What OpenEXR calls the name of the part.
+        # The name of the OpenEXR part.
         spec.attribute("oiio:subimagename", name)
         spec.full_width, spec.full_height = width, height
         if pixels.shape[2] == 1:
@@ -278,7 +278,7 @@ def _write_exr(
 def _spec(
     oiio: ModuleType, frames: Framebuffers, name: str, pixels: NDArray[Any], file: Path
 ) -> OpenImageIO.ImageSpec:
-    """Describe an (H, W, C) array to OpenImageIO, with what the frames came from."""
+    """Return OpenImageIO's description of an (H, W, C) array, with the origin of the frames."""
     height, width, channels = pixels.shape
     spec: OpenImageIO.ImageSpec = oiio.ImageSpec(
         width, height, channels, PIXEL_TYPES[str(pixels.dtype)]
@@ -297,7 +297,7 @@ def _spec(
     for key, value in said.items():
         spec.attribute(f"vkbloom:{key}", value)
     description = f"vkbloom on {adapter}, settings {settings}"
-    # TIFF and JPEG have no attributes of other names.
+    # TIFF and JPEG cannot store attributes with other names.
     if file.suffix.lower() in (".tif", ".tiff", ".jpg", ".jpeg"):
         description += _DESCRIBED + json.dumps(said)
     spec.attribute("ImageDescription", description)

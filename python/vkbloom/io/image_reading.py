@@ -28,7 +28,16 @@ from vkbloom.io.srgb import decode_srgb
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["check_plausible", "decode", "load", "opened"]
+__all__ = [
+    "check_plausible",
+    "chosen_part",
+    "decode",
+    "describe",
+    "load",
+    "of_layer",
+    "opened",
+    "size_of",
+]
 
 _LARGEST_SIDE: Final = 65536
 # Pixels of the largest texture, 16384 x 16384. A damaged header may claim more.
@@ -39,7 +48,7 @@ _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
 # Red, green, blue, white.
 _REC_709: Final = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-# That are listed. Some files have thousands, and each takes time.
+# The most parts that are listed. Some files have thousands, and each takes time.
 _MOST_PARTS: Final = 100
 
 
@@ -106,10 +115,10 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
     path : str or path-like
         A file of any format that OpenImageIO reads.
     subimage : int, default 0
-        Which part of a file that has several (OpenEXR, TIFF, GIF), from 0 on.
+        The part of a file with several parts (OpenEXR, TIFF, GIF), from 0.
     layer : str, optional
-        Of an OpenEXR file: only the channels ``layer.NAME`` are taken, under the NAME. It is
-        looked for in `subimage` and the parts behind it.
+        For OpenEXR files: only the channels ``layer.NAME`` are read, with the name NAME. The layer
+        is searched in `subimage` and the parts after it.
 
     Returns
     -------
@@ -120,8 +129,8 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
     OSError
         The file does not exist or cannot be opened; the error names it.
     ValueError
-        The file is damaged or no image, has no such part or layer, is no flat image of 8 or 16
-        bit integers or floats, or its name is not UTF-8; it names the file.
+        The file is damaged or not an image; it has no such part or layer; it is not a flat image of
+        8 or 16 bit integers or floats; or its name is not UTF-8. The error names the file.
     ModuleNotFoundError
         OpenImageIO is missing.
     """
@@ -132,6 +141,50 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
 def _read(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
 ) -> StoredImage:
+    subimage, spec = chosen_part(reader, name, subimage, layer)
+    stored_as = str(spec.format)
+    display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
+    left, top = min(spec.x, display[0]), min(spec.y, display[1])
+    width, height = _covered(spec)
+    dtype = DTYPES[stored_as]
+    wanted = stored_as if stored_as != "double" else "float"
+    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
+    # A truncated JPEG has pixels and an error.
+    reason = failure_of(reader)
+    if data is None or reason:
+        raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
+    pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
+    if pixels.shape[:2] != (height, width):
+        row, column = spec.y - top, spec.x - left
+        whole = np.zeros((height, width, spec.nchannels), dtype)
+        whole[row : row + spec.height, column : column + spec.width] = pixels
+        pixels = whole
+    described = of_layer(replace(describe(reader), pixels=pixels), spec, layer)
+    pixels = described.pixels
+    orientation = spec.get_int_attribute("Orientation", 1)
+    if orientation != 1:
+        x, y = display[0] - left, display[1] - top
+        pixels = _upright(pixels[y : y + display[3], x : x + display[2]], orientation)
+        left, top = 0, 0
+        display = (0, 0, pixels.shape[1], pixels.shape[0])
+    return replace(
+        described,
+        pixels=np.ascontiguousarray(pixels),
+        origin=(left, top),
+        display=display,
+    )
+
+
+def chosen_part(
+    reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
+) -> tuple[int, OpenImageIO.ImageSpec]:
+    """Make the part to read the current one, and return its number and what it is.
+
+    Raises
+    ------
+    ValueError
+        As `load`, but of a file that is damaged in its pixels.
+    """
     if layer is not None:
         subimage = _part_with(reader, name, subimage, layer)
     if subimage < 0 or not reader.seek_subimage(subimage, 0):
@@ -142,60 +195,50 @@ def _read(
     spec = reader.spec()
     if spec.deep or spec.depth > 1:
         raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
-    stored_as = str(spec.format)
-    if stored_as not in DTYPES:
+    if str(spec.format) not in DTYPES:
         raise ValueError(
-            f"{name}: numbers of {stored_as} are not supported; use unsigned integers of 8 or 16 "
+            f"{name}: numbers of {spec.format} are not supported; use unsigned integers of 8 or 16 "
             "bits, or floats"
         )
-    display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
-    left, top = min(spec.x, display[0]), min(spec.y, display[1])
-    width = max(spec.x + spec.width, display[0] + display[2]) - left
-    height = max(spec.y + spec.height, display[1] + display[3]) - top
+    width, height = _covered(spec)
     if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
         raise ValueError(
             f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
             f"{_LARGEST_AREA} in all"
         )
     check_plausible(spec, name)
-    dtype = DTYPES[stored_as]
-    wanted = stored_as if stored_as != "double" else "float"
-    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
-    # A truncated JPEG gives pixels and an error.
-    reason = failure_of(reader)
-    if data is None or reason:
-        raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
-    pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
-    if pixels.shape[:2] != (height, width):
-        row, column = spec.y - top, spec.x - left
-        whole = np.zeros((height, width, spec.nchannels), dtype)
-        whole[row : row + spec.height, column : column + spec.width] = pixels
-        pixels = whole
-    described = describe(reader)
-    names, formats = described.channels, described.numbers
-    if layer is not None:
-        own = [index for index, of in enumerate(_layers(spec)) if of == layer]
-        pixels = pixels[:, :, own]
-        names = tuple(names[index].rpartition(".")[2] for index in own)
-        formats = tuple(formats[index] for index in own)
-    orientation = spec.get_int_attribute("Orientation", 1)
-    if orientation != 1:
-        x, y = display[0] - left, display[1] - top
-        pixels = _upright(pixels[y : y + display[3], x : x + display[2]], orientation)
-        left, top = 0, 0
-        display = (0, 0, pixels.shape[1], pixels.shape[0])
+    return subimage, spec
+
+
+def _covered(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
+    """Return the size of the area of the data window and the display window."""
+    right = max(spec.x + spec.width, spec.full_x + spec.full_width)
+    bottom = max(spec.y + spec.height, spec.full_y + spec.full_height)
+    return right - min(spec.x, spec.full_x), bottom - min(spec.y, spec.full_y)
+
+
+def size_of(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
+    """Return the width and the height of what `load` returns, before it is turned."""
+    if spec.get_int_attribute("Orientation", 1) != 1:
+        return spec.full_width, spec.full_height
+    return _covered(spec)
+
+
+def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None) -> StoredImage:
+    """Return an image with a layer's channels alone, by their names in it; None: all."""
+    if layer is None:
+        return stored
+    own = [index for index, of in enumerate(_layers(spec)) if of == layer]
     return replace(
-        described,
-        pixels=np.ascontiguousarray(pixels),
-        channels=names,
-        numbers=formats,
-        origin=(left, top),
-        display=display,
+        stored,
+        pixels=stored.pixels[:, :, own],
+        channels=tuple(stored.channels[index].rpartition(".")[2] for index in own),
+        numbers=tuple(stored.numbers[index] for index in own),
     )
 
 
 def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
-    """Return what a file says of its current part, without pixels; another may be current then.
+    """Return the description of a file's current part, without pixels. May change the current part.
 
     Parameters
     ----------
@@ -203,7 +246,7 @@ def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
         From `opened`.
     """
     spec = reader.spec()
-    # Before the other parts are looked at.
+    # Before the reader goes to other parts.
     found = StoredImage(
         pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
         channels=tuple(spec.channelnames),
@@ -224,7 +267,7 @@ def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
 
 
 def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
-    """Return the layer of each channel: what is before its name, else the name of the part."""
+    """Return the layer of each channel: the prefix of its name, or else the name of the part."""
     part = spec.get_string_attribute("oiio:subimagename")
     return [name.rpartition(".")[0] or part for name in spec.channelnames]
 
@@ -268,24 +311,24 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
     ----------
     stored : StoredImage
     colour : str, optional
-        What the colours in the file are: "linear", "srgb" or a colour space of OpenColorIO's
-        built-in configuration, such as "ACEScg". By default floats are linear, and integers what
-        the file says by a cICP chunk, an ICC profile or a gamma, else sRGB.
+        The colour space of the file: "linear", "srgb" or a colour space of OpenColorIO's built-in
+        configuration, such as "ACEScg". Default: floats are linear; integers have the space that
+        the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
     raw : bool, default False
         Whether to keep 8-bit values without decoding.
 
     Returns
     -------
     Picture
-        Of float16 where the file has half, of float32 for all else; of uint8 if `raw`. Colours of
-        integer files, or with `colour`, are linear Rec. 709, not clipped. They are neither
-        multiplied nor divided by alpha.
+        float16 if the file has half, uint8 if `raw`, otherwise float32. Colours of integer files,
+        or with `colour`, are linear Rec. 709, not clipped. They are neither multiplied nor divided
+        by alpha.
 
     Raises
     ------
     ValueError
         The channels are neither RGB, RGBA, grey nor grey with alpha; there is no such `colour`;
-        `raw` and the file does not hold 8-bit integers, or `colour` is given as well.
+        `raw` and the file has no 8-bit integers, or `colour` is also given.
     """
     if raw and colour is not None:
         raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
@@ -296,7 +339,7 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
     if raw and numbers != "uint8":
         raise ValueError(f"raw: {numbers} is not an 8-bit integer type")
     if numbers == "half":
-        # OpenImageIO reads all channels as float if another channel is float.
+        # OpenImageIO reads all channels as float if one channel is float.
         values = values.astype(np.float16, copy=False)
     notes = [f"left out the channels {', '.join(left_out)}"] if left_out else []
     grey = len(chosen) < 3
@@ -319,9 +362,9 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
 
 
 def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
-    """Return the places of the colour and alpha, and the names of the channels left out."""
+    """Return the indices of the colour and alpha channels, and the names of the other channels."""
     layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
-    # One layer's name before every channel says nothing.
+    # If all channels have the same layer, its name is not needed.
     plain = [name.rpartition(".")[2] if len(layers) == 1 else name for name in names]
     places = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
     alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
@@ -344,7 +387,7 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
 def _linear(
     values: NDArray[Any], stored: StoredImage, colour: Colour | None
 ) -> tuple[str, NDArray[Any], list[str]]:
-    """Return what the colours were taken as, floats of linear ones, and notes; alpha is scaled."""
+    """Return the assumed colour space, the linear floats, and notes; alpha is only scaled."""
     if colour is not None:
         if colour not in ("linear", "srgb"):
             colours_of.check_space(colour)
@@ -383,7 +426,7 @@ def _by_profile(
 
 
 def _notes_of_floats(stored: StoredImage) -> list[str]:
-    """Say what a file of floats tells of its colours, which stay as they are."""
+    """Return notes about the colour space of a file of floats, which is not converted."""
     notes: list[str] = []
     if stored.space == SPACES["srgb"]:
         notes.append("the file says srgb of its colours, which as floats are taken as linear")
@@ -402,7 +445,7 @@ def _notes_of_floats(stored: StoredImage) -> list[str]:
 def _attributes_of_linear(
     stored: StoredImage, taken_as: str, colour: Colour | None
 ) -> dict[str, tuple[Any, Any]]:
-    """Return the attributes without those that tell of colours that were converted."""
+    """Return the attributes without those that describe the colours before the conversion."""
     lost = set()
     if taken_as != "srgb":
         lost.add("ICCProfile")
@@ -412,7 +455,7 @@ def _attributes_of_linear(
 
 
 def _decoded(values: NDArray[Any], space: str) -> NDArray[Any]:
-    """Return floats of linear colours out of a space; alpha is only scaled."""
+    """Return linear floats from colours of a space; alpha is only scaled."""
     if values.dtype.kind == "f":
         if space == "linear":
             return values

@@ -74,9 +74,9 @@ def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
     Raises
     ------
     ValueError
-        It has none, or `quality` is out of range.
+        The format has none, or `quality` is out of range.
     TypeError
-        `quality` is no int.
+        `quality` is not an int.
     """
     if quality is None:
         return
@@ -109,9 +109,9 @@ def save(
     colour : {"linear", "srgb"}, optional
         Encoding of the colours in the file. Default: integers are sRGB and floats linear.
     attributes : mapping of str to str, optional
-        Added to the file where its format has a place for them.
+        Added to the file if its format supports them.
     quality : int, optional
-        Of JPEG, WebP and JPEG XL, 1 to 100. By default that of the format's writer.
+        Quality of JPEG, WebP and JPEG XL, 1 to 100. Default: that of the format's writer.
 
     Returns
     -------
@@ -163,12 +163,12 @@ def _write(
 def prepared(
     picture: Picture, channels: int, numbers: str, colour: SavedColour | None, target: Path
 ) -> tuple[NDArray[Any], Encoding | None, tuple[str, ...]]:
-    """Return the values to write in a layout, their encoding, and notes on what is lost.
+    """Return the values to write in a layout, their encoding, and notes about lost information.
 
     Parameters
     ----------
     picture : Picture
-        All of the file's rows, or some.
+        All rows of the file, or some.
     channels, numbers
         From `chosen_layout`.
     colour, target
@@ -193,25 +193,25 @@ def put(
     *,
     attributes: Mapping[str, str | int],
 ) -> None:
-    """Write values into a temporary file as they are.
+    """Write values unchanged into a temporary file.
 
     Parameters
     ----------
     oiio : module
         OpenImageIO.
     values : ndarray, shape (H, W, C)
-        Of a dtype that the format holds, 1 to 4 channels.
+        1 to 4 channels of a dtype that the format supports.
     picture : Picture
-        What is said of the values: their encoding, windows and attributes.
+        Encoding, windows and attributes of the values.
     temporary, target : Path
-        Of `safe_writing.reserve`, and what it was given.
+        The result of `safe_writing.reserve`, and its argument.
     attributes : mapping of str to str or int
-        What is said besides.
+        Further attributes of the file.
 
     Raises
     ------
     OSError
-        It cannot be written; names `target`.
+        The file cannot be written. The error names `target`.
     """
     writer = oiio.ImageOutput.create(str(temporary))
     stored = picture.stored
@@ -249,7 +249,7 @@ def spec_of(
     target: Path,
     attributes: Mapping[str, str | int],
 ) -> OpenImageIO.ImageSpec:
-    """Return what a file of values of that shape and dtype says; the rest is as for `put`."""
+    """Return the description of a file with values of this shape and dtype, as for `put`."""
     stored = picture.stored
     height, width, channels = shape
     spec: OpenImageIO.ImageSpec = oiio.ImageSpec(width, height, channels, PIXEL_TYPES[dtype.name])
@@ -273,12 +273,12 @@ def chosen_layout(
     temporary: Path,
     target: Path,
 ) -> tuple[int, str]:
-    """Return the number of channels and the number type to write: the closest that there are.
+    """Return the closest number of channels and number type that the format supports.
 
     Raises
     ------
     ValueError
-        The format can hold none.
+        The format supports none.
     """
     for values in _layouts(picture, writer.supports("alpha") != 0):
         for numbers in _PREFERENCES[picture.numbers]:
@@ -349,7 +349,7 @@ def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
 
 
 def as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
-    """Return values as the numbers of a file, whose 1 is the largest for integers."""
+    """Return values as numbers of a file; for integers 1 becomes the largest value."""
     dtype = DTYPES[numbers]
     if values.dtype.kind == "u":
         if values.dtype == dtype:
@@ -379,7 +379,7 @@ def _describe(
         spec.attribute("oiio:UnassociatedAlpha", 1)
     is_jpeg = format_name == "jpeg"
     if is_jpeg and spec.nchannels == 3:
-        # Unless the picture came with another: colours as sharp as brightness.
+        # No subsampling of colours, unless the picture's attributes contain one.
         spec.attribute("jpeg:subsampling", "4:4:4")
     for name, (kind, value) in stored.attributes.items():
         # A profile describes encoded colours, not those of a picture that was written linear.
@@ -388,7 +388,7 @@ def _describe(
         if name.startswith("jpeg:") and not is_jpeg:
             continue
         if isinstance(value, int):
-            # Of integers, OpenImageIO's Python sets those of 32 bits; Exif has 16 (ISO, flash).
+            # OpenImageIO's Python module sets integers of 32 bits; Exif has 16 (ISO, flash).
             spec.attribute(name, value)
         else:
             spec.attribute(name, kind, value)

@@ -42,7 +42,7 @@ __all__ = [
 
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str
-#: What the colours in a file shall be.
+#: The colour encoding of a file to write.
 SavedColour = Literal["linear", "srgb"]
 Encoding = Literal["linear", "srgb", "gamma22"]
 #: x, y, width, height in pixels.
@@ -57,7 +57,7 @@ DTYPES: Final[Mapping[str, np.dtype[Any]]] = {
     "double": np.dtype(np.float32),
 }
 
-# OpenImageIO's names of the numbers to write, by the dtype's.
+# OpenImageIO's names of the number types to write, by dtype.
 PIXEL_TYPES: Final[Mapping[str, str]] = {
     "uint8": "uint8",
     "uint16": "uint16",
@@ -72,8 +72,8 @@ SPACES: Final[Mapping[str, str]] = {
     "gamma22": "g22_rec709_scene",
 }
 
-# Attributes that hold for the result as well: what the colours and the pixels are, how large the
-# picture is in print, and who took it where and how.
+# Attributes that are also valid for the result: those about colours and pixels, the size in print,
+# and who took the picture where and how.
 _KEPT_ATTRIBUTES: Final = frozenset(
     (
         *("chromaticities", "ICCProfile", "PixelAspectRatio"),
@@ -83,7 +83,7 @@ _KEPT_ATTRIBUTES: Final = frozenset(
     )
 )
 _KEPT_GROUPS: Final = ("Exif:", "GPS:", "IPTC:")
-# Which conversion or turning makes wrong.
+# Attributes that a conversion or rotation makes wrong.
 _LOST_ATTRIBUTES: Final = frozenset(
     ("Exif:ColorSpace", "Exif:PixelXDimension", "Exif:PixelYDimension")
 )
@@ -115,12 +115,13 @@ class StoredImage:
     attributes : mapping of str to (OpenImageIO.TypeDesc, value)
         Those of which `is_kept` is true, by OpenImageIO's names.
     parts : tuple of str
-        The names of the file's parts, of which the pixels are one; "" where it gives none. Of
-        more than 100 the first.
+        The names of the file's parts (the first 100), of which the pixels are one; "" for a part
+        without a name.
     profile_name : str
-        What its ICC profile calls itself, "" without one.
+        The name in the ICC profile; "" without a profile.
     is_signalled : bool
-        Whether `space` comes from a cICP chunk, which goes before a profile (PNG, third edition).
+        Whether `space` is from a cICP chunk, which has precedence over a profile (PNG, third
+        edition).
     """
 
     pixels: NDArray[Any]
@@ -159,10 +160,10 @@ class Picture:
     stored : StoredImage
         The image as stored in the file.
     notes : tuple of str
-        What the user may want to know about how the file was taken.
+        Notes for the user about how the file was interpreted.
     colour : str
-        What the colours in the file were taken as: "linear", "srgb", the name of another space or
-        of the file's profile; "" of values that were left as they are.
+        The colour space from which colours were decoded: "linear", "srgb", the name of another
+        space or of the file's profile; "" if the values were not decoded.
     """
 
     pixels: NDArray[Any]
@@ -181,14 +182,14 @@ class Picture:
         encoding: Encoding | None = None,
         attributes: Mapping[str, tuple[Any, Any]] | None = None,
     ) -> Self:
-        """Make a picture of an array; without an encoding, `save` writes its values as they are.
+        """Make a picture from an array. Without an encoding, `save` writes its values unchanged.
 
         Parameters
         ----------
         pixels : ndarray, shape (H, W, 3) or (H, W, 4)
             uint8, float16 or float32, 1 being white.
         numbers : str
-            OpenImageIO's name of the numbers to write where the file's format has them.
+            OpenImageIO's name of the number type to write, if the file's format supports it.
         encoding : {"linear", "srgb", "gamma22"} or None
         attributes : mapping of str to (OpenImageIO.TypeDesc, value), optional
         """
@@ -223,12 +224,12 @@ def check_name(path: str | os.PathLike[str]) -> None:
 
 
 def is_exr(path: Path) -> bool:
-    """Tell whether a file name has the extension of OpenEXR."""
+    """Return whether a file name has the extension of OpenEXR."""
     return path.suffix.lower() == ".exr"
 
 
 def is_kept(attribute: str) -> bool:
-    """Tell whether an attribute of a file, by OpenImageIO's name, holds for the result as well."""
+    """Return whether an attribute, by OpenImageIO's name, is also valid for the result."""
     return attribute not in _LOST_ATTRIBUTES and (
         attribute in _KEPT_ATTRIBUTES or attribute.startswith(_KEPT_GROUPS)
     )
@@ -240,7 +241,7 @@ def failure_of(source: Any) -> str:
     Parameters
     ----------
     source : OpenImageIO.ImageInput or module
-        OpenImageIO prints an error that nobody has read when the object is destroyed.
+        When it is destroyed, OpenImageIO prints an error that was not read.
     """
     try:
         text: str = source.geterror()

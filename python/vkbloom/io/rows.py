@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io import image_reading, image_writing, safe_writing
@@ -18,99 +20,137 @@ from vkbloom.io.images import DTYPES, Picture, SavedColour, StoredImage, failure
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["RowReader", "opened_rows", "written_rows"]
+__all__ = ["Rows", "opened_rows", "written_rows"]
 
-# Of a band, as four single floats a pixel.
+# The most bytes of a band, as four single floats for each pixel.
 _BAND_BYTES: Final = 64 << 20
 
 
-class RowReader:
-    """An open file, from the top to the bottom.
+class Rows:
+    """The rows of an image file, from the top to the bottom.
 
     Parameters
-    ----------
-    reader : OpenImageIO.ImageInput
-    name : str
-        The file's, for errors.
-
-    Attributes
     ----------
     size : (int, int)
         Width and height in pixels.
     numbers : str
         OpenImageIO's name of the number type.
+    read : callable
+        Returns rows `first` to `end` as `image_reading.load` returns the image.
+    step : int
+        `first` and `end` are multiples of this, or `end` is the height.
+
+    Attributes
+    ----------
+    size, numbers
     band : int
-        Rows to read at a time; the last band may have fewer.
+        Rows to take at a time.
     """
 
-    def __init__(self, reader: OpenImageIO.ImageInput, name: str) -> None:
-        self._reader = reader
-        self._name = name
-        self._empty = image_reading.describe(reader)
-        reader.seek_subimage(0, 0)
-        self._spec = spec = reader.spec()
-        self.size = spec.width, spec.height
-        self.numbers = str(spec.format)
-        step = max(spec.tile_height, 1)
-        rows = _BAND_BYTES // (16 * spec.width)
-        self.band = max(rows // step, 1) * step
+    def __init__(
+        self,
+        size: tuple[int, int],
+        numbers: str,
+        read: Callable[[int, int], StoredImage],
+        step: int = 1,
+    ) -> None:
+        self.size = size
+        self.numbers = numbers
+        self.band = max(_BAND_BYTES // (16 * size[0]) // step, 1) * step
+        self._read = read
+        self._place = 0
+        self._left: StoredImage | None = None
 
-    def read(self, first: int, count: int) -> StoredImage:
-        """Return rows as `image_reading.load` returns the image.
+    def take(self, count: int) -> StoredImage:
+        """Return the next rows.
 
         Raises
         ------
         ValueError
             The file is damaged; the error names it.
         """
-        spec = self._spec
-        wanted = self.numbers if self.numbers != "double" else "float"
-        y, place = spec.y + first, (0, 0)
-        if spec.tile_width:
-            columns = spec.x, spec.x + spec.width
-            data = self._reader.read_tiles(
-                *place, *columns, y, y + count, 0, 1, 0, spec.nchannels, wanted
-            )
-        else:
-            data = self._reader.read_scanlines(*place, y, y + count, 0, 0, spec.nchannels, wanted)
-        reason = failure_of(self._reader)
-        if data is None or reason:
-            raise ValueError(f"{self._name}: damaged: {reason or 'the pixels cannot be read'}")
-        shape = count, spec.width, spec.nchannels
-        pixels = np.asarray(data, DTYPES[self.numbers]).reshape(shape)
-        return dataclasses.replace(self._empty, pixels=pixels)
+        height = self.size[1]
+        parts = [] if self._left is None else [self._left.pixels]
+        found = self._left
+        while found is None or (sum(map(len, parts)) < count and self._place < height):
+            end = min(self._place + self.band, height)
+            found = self._read(self._place, end)
+            parts.append(found.pixels)
+            self._place = end
+        pixels = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        self._left = replace(found, pixels=pixels[count:])
+        return replace(found, pixels=pixels[:count])
+
+    def bands(self) -> Iterator[StoredImage]:
+        """Yield all rows."""
+        for first in range(0, self.size[1], self.band):
+            yield self.take(min(self.band, self.size[1] - first))
 
 
 @contextmanager
-def opened_rows(path: str | os.PathLike[str]) -> Iterator[RowReader | None]:
-    """Open a file to be read by rows; None where it has to be read as a whole.
+def opened_rows(
+    path: str | os.PathLike[str], subimage: int = 0, layer: str | None = None
+) -> Iterator[Rows]:
+    """Open a file to be read by rows.
 
-    That are files with several parts, files that are turned, or whose data window is not their
-    display window, and what `image_reading.load` refuses.
+    Files that are turned, and those whose data window is not their display window, are read as a
+    whole when the first rows are taken.
+
+    Parameters
+    ----------
+    path, subimage, layer
+        As for `image_reading.load`.
 
     Raises
     ------
     OSError, ValueError, ModuleNotFoundError
-        As `image_reading.opened`.
+        As `image_reading.load`.
     """
     name = os.fspath(path)
     with image_reading.opened(path, "Reading images") as reader:
-        has_parts = reader.seek_subimage(1, 0)
-        failure_of(reader)
-        reader.seek_subimage(0, 0)
-        spec = reader.spec()
+        subimage, spec = image_reading.chosen_part(reader, name, subimage, layer)
+        orientation = spec.get_int_attribute("Orientation", 1)
         display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
-        is_plain = (
-            not has_parts
-            and not spec.deep
-            and spec.depth == 1
-            and str(spec.format) in DTYPES
-            and display == (spec.x, spec.y, spec.width, spec.height)
-            and spec.get_int_attribute("Orientation", 1) == 1
+        if orientation == 1 and display == (spec.x, spec.y, spec.width, spec.height):
+            empty = image_reading.describe(reader)
+            reader.seek_subimage(subimage, 0)
+
+            def read(first: int, end: int) -> StoredImage:
+                pixels = _read_rows(reader, name, subimage, first, end)
+                return image_reading.of_layer(replace(empty, pixels=pixels), spec, layer)
+
+            size = spec.width, spec.height
+            yield Rows(size, str(spec.format), read, max(spec.tile_height, 1))
+            return
+        width, height = image_reading.size_of(spec)
+        size = (height, width) if orientation > 4 else (width, height)
+        whole = functools.cache(lambda: image_reading.load(name, subimage, layer))
+        yield Rows(size, str(spec.format), lambda first, end: _cut(whole(), first, end))
+
+
+def _cut(stored: StoredImage, first: int, end: int) -> StoredImage:
+    return replace(stored, pixels=stored.pixels[first:end])
+
+
+def _read_rows(
+    reader: OpenImageIO.ImageInput, name: str, subimage: int, first: int, end: int
+) -> NDArray[Any]:
+    """Return rows of the current part, which has that number."""
+    spec = reader.spec()
+    numbers = str(spec.format)
+    wanted = numbers if numbers != "double" else "float"
+    y, place = spec.y, (subimage, 0)
+    if spec.tile_width:
+        columns = spec.x, spec.x + spec.width
+        data = reader.read_tiles(
+            *place, *columns, y + first, y + end, 0, 1, 0, spec.nchannels, wanted
         )
-        if is_plain:
-            image_reading.check_plausible(spec, name)
-        yield RowReader(reader, name) if is_plain else None
+    else:
+        data = reader.read_scanlines(*place, y + first, y + end, 0, 0, spec.nchannels, wanted)
+    reason = failure_of(reader)
+    if data is None or reason:
+        raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
+    return np.asarray(data, DTYPES[numbers]).reshape(end - first, spec.width, spec.nchannels)
 
 
 @contextmanager
@@ -158,7 +198,7 @@ def written_rows(
         if layout is None:
             layout = image_writing.chosen_layout(oiio, picture, writer, temporary, target)
         values, encoding, notes = image_writing.prepared(picture, *layout, colour, target)
-        described = dataclasses.replace(picture, encoding=encoding)
+        described = replace(picture, encoding=encoding)
         if row == 0:
             shape = height, *values.shape[1:]
             spec = image_writing.spec_of(

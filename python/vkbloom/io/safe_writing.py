@@ -8,7 +8,7 @@ A file is written to a temporary file beside it, which is renamed when it is com
 4. `check_complete`, then `put_in_place`
 5. remove the temporary file if it still exists
 
-`replacing` does steps 2, 4 and 5 for one file.
+`replacing` does steps 2, 4 and 5 for one file, and `writing` also closes a writer for it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, BinaryIO, Final
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, TypeAlias
 
 import numpy as np
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import OpenImageIO
 
 __all__ = [
+    "Steps",
     "check_complete",
     "check_extension",
     "holds",
@@ -38,7 +39,11 @@ __all__ = [
     "reserve",
     "write_error",
     "write_file",
+    "writing",
 ]
+
+#: A writer of OpenImageIO, its file, and a check of the results of its calls.
+Steps: TypeAlias = tuple[Any, Path, Callable[[bool], None]]
 
 # Formats of OpenImageIO that discard the picture or print it on the terminal.
 _FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
@@ -203,22 +208,8 @@ def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
     ----------
     oiio : module
         OpenImageIO.
-    file : Path
-        The file to replace or create.
-    size : int
-        Bytes of the pixels.
-
-    Yields
-    ------
-    Path
-        The temporary file, with the extension of `file`.
-
-    Raises
-    ------
-    ValueError
-        The name is not UTF-8.
-    OSError
-        The file cannot be written; the error names it.
+    file, size
+        As for `reserve`, which also names the errors.
     """
     temporary = reserve(file, size)
     try:
@@ -227,6 +218,38 @@ def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
         put_in_place(temporary, file)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def writing(oiio: ModuleType, file: Path) -> Iterator[Steps]:
+    """Yield a writer of OpenImageIO for the temporary file of `replacing`, and close it.
+
+    Parameters
+    ----------
+    oiio : module
+        OpenImageIO.
+    file : Path
+        The file to replace or create.
+
+    Yields
+    ------
+    Steps
+        The writer, not opened yet; the temporary file; and a function that takes the results of
+        the writer's calls, and raises OSError for a failed one.
+    """
+    with replacing(oiio, file, 0) as temporary:
+        writer: Any = oiio.ImageOutput.create(str(temporary))
+
+        def check(done: bool) -> None:
+            if not done:
+                raise write_error(writer, temporary, file)
+
+        try:
+            yield writer, temporary, check
+            check(writer.close())
+        finally:
+            # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
+            writer.geterror()
 
 
 def write_file(file: Path, content: bytes) -> None:
@@ -295,7 +318,7 @@ def _is_readable(oiio: ModuleType, file: Path) -> bool:
         oiio.geterror()
         return False
     spec = reader.spec()
-    # Some rows at a time: large files are not held as a whole.
+    # Some rows at a time, so that large files are not completely in memory.
     rows = max(_READ_BYTES // max(spec.scanline_bytes(True), 1), 1)
     place, bottom = (0, 0), spec.y + spec.height
     readable = (

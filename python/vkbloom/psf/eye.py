@@ -83,8 +83,19 @@ class spencer(RadialPSF):
         return np.asarray(total + shares[3] * halo)
 
 
+class _AgeingEye(RadialPSF):
+    """Checks age and pigment."""
+
+    age: float
+    pigment: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "age", check_number("age", self.age, 0, 120))
+        object.__setattr__(self, "pigment", check_number("pigment", self.pigment, 0, 1.2))
+
+
 @dataclasses.dataclass(frozen=True)
-class cie_general(RadialPSF):
+class cie_general(_AgeingEye):
     """The CIE's general disability glare, 0.1 to 100 degrees.
 
     Parameters
@@ -119,9 +130,6 @@ class cie_general(RadialPSF):
     age: float = 35.0
     pigment: float = 0.5
 
-    def __post_init__(self) -> None:
-        _check_eye(self, self.age, self.pigment)
-
     def density(self, theta: ArrayLike) -> Array:  # noqa: D102  as of RadialPSF
         angle = np.maximum(np.asarray(theta, np.float64), 0.1)
         old = 1 + (self.age / 62.5) ** 4
@@ -130,7 +138,7 @@ class cie_general(RadialPSF):
 
 
 @dataclasses.dataclass(frozen=True)
-class cie_total(RadialPSF):
+class cie_total(_AgeingEye):
     """The CIE's total glare: the whole point-spread function of the eye.
 
     Parameters
@@ -166,9 +174,6 @@ class cie_total(RadialPSF):
     age: float = 35.0
     pigment: float = 0.5
 
-    def __post_init__(self) -> None:
-        _check_eye(self, self.age, self.pigment)
-
     def density(self, theta: ArrayLike) -> Array:  # noqa: D102  as of RadialPSF
         angle = np.asarray(theta, np.float64)
         old, p = (self.age / 70) ** 4, self.pigment
@@ -178,11 +183,6 @@ class cie_total(RadialPSF):
         veil = 400 / wide + 3e-8 * angle**2 + p * (1300 * wide**-1.5 + 0.8 * wide**-0.5)
         total = (1 - 0.08 * old) * core + (1 + 1.6 * old) * veil + 0.0025 * p
         return _grey(total / (1 + p * (0.0417 + 0.055 * old)))
-
-
-def _check_eye(psf: cie_general | cie_total, age: float, pigment: float) -> None:
-    object.__setattr__(psf, "age", check_number("age", age, 0, 120))
-    object.__setattr__(psf, "pigment", check_number("pigment", pigment, 0, 1.2))
 
 
 def _grey(values: Array) -> Array:

@@ -1,10 +1,10 @@
-"""The bloom methods in NumPy and float64, written from the formulas alone.
+"""The bloom methods in NumPy and float64, written only from the formulas.
 
-Slow, simple and independent of the device code: what a picture is compared with.
+It is slow, simple and independent of the device code. Tests compare pictures with it.
 
-`apply` gives all framebuffers of an image, `passes` and `blur` those of the blur alone,
-`composite` the final image, `gain` what a method does to a flat image of 1, and `shade` the light
-of the deferred system.
+`apply` returns all framebuffers of an image, `passes` and `blur` only those of the blur,
+`composite` the final image, `gain` the bloom of a flat image of 1, and `shade` the light of the
+deferred system.
 """
 
 from __future__ import annotations

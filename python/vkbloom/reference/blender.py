@@ -56,17 +56,7 @@ def passes(
         level = halved(level)
         shrink = _weighted_taps if k == 1 else downsample
         downs.append(store(shrink(downs[-1], level)))
-    ones = [1.0] * count
-    return combine(
-        downs,
-        size,
-        store,
-        own=ones,
-        coarse=ones,
-        upsample=tent_of_target,
-        last=linear,
-        gain=1 / count,
-    )
+    return combine(downs, size, store, upsample=tent_of_target, last=linear, gain=1 / count)
 
 
 def gain(settings: BlenderGlare) -> float:

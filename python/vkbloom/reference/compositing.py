@@ -16,7 +16,7 @@ __all__ = ["check_settings", "composite"]
 
 
 class CompositeSettings(Protocol):
-    """What the last pass reads of any settings; of Godot's also `white`."""
+    """The settings that the last pass reads. For Godot it also reads `white`."""
 
     @property
     def method(self) -> str: ...
@@ -41,7 +41,7 @@ class CompositeSettings(Protocol):
 
 
 def check_settings(settings: object) -> None:
-    """Raise TypeError for what has not even the fields that all settings have."""
+    """Raise TypeError for an object without the fields that all settings have."""
     if not hasattr(settings, "composite"):
         raise TypeError(f"settings must be vkbloom.Settings, not {settings!r}")
 
@@ -56,42 +56,43 @@ def composite(
 ) -> Array:
     """Return the final image: composite, exposure, tone map, encoding, dither, in this order.
 
-    With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" s + (b - s) i
-    and "screen" 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies
-    by 2^e. `vkbloom.GodotBloom` has composites of its own, with the exposure before. Dither rounds
-    uint8 to floor(255 c + n) / 255 with c clamped to 0..1 and n a noise of 0..1, and leaves other
-    types alone. All of it works on rgb. ``settings.alpha`` is what becomes of the scene's alpha a:
-    "keep" a; "max" max(a, clamp(max over rgb of i b, 0, 1)); "blur", with the bloom's alpha b_a,
-    1 - (1 - a)(1 - clamp(i b_a, 0, 1)).
+    With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" is s + (b - s) i, and
+    "screen" is 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies by
+    2^e. `vkbloom.GodotBloom` has its own composites, with the exposure before them. Dither rounds
+    uint8 to floor(255 c + n) / 255, with c clamped to 0..1 and a noise n in 0..1. It does not
+    change other types. All this applies to rgb. ``settings.alpha`` selects the result's alpha from
+    the scene's alpha a: "keep" is a; "max" is max(a, clamp(max over rgb of i b, 0, 1)); "blur",
+    with the bloom's alpha b_a, is 1 - (1 - a)(1 - clamp(i b_a, 0, 1)).
 
-    Where the bloom came of a share of the scene only, "mix" is s + i (b - share s).
+    If the bloom was made from only a share of the scene, "mix" is s + i (b - share s).
 
-    A component of the scene that is NaN or infinite stays so. To the tone maps that mix the
-    channels it counts as 0.
+    A component of the scene that is NaN or infinite stays so. It counts as 0 in tone maps that mix
+    the channels.
 
     Parameters
     ----------
     scene : ndarray, shape (H, W, 3) or (H, W, 4)
         uint8 (read as value / 255), float16, float32 or float64.
     bloom : ndarray, shape (H, W, 3) or (H, W, 4), or None
-        Of the same types, finite. Not read where ``settings.bloom`` is off.
+        Finite, of the same types. Not read if ``settings.bloom`` is off.
     settings : vkbloom.Settings
     dtype : dtype, optional
-        Of the final image; the scene's by default. The result is clamped to what it holds.
+        Dtype of the final image; by default the scene's. The result is clamped to its range.
     share : float or ndarray, shape (H, W, 1)
-        Of the scene in the bloom's source: the mask, or 0 where an emission took its place.
+        The share of the scene in the bloom's source: the mask, or 0 with an emission.
 
     Returns
     -------
     ndarray of float64, shape of the scene
-        In real units, not rounded to `dtype` but by the dither.
+        In real units. Only the dither rounds to `dtype`.
 
     Raises
     ------
     TypeError
-        An image of another dtype, or none where the bloom is on; `settings` are none.
+        An image has another dtype, `bloom` is missing while the bloom is on, or `settings` is not
+        Settings.
     ValueError
-        An image of another shape, or sizes that differ.
+        An image has another shape, or the sizes differ.
 
     See Also
     --------
@@ -125,7 +126,7 @@ def composite(
                 f"not {glow.shape[:2]}"
             )
         if settings.method == "godot":
-            # Its glow was exposed before the threshold.
+            # The glow was already exposed before the threshold.
             rgb = _godots(rgb * scale, glow, settings, curve, share)
         else:
             rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
@@ -141,7 +142,7 @@ def composite(
 
 
 def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Array:
-    """Return the alpha of the final image, (H, W, 1), or (H, W, 0) where the scene has none."""
+    """Return the alpha of the final image, (H, W, 1); (H, W, 0) if the scene has none."""
     if settings.alpha == "max":
         brightest = settings.intensity * bloom[..., :3].max(axis=-1, keepdims=True)
         larger: Array = np.maximum(alpha, np.clip(brightest, 0, 1))
@@ -154,7 +155,7 @@ def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Arr
 
 
 def _blend(scene: Array, bloom: Array, mode: str, intensity: float, share: float | Array) -> Array:
-    """Return scene and bloom as one image."""
+    """Return the combination of scene and bloom."""
     if mode == "add":
         return scene + intensity * bloom
     if mode == "mix":
@@ -171,7 +172,7 @@ def _godots(
     curve: Callable[[Array], Array],
     share: float | Array,
 ) -> Array:
-    """Return scene and bloom past the tone map, as Godot blends them.
+    """Return scene and bloom after the tone map, as Godot blends them.
 
     From godotengine/godot, servers/rendering/renderer_rd/shaders/effects/tonemap.glsl
     @ 001c8c9c24dc.
@@ -192,10 +193,11 @@ def _godots(
 
 
 def _noise(size: tuple[int, int], seed: int) -> Array:
-    """Return the noise of an image of (height, width): (n + 1/2) / 4096, n of 0..4095, a channel.
+    """Return the noise of an image of (height, width): (n + 1/2) / 4096, n in 0..4095.
 
-    n are the upper 12 bits of the three numbers of 32 bits that pcg3d makes of column, row and
-    seed (Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020).
+    For each channel, n is the upper 12 bits of one of the three 32-bit numbers that pcg3d computes
+    from column, row and seed (Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3),
+    2020).
     """
     rows, columns = np.indices(size, np.uint32)
     state = [columns, rows, np.full(size, seed, np.uint32)]

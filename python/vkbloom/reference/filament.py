@@ -59,17 +59,7 @@ def passes(
         is_even = level[0] % 2 == 0 and level[1] % 2 == 0
         level = halved(level)
         downs.append(store((_nine_taps if is_even else downsample)(downs[-1], level)))
-    ones = [1.0] * count
-    return combine(
-        downs,
-        size,
-        store,
-        own=ones,
-        coarse=ones,
-        upsample=tent_of_target,
-        last=linear,
-        gain=1 / count,
-    )
+    return combine(downs, size, store, upsample=tent_of_target, last=linear, gain=1 / count)
 
 
 def gain(settings: FilamentBloom) -> float:

@@ -33,7 +33,7 @@ __all__ = ["apply", "blur", "gain", "passes"]
 
 
 class Settings(CompositeSettings, Protocol):
-    """What the reference reads of any settings; each method reads its own fields beside it."""
+    """The settings that the reference reads for all methods; each method also has its own."""
 
     method: ClassVar[str]
 
@@ -58,12 +58,12 @@ class _Method(NamedTuple):
         ``passes(glow, settings, size, store)`` returns the framebuffers after the glow, in the
         order of the data flow; the last one is "bloom". `glow` is the content of the first bloom
         buffer, (H, W, C) of float64, with 1, 3 or, with alpha, 4 channels where a method reads a
-        luminance. `size` is the width and height of the bloom. `store` converts values as storing
-        in a bloom buffer does. A published method also takes a mask, (h, w, 1) of float64 or None,
+        luminance. `size` is the width and height of the bloom. `store` converts values as a store
+        to a bloom buffer does. A published method also takes a mask, (h, w, 1) of float64 or None,
         which multiplies the result of its threshold.
     gain : callable
-        ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns what a flat image of 1
-        becomes.
+        ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns the bloom of a flat
+        image of 1.
     published : bool
         Whether `passes` reduces the frame and applies the threshold itself.
     sized : bool
@@ -106,15 +106,15 @@ def apply(
     centres, thresholded, blurred and composited. Components that are NaN or infinite count as
     0 in the bloom and stay as they are in "final".
 
-    An emission takes the image's place up to the composite. A mask is reduced like the image and
-    multiplies what the threshold lets through; published methods, which apply their threshold
-    while they downsample, read it at the pixel centres of the image that this pass writes. With
-    ``settings.alpha`` "blur" alpha is a fourth channel of all this: the weights follow from rgb,
-    and bounds of colours (such as a clamp against overflow) are not alpha's.
+    An emission replaces the image up to the composite. A mask is reduced like the image and
+    multiplies the thresholded image. Published methods apply their threshold while they downsample;
+    they read the mask at the pixel centres of the image that this pass writes. With
+    ``settings.alpha`` "blur", alpha is a fourth channel: the weights follow from rgb, and limits of
+    colours (such as a clamp against overflow) do not apply to alpha.
 
-    Bloom buffers of the format "rgba8unorm" are clamped to 0..1 wherever they are stored, those
-    of "rgba16float" to +-65504; nothing is rounded to a format's steps, but in "rg11b10ufloat".
-    Published methods keep only their levels in that format: "glow" and "bloom" are not rounded.
+    Every store to a bloom buffer clamps: to 0..1 in "rgba8unorm", to +-65504 in "rgba16float". Only
+    "rg11b10ufloat" also rounds to the steps of the format. Published methods store only their
+    levels in that format: their "glow" and "bloom" are not rounded.
 
     Parameters
     ----------
@@ -124,31 +124,30 @@ def apply(
         "rgba32float".
     settings : vkbloom.Settings
     mask : ndarray, shape (H, W), optional
-        uint8 (read as value / 255), bool or floats of 0 to 1.
+        uint8 (read as value / 255), bool, or floats in 0..1.
     emission : ndarray, optional
         Of the image's shape and dtype.
 
     Returns
     -------
     dict of str to ndarray of float64
-        In the order of the data flow: "glow", then the blur's (`passes`), then "final". Real
-        units: 0..1 for what a device stores as unorm. Bloom buffers have 4 channels, with
-        alpha 1 but for ``settings.alpha`` "blur"; "final" has the image's channels. With
-        ``settings.bloom`` off, "final" alone.
+        In the order of the data flow: "glow", then those of `passes`, then "final". The values are
+        in real units: 0..1 for unorm formats. Bloom buffers have 4 channels. Their alpha is 1,
+        except with ``settings.alpha`` "blur". "final" has the image's channels. With
+        ``settings.bloom`` off there is only "final".
 
     Raises
     ------
     TypeError
-        An image of another dtype, or `settings` that are none.
+        The image has another dtype, or `settings` is not Settings.
     ValueError
-        An image of another shape; a mask of another size or with other values; an emission of
-        another shape or dtype; ``settings.alpha`` "max" or "blur" without an alpha.
+        The image has another shape; the mask another size or other values; the emission another
+        shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
 
     See Also
     --------
-    passes : The blur alone.
-    composite : The last step alone.
-    vkbloom.Renderer.apply : The same on a device.
+    passes : Only the blur.
+    composite : Only the last step. vkbloom.Renderer.apply : The same on a device.
 
     Examples
     --------
@@ -183,7 +182,7 @@ def apply(
         glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), weights))
         blurred = method.passes(glow, settings, (width, height), store)
     framebuffers = _with_alphas({"glow": glow, **blurred})
-    # What of the scene the bloom came of.
+    # The share of the scene from which the bloom is made.
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     bloom = framebuffers["bloom"]
     framebuffers["final"] = composite(scene, bloom, settings, dtype, share=share)
@@ -198,26 +197,25 @@ def passes(
     *,
     mask: NDArray[Any] | None = None,
 ) -> dict[str, Array]:
-    """Return the framebuffers that the blur makes of a glow: no threshold, no composite.
+    """Return the framebuffers of the blur of a glow, without threshold and composite.
 
     Parameters
     ----------
     glow : ndarray, shape (H, W, C)
-        What the bloom buffers begin with, at their size: uint8 (read as value / 255), float16,
-        float32 or float64. A fourth channel of four is alpha and comes out as 1, but for
-        ``settings.alpha`` "blur"; otherwise each channel is blurred by itself. NaN and infinity
-        count as 0.
+        The content of the first bloom buffer, at its size: uint8 (read as value / 255), float16,
+        float32 or float64. A fourth channel is alpha; it becomes 1, except with ``settings.alpha``
+        "blur". All other channels are blurred separately. NaN and infinity count as 0.
     settings : vkbloom.Settings
-        Those of the blur are used, and `format`.
+        Only the fields of the blur and `format` are used.
     size : (int, int), optional
-        Width and height of the final image, at whose pixels the last pass is evaluated; by
-        default the glow's own.
+        Width and height of the final image, at whose pixels the last pass is evaluated; by default
+        those of the glow.
     format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"}, optional
-        Of the bloom buffers; by default that of the settings, and where that is None, the one
+        Format of the bloom buffers; by default that of the settings, and if this is None, the one
         of the glow's dtype.
     mask : ndarray, shape (height, width), optional
-        Multiplies what passes the threshold of a published method, as in `apply`. The glow of
-        other methods has come past threshold and mask.
+        Multiplies the thresholded image of a published method, as in `apply`. For other methods the
+        glow is already thresholded and masked.
 
     Returns
     -------
@@ -228,9 +226,9 @@ def passes(
     Raises
     ------
     TypeError
-        A glow of another dtype, or `settings` that are none.
+        The glow has another dtype, or `settings` is not Settings.
     ValueError
-        A glow of another shape, a size under 1 or an unknown format.
+        The glow has another shape, the size is below 1, or the format is unknown.
 
     See Also
     --------
@@ -270,7 +268,7 @@ def blur(
     size: tuple[int, int] | None = None,
     format: str | None = None,
 ) -> Array:
-    """Return the bloom that the blur makes of a glow: no threshold, no composite.
+    """Return the bloom of a glow, without threshold and composite.
 
     Parameters
     ----------
@@ -302,15 +300,15 @@ def blur(
 
 
 def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
-    """Return the bloom of a flat image of 1, before any clamp and before the intensity.
+    """Return the bloom of a flat image of 1, without clamps and before the intensity.
 
     Parameters
     ----------
     settings : vkbloom.Settings
-        A threshold that they set has its effect: a flat image of 1 passes through it first.
+        Their threshold is applied to the flat image of 1.
     size : (int, int), optional
-        Width and height of the image. Counts with `vkbloom.KinoBloom`, which adds more levels
-        the higher the image is, and in the eighth digit with `vkbloom.UrpBloom`.
+        Width and height of the image. It matters for `vkbloom.KinoBloom`, which has more levels for
+        higher images, and in the eighth digit for `vkbloom.UrpBloom`.
 
     Returns
     -------
@@ -319,7 +317,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
 
     See Also
     --------
-    vkbloom.testing.assert_gain : Asserts it of any bloom.
+    vkbloom.testing.assert_gain : Asserts the gain of any bloom.
 
     Examples
     --------
@@ -371,7 +369,7 @@ def _with_alphas(framebuffers: dict[str, Array]) -> dict[str, Array]:
 
 
 def _with_alpha(image: Array) -> Array:
-    """Return rgb with a fourth channel of 1, four channels as they are."""
+    """Return rgb with a fourth channel of 1. Four channels are returned unchanged."""
     if image.shape[2] == 4:
         return image
     return np.concatenate([image, np.ones((*image.shape[:2], 1))], axis=-1)

@@ -22,7 +22,7 @@ __all__ = ["gain", "passes"]
 
 _WEIGHTS = (0.2024, 0.1790, 0.1240, 0.0672, 0.0285)
 _LUMINANCE = np.array([0.299, 0.587, 0.114])
-# Weights up to this one count as none.
+# Levels with a weight up to this one are left out.
 _LEAST_WEIGHT = 1e-4
 
 

@@ -18,7 +18,7 @@ _FORMATS = {
     "uint8": "rgba8unorm",
     "float16": "rgba16float",
     "float32": "rgba32float",
-    # No bloom buffer has doubles. They are for work within the reference, and are not clamped.
+    # There are no bloom buffers of doubles. Only the reference uses them, without clamps.
     "float64": "rgba32float",
 }
 
@@ -31,7 +31,7 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     image : ndarray, shape (H, W, C)
         uint8 (read as value / 255), float16, float32 or float64.
     name : str
-        Of the argument, for the errors.
+        Name of the argument, for error messages.
     channels : collection of int, optional
         Accepted numbers of channels C; by default any.
 
@@ -42,7 +42,7 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     Raises
     ------
     TypeError
-        Another dtype.
+        The image has another dtype.
     ValueError
         Another shape.
     """
@@ -66,9 +66,9 @@ def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
     Parameters
     ----------
     mask : ndarray, shape (H, W)
-        uint8 (read as value / 255), bool, or any floats.
+        uint8 (read as value / 255), bool, or floats.
     size : (int, int)
-        The width and height that it must have.
+        The required width and height.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
     Raises
     ------
     ValueError
-        Another size, or a value that is not within 0 to 1.
+        The mask has another size, or a value that is not in 0..1.
     """
     array = np.asarray(mask)
     if array.shape != size[::-1]:
@@ -89,12 +89,12 @@ def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
 
 
 def finite(image: Array) -> Array:
-    """Return the image with 0 in place of every component that is NaN or infinite."""
+    """Return the image with 0 instead of NaN and infinity."""
     return np.where(np.isfinite(image), image, 0.0)
 
 
 def format_of(image: NDArray[Any], format: str | None) -> str:
-    """Return the format of the bloom buffers: the one asked for, or that of the image's dtype."""
+    """Return the format of the bloom buffers: `format`, or by default that of the image's dtype."""
     return _FORMATS[np.asarray(image).dtype.name] if format is None else format
 
 
@@ -153,7 +153,7 @@ _STORAGES = {
 
 
 def storage(format: str) -> Storage:
-    """Return what storing in a bloom buffer of a format does to the values.
+    """Return the effect of storing values in a bloom buffer of a format.
 
     Parameters
     ----------

@@ -46,8 +46,7 @@ def passes(
         image = store(_box(image, level, settings.anti_flicker and k == 0))
         downs.append(image)
     up = partial(tent, x_step=step, y_step=step)
-    ones = [1.0] * count
-    ups = combine(downs, size, store, own=ones, coarse=ones, upsample=up, last=up)
+    ups = combine(downs, size, store, upsample=up, last=up)
     return {"bright": bright, **ups}
 
 

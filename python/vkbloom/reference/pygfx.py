@@ -45,13 +45,10 @@ def passes(
         image = np.maximum(shrink(image, level), 0)
         image = store(masked(image, mask) if k == 0 else image)
         downs.append(image)
-    ones = [1.0] * len(downs)
     return combine(
         downs,
         size,
         store,
-        own=ones,
-        coarse=ones,
         upsample=lambda image, larger: _tent(image, larger, settings.filter_radius),
         last=linear,
     )

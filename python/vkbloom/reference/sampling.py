@@ -1,9 +1,9 @@
 """Bilinear sampling of an image at a grid of positions, clamped to the edge.
 
 All passes of the bloom methods read at positions that form a grid: the pixel centres of the
-image they write, moved by the offset of a tap. Bilinear interpolation and clamping work on
-each axis by itself, so that a pass (or a term of it) is one matrix for the rows and one for
-the columns. The matrices are banded; they are built and applied in blocks of output rows.
+image they write, moved by the offset of a tap. Bilinear interpolation and clamping are separable,
+so a pass (or a term of it) is one matrix for the rows and one for the columns. The matrices are
+banded. They are built and applied in blocks of output rows.
 """
 
 from __future__ import annotations
@@ -22,22 +22,21 @@ Taps = Sequence[tuple[float, float]]
 
 CENTRE: Taps = ((0.0, 1.0),)
 
-# Output rows per block: wide enough for fast products, narrow enough that a block of a large
-# image does not multiply with many zeros beside its band.
+# Output rows per block: enough for fast matrix products, and few enough that a block of a large
+# image has few zeros beside its band.
 _BLOCK = 32
 
 
 def sample(
     image: Array, size: tuple[int, int], x_taps: Taps = CENTRE, y_taps: Taps = CENTRE
 ) -> Array:
-    """Read an image around the pixel centres of another one, and sum what the taps find.
+    """Sample an image with taps around the pixel centres of another one, and add them.
 
-    The pixel (i, j) of the result has its centre at ((i + 0.5) / width, (j + 0.5) / height)
-    in normalized coordinates, which is ((i + 0.5) / width * w - 0.5) in texels of the image
-    that is read, w texels wide, with texel n at n. Between texels the value is the linear
-    interpolation of the two nearest on each axis (the Vulkan specification, chapter "Image
-    Operations", section "Texel Filtering", of linear filters); beyond the edge it is the
-    edge's.
+    The pixel (i, j) of the result has its centre at ((i + 0.5) / width, (j + 0.5) / height) in
+    normalized coordinates. In texels of the image that is read, with texel n at n and w texels in a
+    row, this is (i + 0.5) / width * w - 0.5. Between texels the value is the linear interpolation
+    of the two nearest texels along each axis (the Vulkan specification, chapter "Image Operations",
+    section "Texel Filtering", of linear filters). Outside of the image it is the value at the edge.
 
     Parameters
     ----------
@@ -46,8 +45,8 @@ def sample(
     size : (int, int)
         Width and height of the result, in pixels.
     x_taps, y_taps : sequence of (float, float)
-        Offset, in texels of `image`, and weight of each tap along the axis. The taps of both
-        axes form a grid, with the products of their weights.
+        Offset (in texels of `image`) and weight of each tap along the axis. The taps of both axes
+        form a grid, and their weights are multiplied.
 
     Returns
     -------
@@ -79,7 +78,7 @@ def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
         first = int(texels.min())
         band = int(texels.max()) + 1 - first
         output_rows = np.arange(stop - start)[:, np.newaxis]
-        # Taps that meet in one texel add up there, which bincount does.
+        # bincount adds up taps at the same texel.
         matrix = np.bincount(
             (output_rows * band + texels - first).ravel(),
             weights=weights.ravel(),
@@ -90,7 +89,7 @@ def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
 
 
 def read_rows(image: Array, positions: Array) -> Array:
-    """Read an image along its first axis at any positions, bilinear, clamped to the edge.
+    """Sample an image along its first axis at any positions, linearly and clamped to the edge.
 
     Parameters
     ----------
@@ -112,12 +111,12 @@ def read_rows(image: Array, positions: Array) -> Array:
 
 
 def weighted_mean(parts: Iterable[tuple[Array | float, Array]]) -> Array:
-    """Return the mean of images, each with its weight.
+    """Return the weighted mean of images.
 
     Parameters
     ----------
     parts : iterable of (float or ndarray, ndarray)
-        A number or an array of shape (H, W, 1), and the image, shape (H, W, C).
+        The weight, a number or an array of shape (H, W, 1); and the image of shape (H, W, C).
 
     Returns
     -------

@@ -12,7 +12,7 @@ from .sampling import Array
 
 __all__ = ["shade"]
 
-# Figures of the forward system's Phong pass; the light stands still in view space.
+# Values of the forward system's Phong pass. The light has a fixed position in view space.
 _LIGHT = np.array([-5.0, -5.0, 0.0])
 _LAMP = 0.9
 _AMBIENT = 0.25
@@ -26,35 +26,36 @@ def shade(
     position: NDArray[Any],
     brightness: NDArray[Any],
 ) -> Array:
-    """Return the deferred system's "scene": what is lit, plus what is emitted.
+    """Return the deferred system's "scene": the reflected light plus the emission.
 
-    With c the albedo, N the normal, P the position, L the direction from P to the light at
-    (-5, -5, 0), V that to the camera at the origin and R = 2 (N.L) N - L, all of length 1:
+    With the albedo c, the normal N, the position P, the direction L from P to the light at (-5, -5,
+    0), the direction V from P to the camera at the origin, and R = 2 (N.L) N - L, all directions of
+    length 1:
 
         c / 4 where any channel of c is 0.9 or more (a lamp's ambient light), else 0
         + max(N.L, 0) c + 0.75 max(R.V, 0)^8 + brightness
 
-    Where the normal is (0, 0, 0) there is no surface, and c + brightness is the result. The
-    formula is that of the forward system's Phong pass; its 0.9 is rounded to the albedo's dtype.
+    A normal of (0, 0, 0) means no surface; then the result is c + brightness. The formula is that
+    of the forward system's Phong pass. Its 0.9 is rounded to the albedo's dtype.
 
     Parameters
     ----------
     albedo, normal, position, brightness : ndarray, shape (H, W, 3) or (H, W, 4)
-        Framebuffers of a deferred frame, or others in their place: float16, float32 or float64,
-        finite. Normal and position in view space, the position in units of the scene; the normal
-        need not have length 1. A fourth channel is not read.
+        Framebuffers of a deferred frame, or similar arrays: float16, float32 or float64, finite.
+        Normal and position are in view space, the position in scene units. The normal may have any
+        length. A fourth channel is not read.
 
     Returns
     -------
     ndarray of float64, shape (H, W, 4)
-        Kept within +-65504, which is what "rgba16float" holds, but not rounded to it. Alpha is 1.
+        Clamped to +-65504, the range of "rgba16float", but not rounded. Alpha is 1.
 
     Raises
     ------
     TypeError
-        An array of another dtype.
+        An array has another dtype.
     ValueError
-        An array of another shape, or shapes that differ.
+        An array has another shape, or the shapes differ.
 
     See Also
     --------
@@ -90,7 +91,7 @@ def shade(
     n, to_light, to_camera = _unit(normals), _unit(_LIGHT - places), _unit(-places)
     facing = _dot(n, to_light)
     reflected = 2 * facing * n - to_light
-    # In the precision of the albedo, so that a lamp of 0.9 stays one as a half float.
+    # Rounded to the albedo's dtype, so that a half float of 0.9 is still a lamp.
     lamp = float(albedo.dtype.type(_LAMP))
     ambient = np.where((colour >= lamp).any(axis=-1, keepdims=True), _AMBIENT * colour, 0.0)
     specular = _SPECULAR * np.maximum(_dot(reflected, to_camera), 0) ** _SHININESS
@@ -105,6 +106,6 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _unit(vectors: Array) -> Array:
-    """Return the vectors at length 1; those without length stay as they are."""
+    """Return the vectors with length 1. Vectors of length 0 stay as they are."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1.0)

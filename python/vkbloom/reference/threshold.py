@@ -18,8 +18,7 @@ def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
     Parameters
     ----------
     rgb : ndarray of float64, shape (..., 3), (..., 4) or (..., 1)
-        A fourth channel is alpha, which does not count. One channel is grey, whose luminance is
-        itself.
+        A fourth channel is alpha, which is ignored. A single channel is its own luminance.
     coefficients : ndarray of float64, shape (3,)
         Sources differ in the last digits.
 
@@ -60,7 +59,7 @@ def firefly_weight(brightness: Array) -> Array:
 
 
 def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
-    """Keep what is brighter than the threshold.
+    """Keep colours brighter than the threshold.
 
     Without a knee, a colour does not change if its luminance is greater than the threshold, and
     becomes 0 otherwise. With a knee, the colour is scaled by max(q, b - threshold) / max(b, 1e-5)

@@ -40,15 +40,14 @@ def _khronos_neutral(rgb: Array) -> Array:
     """Apply Khronos PBR Neutral, from its specification.
 
     Source: github.com/KhronosGroup/ToneMapping, PBR_Neutral/README.md, section "PBR Neutral
-    Specification", whose symbols F90, K_s, K_d, f, p, p_n and g these are. Input and output
-    are linear.
+    Specification", with its symbols F90, K_s, K_d, f, p, p_n and g. Input and output are linear.
     """
     fresnel, start, desaturation = 0.04, 0.8 - 0.04, 0.15
     least = rgb.min(axis=-1, keepdims=True)
     toe = np.where(least <= 2 * fresnel, least - least**2 / (4 * fresnel), fresnel)
     colour = rgb - toe
     peak = colour.max(axis=-1, keepdims=True)
-    # Only pixels beyond the start are compressed; the others take a divisor that is safe.
+    # Only pixels above the start are compressed. The others get a divisor that is not 0.
     compressed = peak > start
     peak = np.where(compressed, peak, 1.0)
     new_peak = 1 - (1 - start) ** 2 / (peak + 1 - 2 * start)
@@ -57,8 +56,8 @@ def _khronos_neutral(rgb: Array) -> Array:
 
 
 # Matrices of three.js, release 185, src/renderers/shaders/ShaderChunk/
-# tonemapping_pars_fragment.glsl.js, here with the rows as rows. Rec. 2020 <-> sRGB from
-# Report ITU-R BT.2407; inset and outset from Blender's AgX.
+# tonemapping_pars_fragment.glsl.js, written by rows here. Rec. 2020 <-> sRGB from Report ITU-R
+# BT.2407; inset and outset from Blender's AgX.
 _SRGB_TO_REC2020 = np.array(
     [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]]
 )
@@ -86,11 +85,11 @@ _AGX_CONTRAST = (15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232)
 
 
 def _agx(rgb: Array) -> Array:
-    """Apply AgX with its default look, as three.js (release 185) has it.
+    """Apply AgX with its default look, as in three.js (release 185).
 
     Linear sRGB -> linear Rec. 2020 -> inset -> log2 between two exposures as 0..1 -> contrast
-    polynomial -> outset -> power 2.2, which undoes the curve's display encoding -> linear
-    sRGB, clamped to 0..1. Input and output are linear: an encoding still has to follow.
+    polynomial -> outset -> power 2.2, which removes the curve's display encoding -> linear sRGB,
+    clamped to 0..1. Input and output are linear, so an encoding has to follow.
     """
     colour = np.maximum(rgb @ (_AGX_INSET @ _SRGB_TO_REC2020).T, 1e-10)
     stops = (np.log2(colour) - _AGX_MIN_EV) / (_AGX_MAX_EV - _AGX_MIN_EV)
@@ -111,8 +110,8 @@ def _srgb(rgb: Array) -> Array:
     return np.where(positive <= 0.0031308, 12.92 * positive, 1.055 * positive ** (1 / 2.4) - 0.055)
 
 
-# By the name in the settings. Each takes and returns finite rgb, (..., 3), of float64. The
-# curves are meant for values from 0 up; below 0 the formulas are taken as they stand.
+# By name in the settings. Each takes and returns finite rgb, (..., 3), of float64. The curves are
+# defined for values of at least 0; for negative values the formulas are used unchanged.
 TONE_MAPS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
     {
         "none": _none,

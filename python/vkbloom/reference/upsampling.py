@@ -95,10 +95,10 @@ def combine(
     size: tuple[int, int],
     store: Storage,
     *,
-    own: Sequence[float],
-    coarse: Sequence[float],
     upsample: Filter,
     last: Filter,
+    own: Sequence[float] | None = None,
+    coarse: Sequence[float] | None = None,
     smallest: float = 1.0,
     gain: float = 1.0,
     end: Callable[[Array], Array] | None = None,
@@ -117,15 +117,15 @@ def combine(
     size : (int, int)
         Width and height of the bloom.
     store : Storage
-        What storing in a bloom buffer does to the values.
-    own, coarse : sequence of float
-        Shares of the level and of those below it; N - 1 entries are read.
+        The effect of storing values in a bloom buffer.
     upsample, last : callable
         The filters between levels and to the bloom.
+    own, coarse : sequence of float, optional
+        Shares of the level and of the smaller levels; N - 1 entries are read. Default: all 1.
     smallest, gain : float, optional
         Factors of the smallest level and of the bloom.
     end : callable, optional
-        What storing the bloom does to the values; by default ``store.end``.
+        The effect of storing the bloom; by default ``store.end``.
 
     Returns
     -------
@@ -133,7 +133,9 @@ def combine(
         "down_0" to "down_N-1", "up_N-2" to "up_0" and "bloom".
     """
     framebuffers = {f"down_{k}": down for k, down in enumerate(downs)}
-    # up_k is what is stored, times the factor. The smallest level is stored without its factor.
+    own = own or [1.0] * len(downs)
+    coarse = coarse or [1.0] * len(downs)
+    # up_k is the stored image times the factor. The smallest level is stored without its factor.
     up, factor = downs[-1], smallest
     for k in range(len(downs) - 2, -1, -1):
         height, width, _ = downs[k].shape

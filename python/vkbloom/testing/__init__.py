@@ -15,6 +15,7 @@ from vkbloom.testing.laws import (
     assert_superposition,
     assert_symmetric,
 )
+from vkbloom.testing.moving_light import Stability, assert_stable, stability
 from vkbloom.testing.point_spread import (
     Response,
     assert_centroid_kept,
@@ -25,24 +26,35 @@ from vkbloom.testing.point_spread import (
 )
 from vkbloom.testing.probe import Probe
 from vkbloom.testing.regression import FrameDifferenceWarning, FrameRegression
+from vkbloom.testing.scaled_scene import (
+    ResolutionResponse,
+    assert_resolution_independent,
+    resolution_response,
+)
 from vkbloom.views.tolerances import Tolerances
 
 __all__ = [
     "FrameDifferenceWarning",
     "FrameRegression",
     "Probe",
+    "ResolutionResponse",
     "Response",
+    "Stability",
     "Tolerances",
     "assert_additive",
     "assert_bounded_fireflies",
     "assert_centroid_kept",
     "assert_gain",
     "assert_no_ringing",
+    "assert_resolution_independent",
     "assert_separable",
     "assert_spread",
+    "assert_stable",
     "assert_superposition",
     "assert_symmetric",
     "point_spread",
     "read_frame",
+    "resolution_response",
     "response",
+    "stability",
 ]

@@ -20,6 +20,8 @@ __all__ = [
     "assert_centroid_kept",
     "assert_separable",
     "assert_spread",
+    "border_share",
+    "check_inside",
     "point_spread",
     "response",
 ]
@@ -180,7 +182,7 @@ def assert_centroid_kept(
     check_number("within", within, 0.0, math.inf)
     spread, error = _measured(bloom, probe, at)
     _check_lit("assert_centroid_kept", spread, error)
-    _check_inside(spread)
+    check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
     place = at or probe.centre
     for channel in range(spread.shape[2]):
         for axis, name in ((0, "x"), (1, "y")):
@@ -249,7 +251,7 @@ def assert_spread(
     check_number("rtol", rtol, 0.0, math.inf)
     spread, error = _measured(bloom, probe, None)
     _check_lit("assert_spread", spread, error)
-    _check_inside(spread)
+    check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
     for channel in range(spread.shape[2]):
         for axis, name in ((0, "x"), (1, "y")):
             profile = spread[:, :, channel].sum(axis=axis)
@@ -402,7 +404,7 @@ def response(
                 float(spread.max()),
                 shifts,
                 [_deviation(profile) for profile in profiles],
-                _border_share(spread),
+                border_share(spread),
             )
         )
     gain, peak, shift, sigma, at_border = (
@@ -444,17 +446,17 @@ def _check_lit(assertion: str, spread: Image, error: float) -> None:
             )
 
 
-def _check_inside(spread: Image) -> None:
-    for channel in range(spread.shape[2]):
-        share = _border_share(spread[:, :, channel])
-        if share > _AT_THE_BORDER:
-            raise ValueError(
-                f"probe: of the light, {100 * share:.3g} % lies in the outermost pixels of an "
-                f"image of {spread.shape[1]} x {spread.shape[0]}; a larger size is needed"
-            )
+def check_inside(share: float, size: tuple[int, int]) -> None:
+    """Raise ValueError if too large a share of the light reaches the border of the image."""
+    if share > _AT_THE_BORDER:
+        raise ValueError(
+            f"probe: of the light, {100 * share:.3g} % lies in the outermost pixels of an image of "
+            f"{size[0]} x {size[1]}; a larger size is needed"
+        )
 
 
-def _border_share(plane: Image) -> float:
+def border_share(plane: Image) -> float:
+    """Return the share of the light in the outermost pixels."""
     total = float(np.abs(plane).sum())
     inside = float(np.abs(plane[1:-1, 1:-1]).sum())
     return (total - inside) / total if total else 0.0

@@ -152,30 +152,48 @@ class Probe:
             The result is not finite.
         """
         __tracebackhide__ = True
-        result, dtype = self._called(bloom, image)
-        if exempt is not None:
-            result[exempt[1], exempt[0]] = 0
-        if not np.isfinite(result).all():
-            y, x, channel = (int(index) for index in np.argwhere(~np.isfinite(result))[0])
-            raise AssertionError(
-                f"the result is {result[y, x, channel]} at x {x}, y {y}, channel {channel}\n"
-                "  law: the bloom of finite values is finite"
-            )
-        atol, rtol = _ERRORS[dtype]
-        if self.atol is not None or self.rtol is not None:
-            atol, rtol = self.atol or 0.0, self.rtol or 0.0
-        return result, atol + rtol * float(np.abs(result).max())
-
-    def _called(self, bloom: Bloom, image: Image) -> tuple[Image, str]:
         if not callable(bloom):
             raise TypeError(f"bloom: {bloom!r} is not callable")
+        given = self.given(image)
+        return self.values(bloom(given), given, exempt=exempt)
+
+    def given(self, image: Image) -> NDArray[Any]:
+        """Return what a bloom gets for an image: in the probe's dtype and number of channels.
+
+        Parameters
+        ----------
+        image : ndarray of float64, shape (H, W, C)
+            In real units, C as in `colours`.
+
+        Returns
+        -------
+        ndarray, shape (H, W) or (H, W, channels)
+        """
         stored = self._stored(image)
         if self.channels == 4:
             opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
             alpha = np.full((*stored.shape[:2], 1), opaque, self.dtype)
             stored = np.concatenate([stored, alpha], axis=2)
-        given = np.ascontiguousarray(stored[:, :, 0] if self.channels is None else stored)
-        result = bloom(given)
+        return np.ascontiguousarray(stored[:, :, 0] if self.channels is None else stored)
+
+    def values(
+        self, result: object, given: NDArray[Any], *, exempt: tuple[int, int] | None = None
+    ) -> tuple[Image, float]:
+        """Check what a bloom returned for an image of `given`.
+
+        Parameters
+        ----------
+        result : array_like
+        given : ndarray
+        exempt : (int, int), optional
+            x and y of a pixel to ignore; it is 0 in the result.
+
+        Returns
+        -------
+        result, error
+            As for `apply`, which has the same errors.
+        """
+        __tracebackhide__ = True
         if isinstance(result, Mapping):
             raise TypeError(
                 "bloom: it returns a mapping; name the framebuffer, for example "
@@ -185,11 +203,23 @@ class Probe:
         if array.dtype.name not in _ERRORS:
             raise TypeError(f"bloom: it returns {array.dtype}, not one of {', '.join(_ERRORS)}")
         whole = array[:, :, np.newaxis] if array.ndim == 2 else array
-        if whole.ndim != 3 or whole.shape[:2] != image.shape[:2]:
+        if whole.ndim != 3 or whole.shape[:2] != given.shape[:2]:
             raise ValueError(f"bloom: it returns shape {array.shape} for {given.shape}")
         if whole.shape[2] < self.colours:
             raise ValueError(f"bloom: it returns {whole.shape[2]} channels for {self.colours}")
-        return self._real(whole[:, :, : self.colours]), array.dtype.name
+        real = self._real(whole[:, :, : self.colours])
+        if exempt is not None:
+            real[exempt[1], exempt[0]] = 0
+        if not np.isfinite(real).all():
+            y, x, channel = (int(index) for index in np.argwhere(~np.isfinite(real))[0])
+            raise AssertionError(
+                f"the result is {real[y, x, channel]} at x {x}, y {y}, channel {channel}\n"
+                "  law: the bloom of finite values is finite"
+            )
+        atol, rtol = _ERRORS[array.dtype.name]
+        if self.atol is not None or self.rtol is not None:
+            atol, rtol = self.atol or 0.0, self.rtol or 0.0
+        return real, atol + rtol * float(np.abs(real).max())
 
     def _stored(self, image: Image) -> NDArray[Any]:
         if self.dtype.kind == "u":

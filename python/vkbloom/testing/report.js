@@ -1,6 +1,6 @@
 "use strict";
 // One picture at the size of the window. The arrow keys change between expected, actual,
-// difference and FLIP in the same place, so that the eye sees what moves; Escape closes.
+// difference and FLIP in the same place, so that differences are visible. Escape closes.
 const dialog = document.querySelector("dialog");
 const large = dialog.querySelector("img");
 const caption = document.getElementById("caption");
@@ -17,7 +17,7 @@ function show(index) {
   for (const [place, button] of [...kinds.children].entries()) {
     button.setAttribute("aria-pressed", String(place === current));
   }
-  // The focus goes along, so that the button it outlines is the one that is pressed.
+  // The focus moves too, so that the outlined button is the pressed one.
   kinds.children[current].focus();
 }
 

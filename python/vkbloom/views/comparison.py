@@ -239,7 +239,7 @@ def _checked(name: str, image: NDArray[Any]) -> NDArray[Any]:
 
 
 def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
-    """List the reasons why two images cannot be compared value by value."""
+    """Return the reasons why two images cannot be compared value by value."""
     found: list[str] = []
     if a.shape[:2] != b.shape[:2]:
         sizes = (f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))

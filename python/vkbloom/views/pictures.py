@@ -33,7 +33,7 @@ _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 M
 
 
 def leading_png(frames: Framebuffers) -> bytes:
-    """Return the picture of `final`, or else the last image, or else the last framebuffer.
+    """Return the picture of `final`, or else of the last image, or else of the last framebuffer.
 
     8-bit images are shown as stored. Float images are clipped to 0..1 and shown with
     the sRGB curve, unless the settings' encoding was already applied to them; `normal`

@@ -16,10 +16,10 @@ __all__ = ["DEFAULTS", "Stage", "Tolerances", "failures", "worst"]
 
 Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "PSNR", "FLIP"]
 
-#: (atol, rtol) of each dtype. Integers: one level, which is what a value near the middle of two
-#: levels moves by. Half: four roundings of 2**-11 each, and absolutely a fortieth of an 8-bit
-#: level, for what is left of larger values that cancel out. Float: what lavapipe's linear filter
-#: of rgba32float is exact to.
+#: (atol, rtol) of each dtype. Integers: one level, by which a value near the middle of two levels
+#: may change. Half: relative, four roundings of 2**-11 each; absolute, a fortieth of an 8-bit
+#: level, for differences of larger values. Float: the accuracy of lavapipe's linear filter of
+#: rgba32float.
 DEFAULTS: Final[Mapping[str, tuple[float, float]]] = {
     "uint8": (1 / 255, 0.0),
     "uint16": (1 / 65535, 0.0),

@@ -1,0 +1,36 @@
+// Large images by bands of rows. Where the first smaller image of a graph is made of the source's
+// rows, and the result of the source's rows and a few smaller images, only these need to be held
+// as a whole: bands of the source become the first smaller image, this becomes the others, and they
+// and the bands of the source become bands of the result. Each of these is a part of the graph.
+#ifndef VKB_BANDS_H
+#define VKB_BANDS_H
+
+#include "graph/graph.h"
+
+struct vkb_bands {
+    uint32_t head;                     // the first smaller image; VKB_NO_IMAGE: there is none
+    uint32_t levels[GATHERED_LEVELS];  // the smaller images that the result is made of
+    uint32_t level_count;
+    uint32_t step;   // bands and what they are given beyond them are multiples of this, in rows
+    uint32_t reach;  // rows beyond a band that it may depend on
+};
+
+// Finds the parts of a graph of images that are `height` rows high. False if it has no such parts.
+bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t height,
+                     struct vkb_bands *bands);
+
+typedef char vkb_image_name[VKB_NAME_SIZE];
+
+// A part of a graph, by the names of images.
+struct vkb_part {
+    vkb_image_name outputs[GATHERED_LEVELS];  // become framebuffers
+    vkb_image_name levels[GATHERED_LEVELS];   // become inputs
+    uint32_t output_count, level_count;
+    uint32_t height;  // of the source
+    uint32_t rows;    // that a band has of it: the other images have their share; 0: no bands
+};
+
+// Leaves of the graph what the part needs.
+bool vkb_graph_take(struct vkb_graph *graph, const struct vkb_part *part, struct vkb_error *error);
+
+#endif

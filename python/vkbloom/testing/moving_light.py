@@ -1,0 +1,425 @@
+"""How steady the bloom of a light is that moves by parts of a pixel."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import check_index, check_number
+from vkbloom.testing.laws import fail
+from vkbloom.testing.point_spread import border_share, check_inside
+from vkbloom.testing.probe import Bloom, Image, Probe
+
+__all__ = ["Sequence", "Stability", "area_sampled", "assert_stable", "stability"]
+
+#: A temporal bloom: takes the images of a sequence, in their order, and returns their blooms.
+Sequence = Callable[[list[NDArray[Any]]], Iterable[NDArray[Any]]]
+
+PATHS: Final = ("x", "y", "xy")
+# Side of the light in pixels.
+_LIGHT: Final = 0.5
+# Where there is less than this share of the brightest bloom's light, it has no place or radius.
+_DIM: Final = 1e-3
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stability:
+    """Figures of the bloom of a light that moves along x, along y and along both.
+
+    There are 3 paths of N positions each. All figures are of the first channel, less the bloom of
+    a black image.
+
+    Parameters
+    ----------
+    positions : ndarray of float64, shape (3, N, 2)
+        x and y of the light in pixels; the centre of the first pixel is (0, 0).
+    energy : ndarray of float64, shape (3, N)
+        Sum of the bloom.
+    shift : ndarray of float64, shape (3, N, 2)
+        Centroid of the bloom less that of the image that was given, in pixels; NaN where there is
+        no light.
+    peak : ndarray of float64, shape (3, N)
+        The largest value of the bloom.
+    radius : ndarray of float64, shape (3, N)
+        Root mean square distance of the bloom's light from its centroid in pixels, with the
+        variance of the light in place of that of the given image, which changes with the light's
+        place in its pixel. NaN where there is no light, or if the variance is negative.
+    at_border : float
+        The largest share of the light in the outermost pixels. If it is not small, the image cuts
+        off light, and the other figures are of what is left.
+
+    See Also
+    --------
+    stability : Returns it.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> found = testing.stability(lambda image: image, texel=2, steps=4)
+    >>> found.positions.shape
+    (3, 8, 2)
+    >>> float(found.energy.max())
+    1.0
+    """
+
+    positions: NDArray[np.float64]
+    energy: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    peak: NDArray[np.float64]
+    radius: NDArray[np.float64]
+    at_border: float
+
+    @property
+    def ripple(self) -> float:
+        """Largest less smallest energy, as a share of the mean; NaN without light."""
+        return _variation(self.energy)
+
+    @property
+    def jitter(self) -> float:
+        """Largest distance between the centroids of bloom and image, in pixels."""
+        return _largest(np.hypot(self.shift[..., 0], self.shift[..., 1]))
+
+    @property
+    def flicker(self) -> float:
+        """Largest less smallest peak, as a share of the mean; NaN without light."""
+        return _variation(self.peak)
+
+    @property
+    def growth(self) -> float:
+        """Largest less smallest radius, as a share of the mean."""
+        return _variation(self.radius)
+
+    def __str__(self) -> str:
+        """Return a table of each path."""
+        rows: list[tuple[str, ...]] = [("along", "ripple", "jitter", "flicker", "growth")]
+        for index, path in enumerate(PATHS):
+            one = self._path(index)
+            figures = (one.ripple, one.jitter, one.flicker, one.growth)
+            rows.append((path, *(f"{figure:.3g}" for figure in figures)))
+        return "\n".join("  ".join(cell.rjust(7) for cell in row) for row in rows)
+
+    def _path(self, index: int) -> Stability:
+        names = ("positions", "energy", "shift", "peak", "radius")
+        arrays = {name: getattr(self, name)[index : index + 1] for name in names}
+        return dataclasses.replace(self, **arrays)
+
+
+def stability(
+    bloom: Bloom | Sequence,
+    *,
+    texel: int = 8,
+    steps: float = 8,
+    temporal: bool = False,
+    settle: int = 0,
+    probe: Probe | None = None,
+) -> Stability:
+    """Measure how steady the bloom of a small moving light is.
+
+    The light is a square of half a pixel, area-sampled: a pixel has the share of the light that
+    falls on it, so that all images have the same energy. It moves over one texel of the coarsest
+    level along x, along y and along both. Of a convolution the energy and the radius stay the
+    same, the centroid is that of the image, and the peak changes only by how the light falls on
+    the pixels.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns the bloom alone, of the same height and width. With `temporal`:
+        takes a list of images, in their order, and returns an iterable of as many blooms.
+    texel : int
+        Length of each path in pixels, at least 1: the size of a texel of the coarsest level, 2^N
+        of a chain of N halvings.
+    steps : float
+        Positions for each pixel of a path, above 0.
+    temporal : bool
+        Whether `bloom` takes the images of a path as a sequence, as methods with a history do.
+    settle : int
+        With `temporal`: how many images with the light at its first position come before each
+        path. They are not measured.
+    probe : Probe, optional
+        The kind of image; its `value` is the light's sum over all pixels. With a threshold it has
+        to be large: a quarter of the light, or less, may fall on one pixel. Default: 16 texels
+        wide and high, at least 64 pixels.
+
+    Returns
+    -------
+    Stability
+        With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` of the peak
+        and `growth` of the radius.
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the path leaves the image.
+
+    See Also
+    --------
+    assert_stable : Asserts limits of the figures.
+    assert_superposition, assert_centroid_kept : Laws that a threshold or a shift breaks.
+
+    Examples
+    --------
+    A pyramid whose first reduction drops every second pixel loses a small light half of the time:
+
+    >>> from vkbloom import testing
+    >>> def dropping(image):
+    ...     return image[::2, ::2].repeat(2, axis=0).repeat(2, axis=1)
+    >>> testing.stability(dropping, texel=2).ripple > 1
+    True
+    """
+    __tracebackhide__ = True
+    check_index("texel", texel, 1, 4096)
+    check_number("steps", steps, 1e-3, 1e3)
+    check_index("settle", settle, 0, 1_000_000)
+    if settle and not temporal:
+        raise ValueError(f"settle: {settle} is not 0; only a temporal bloom has to settle")
+    probe = probe or _wide(texel)
+    if texel + 2 > min(probe.size):
+        raise ValueError(f"probe: a path of {texel} pixels leaves an image of {probe.size}")
+    along = (np.arange(max(1, round(texel * steps))) + 0.5) / max(1, round(texel * steps)) - 0.5
+    middle = (np.array(probe.size) - 1) / 2
+    positions = np.stack(
+        [
+            middle + texel * along[:, np.newaxis] * np.array(direction)
+            for direction in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
+        ]
+    )
+    measure = _in_order if temporal else _one_by_one
+    rows = [measure(bloom, probe, path, settle) for path in positions]
+    energy, across, down, peak, radius, border = np.moveaxis(np.array(rows), -1, 0)
+    faint = ~(energy > _DIM * energy.max())
+    shift = np.where(faint[..., np.newaxis], math.nan, np.stack([across, down], axis=-1))
+    return Stability(
+        positions=positions,
+        energy=energy,
+        shift=shift,
+        peak=peak,
+        radius=np.where(faint, math.nan, radius),
+        at_border=float(border.max()),
+    )
+
+
+def assert_stable(
+    bloom: Bloom | Sequence,
+    *,
+    ripple: float = 0.02,
+    jitter: float = 0.1,
+    flicker: float = 0.1,
+    growth: float = 0.05,
+    texel: int = 8,
+    steps: float = 8,
+    temporal: bool = False,
+    settle: int = 0,
+    probe: Probe | None = None,
+) -> None:
+    """Assert that the bloom of a small moving light neither flickers nor jumps.
+
+    The law: while a light smaller than a pixel moves over one texel of the coarsest level, the
+    bloom's energy, peak and radius change by no more than a share of their mean, and its centroid
+    is no further from that of the image than `jitter`.
+
+    Parameters
+    ----------
+    bloom : callable
+        As for `stability`.
+    ripple, flicker, growth : float
+        Allowed change of energy, peak and radius: largest less smallest, as a share of the mean.
+    jitter : float
+        Allowed distance of the centroids in pixels.
+    texel, steps, temporal, settle, probe
+        As for `stability`. The image must be large enough that no light reaches the border.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, there is no light, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the light reaches the
+        border.
+
+    See Also
+    --------
+    stability : Returns the figures.
+    assert_bounded_fireflies : What a single bright pixel may do.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(3.0), blur_strength=1.0)
+    >>> testing.assert_stable(lambda image: reference.blur(image, settings), texel=1)
+    """
+    __tracebackhide__ = True
+    limits = {"ripple": ripple, "jitter": jitter, "flicker": flicker, "growth": growth}
+    for name, limit in limits.items():
+        check_number(name, limit, 0.0, math.inf)
+    probe = probe or _wide(texel)
+    found = stability(
+        bloom, texel=texel, steps=steps, temporal=temporal, settle=settle, probe=probe
+    )
+    if not found.energy.max() > 0:
+        fail(
+            "assert_stable",
+            "a light gives light",
+            f"the largest sum of the bloom is {found.energy.max():.3g}: none is allowed",
+        )
+    check_inside(found.at_border, probe.size)
+    told = {
+        "ripple": (found.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
+        "jitter": (
+            np.hypot(found.shift[..., 0], found.shift[..., 1]),
+            "the centroid of the bloom",
+            "is {:.3g} pixels from that of the image",
+        ),
+        "flicker": (found.peak, "the peak of the bloom", "changes by {:.3g} of its mean"),
+        "growth": (found.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
+    }
+    for name, (values, what, how) in told.items():
+        figure = getattr(found, name)
+        if not figure <= limits[name]:
+            fail(
+                "assert_stable",
+                f"{what} stays the same while a light moves over {texel} pixels",
+                f"{what} {how.format(figure)}, {_extremes(found, values)}: {limits[name]:.3g} "
+                "allowed",
+            )
+
+
+def area_sampled(
+    size: tuple[int, int], centre: tuple[float, float], sides: tuple[float, float]
+) -> Image:
+    """Return the share of each pixel that a rectangle covers.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the image in pixels.
+    centre : (float, float)
+        x and y in pixels; the centre of the first pixel is (0, 0).
+    sides : (float, float)
+        Width and height of the rectangle in pixels.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W)
+        0 to 1. Their sum is the rectangle's area, as far as it is inside.
+    """
+    covered = []
+    for count, place, side in zip(size, centre, sides, strict=True):
+        edges = np.arange(count + 1) - 0.5
+        covered.append(np.diff(np.clip(edges, place - side / 2, place + side / 2)))
+    return np.outer(covered[1], covered[0])
+
+
+def _wide(texel: int) -> Probe:
+    side = max(64, 16 * texel)
+    return Probe(size=(side, side))
+
+
+def _light(probe: Probe, place: NDArray[np.float64]) -> NDArray[Any]:
+    """Return the image of the light, as the bloom gets it."""
+    share = area_sampled(probe.size, (place[0], place[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
+    return probe.given(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
+
+
+def _one_by_one(
+    bloom: Any, probe: Probe, path: NDArray[np.float64], settle: int
+) -> list[tuple[float, ...]]:
+    """Return the figures of each position, for a bloom of single images."""
+    __tracebackhide__ = True
+    dark = probe.apply(bloom, probe.flat(0.0))[0][:, :, 0]
+    found = []
+    for place in path:
+        given = _light(probe, place)
+        found.append(_figures(probe.values(bloom(given), given)[0][:, :, 0] - dark, probe, given))
+    return found
+
+
+def _in_order(
+    bloom: Any, probe: Probe, path: NDArray[np.float64], settle: int
+) -> list[tuple[float, ...]]:
+    """Return the figures of each position, for a bloom of a sequence."""
+    __tracebackhide__ = True
+    if not callable(bloom):
+        raise TypeError(f"bloom: {bloom!r} is not callable")
+    black = probe.given(probe.flat(0.0))
+    dark = _results(bloom, probe, [black])[0]
+    still = [_light(probe, path[0])] * settle
+    images = still + [_light(probe, place) for place in path]
+    results = _results(bloom, probe, images)
+    pairs = zip(results[settle:], images[settle:], strict=True)
+    return [_figures(result - dark, probe, given) for result, given in pairs]
+
+
+def _results(bloom: Any, probe: Probe, images: list[NDArray[Any]]) -> list[Image]:
+    """Return the first channel of each result of a temporal bloom."""
+    __tracebackhide__ = True
+    results = [np.array(result) for result in bloom(list(images))]
+    if len(results) != len(images):
+        raise ValueError(f"bloom: it returns {len(results)} images for {len(images)}")
+    return [
+        probe.values(result, given)[0][:, :, 0]
+        for result, given in zip(results, images, strict=True)
+    ]
+
+
+def _figures(bloom: Image, probe: Probe, given: NDArray[Any]) -> tuple[float, ...]:
+    """Return energy, x and y of the shift, peak, radius, and the share at the border."""
+    image = probe.values(given, given)[0][:, :, 0]
+    energy, place, variance = _moments(bloom)
+    _, from_place, from_variance = _moments(image)
+    # The variance of the light itself, in place of what sampling it made of that.
+    left = variance - from_variance + _LIGHT**2 / 6
+    return (
+        energy,
+        place[0] - from_place[0],
+        place[1] - from_place[1],
+        float(bloom.max()),
+        math.sqrt(left) if left >= 0 else math.nan,
+        border_share(bloom),
+    )
+
+
+def _moments(plane: Image) -> tuple[float, tuple[float, float], float]:
+    """Return sum, centroid (x, y) and variance; the latter are NaN without light."""
+    total = float(plane.sum())
+    if total == 0:
+        return total, (math.nan, math.nan), math.nan
+    centroid, variance = [], 0.0
+    for axis in (0, 1):
+        profile = plane.sum(axis=axis) / total
+        distance = np.arange(len(profile), dtype=np.float64)
+        middle = float(profile @ distance)
+        centroid.append(middle)
+        variance += float(profile @ (distance - middle) ** 2)
+    return total, (centroid[0], centroid[1]), variance
+
+
+def _variation(values: NDArray[np.float64]) -> float:
+    """Return largest less smallest, as a share of the mean; NaN if the mean is not above 0."""
+    known = values[np.isfinite(values)]
+    if not (known.size and known.mean() > 0):
+        return math.nan
+    return float(np.ptp(known) / known.mean())
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.max()) if known.size else math.nan
+
+
+def _extremes(found: Stability, values: NDArray[np.float64]) -> str:
+    """Say where the smallest and the largest value are."""
+    parts = []
+    for index in (np.nanargmin(values), np.nanargmax(values)):
+        place = np.unravel_index(int(index), values.shape)
+        x, y = found.positions[place]
+        parts.append(f"{values[place]:.4g} with the light at x {x:.4g}, y {y:.4g}")
+    return f"from {parts[0]} to {parts[1]}"

@@ -1,0 +1,172 @@
+"""Surfaces: what they show is what arrays hold; sizes change, windows close, calls are refused."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.core.builds import ROOT
+from tests.images import picture
+from vkbloom import Renderer, Scene, Separable, Surface, _core
+from vkbloom.sources import scene_source
+
+SIZE = (48, 27)
+
+
+def open_or_skip(renderer: Renderer) -> Surface:
+    try:
+        return Surface(renderer, size=SIZE)
+    except vkbloom.Error as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def surface(renderer: Renderer) -> Iterator[Surface]:
+    """A surface without a window."""
+    with open_or_skip(renderer) as opened:
+        yield opened
+
+
+def test_windows(display: dict[str, str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.core.windows"],
+        cwd=ROOT,
+        env=display,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_frames_are_presented_and_stay_as_they_were(
+    surface: Surface, renderer: Renderer, scene: Scene
+) -> None:
+    before = renderer.render(scene, size=SIZE)["final"]
+    assert all(surface.present(scene, time=step / 6) for step in range(6))
+    # Of the frame before the last two.
+    assert "final" in surface.timings
+    np.testing.assert_array_equal(renderer.render(scene, size=SIZE)["final"], before)
+
+
+def test_the_size_may_change(surface: Surface, scene: Scene) -> None:
+    for size in ((5, 300), (1, 1), SIZE):
+        surface.size = size
+        assert surface.size == size
+        assert surface.present(scene)
+        assert surface.present(scene, size=(64, 36), attachment="glow")
+
+
+def test_an_image_is_presented(surface: Surface, renderer: Renderer) -> None:
+    image = picture(*SIZE, 3, dtype="uint8")
+    assert surface.present(image)
+    assert surface.present(renderer.upload(image), Separable(loops=2))
+
+
+def test_a_minimized_surface_shows_nothing(
+    surface: Surface, renderer: Renderer, scene: Scene
+) -> None:
+    source = scene_source(scene, SIZE, "forward", 0.0)
+    plan = renderer._core.plan(source, Separable(), ("final",))
+    for extent, expected in (((0, 0), False), (SIZE, True), ((48, 0), False), (SIZE, True)):
+        submission, shown = renderer._core.show(source, plan, surface._core, *extent, False)
+        submission.wait()
+        assert shown is expected
+
+
+def test_ctrl_c_ends_a_wait(surface: Surface, scene: Scene) -> None:
+    class Alarm(BaseException):
+        pass
+
+    def handler(number: int, frame: object) -> None:
+        raise Alarm
+
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(Alarm):  # noqa: PT012
+            for settings in itertools.repeat(Separable(loops=8, bloom_scale=1.0)):
+                surface.present(scene, settings, size=(640, 360))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert surface.present(scene)
+
+
+def test_a_renderer_closes_its_surfaces(scene: Scene) -> None:
+    with Renderer(validation=True) as renderer:
+        left = open_or_skip(renderer)
+        assert left.present(scene)
+        assert left.present(scene, time=0.5)
+    left.close()
+    with pytest.raises(ValueError, match="closed"):
+        left.present(scene)
+    with pytest.raises(ValueError, match="renderer: it is closed"):
+        Surface(renderer)
+
+
+def test_a_closed_surface_is_refused(surface: Surface, scene: Scene) -> None:
+    surface.close()
+    surface.close()
+    with pytest.raises(ValueError, match="the surface is closed"):
+        surface.present(scene)
+
+
+def test_a_surface_of_another_renderer_is_refused(surface: Surface, scene: Scene) -> None:
+    with Renderer() as other:
+        source = scene_source(scene, SIZE, "forward", 0.0)
+        plan = other._core.plan(source, Separable(), ("final",))
+        with pytest.raises(ValueError, match="it belongs to another renderer"):
+            other._core.show(source, plan, surface._core, *SIZE, False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"attachment": "depth"}, "attachment: 'depth' is no colour image"),
+        ({"attachment": "all"}, "attachment: 'all' is not the name of one framebuffer"),
+        ({"attachment": ("glow", "final")}, "is not the name of one framebuffer"),
+        ({"attachment": "blur"}, "blur"),
+        ({"size": (0, 5)}, r"size: \(0, 5\) is out of range"),
+    ],
+)
+def test_what_cannot_be_shown(
+    arguments: dict[str, Any], message: str, surface: Surface, scene: Scene
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        surface.present(scene, **arguments)
+    assert surface.present(scene)
+
+
+def test_what_is_no_surface(renderer: Renderer) -> None:
+    with pytest.raises(TypeError, match="window: 'x' is not a window of glfw, a function or None"):
+        Surface(renderer, "x")
+    with pytest.raises(TypeError, match="mode: 5 is not a name"):
+        Surface(renderer, mode=5)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="size"):
+        Surface(renderer, size=(0, 1))
+
+
+def test_modes(renderer: Renderer, surface: Surface) -> None:
+    with pytest.raises(ValueError, match='mode: the surface has no "vsync"'):
+        Surface(renderer, mode="vsync")  # type: ignore[arg-type]
+    # A function makes the surface; here none, so that the core makes one without a window.
+    with Surface(renderer, lambda instance: 0 if instance else -1, size=SIZE) as opened:
+        assert opened.size == SIZE
+
+
+def test_without_the_extension_an_error_says_so(renderer: Renderer) -> None:
+    with contextlib.suppress(_core.Error):
+        Surface(renderer).close()
+        pytest.skip("the driver has VK_EXT_headless_surface")
+    with pytest.raises(_core.Error, match="needs VK_EXT_headless_surface, which the driver of"):
+        Surface(renderer)

@@ -1,0 +1,108 @@
+"""Images by bands of rows: the same picture as of the whole image, bit by bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import vkbloom
+from vkbloom import Renderer, Settings
+from vkbloom.banded import Band, BloomByBands
+
+HEIGHT, WIDTH = 2048, 61
+
+
+def band(dtype: str, *, glows: bool, height: int = HEIGHT) -> Band:
+    random = np.random.default_rng(3)
+    image = (4 * random.random((height, WIDTH, 4)) ** 12).astype(dtype)
+    mask = random.random((height, WIDTH)).astype(np.float32)
+    return Band(image, image[::-1].copy(), mask) if glows else Band(image)
+
+
+def chunks(image: Band) -> Iterator[Band]:
+    for first in range(0, len(image.image), 200):
+        yield image.rows(first, first + 200)
+
+
+SETTINGS: dict[str, Settings] = {
+    **vkbloom.presets,
+    "alpha": vkbloom.Pyramid(levels=3, alpha="blur", threshold=0.5, radius=3.5),
+    "small": vkbloom.Separable(bloom_scale=0.25, loops=2),
+    "fixed": vkbloom.Separable(bloom_size=(16, 32)),
+    "wide": vkbloom.DualKawase(offset=9),
+    "narrow": vkbloom.BevyBloom(max_mip_dimension=64, scale_y=3.0),
+}
+
+
+@pytest.mark.parametrize("glows", [False, True])
+@pytest.mark.parametrize("name", SETTINGS)
+def test_bands_are_the_whole(renderer: Renderer, name: str, glows: bool) -> None:
+    image = band("float32" if name == "narrow" else "float16", glows=glows)
+    settings = SETTINGS[name]
+    bloom = BloomByBands.of(renderer._core, settings, image, HEIGHT, 128)
+    if bloom is None:
+        # It reaches everywhere.
+        assert settings.method == "convolution"
+        return
+    assert sum(bloom.reduce(chunks(image))) == HEIGHT
+    bands = list(bloom.finals(chunks(image)))
+    assert len(bands) > 2
+    whole = renderer.apply(
+        image.image, settings, mask=image.mask, emission=image.emission, attachments=("final",)
+    )
+    assert np.array_equal(np.concatenate(bands), whole["final"])
+
+
+@pytest.mark.parametrize(
+    ("settings", "height"),
+    [
+        (vkbloom.Pyramid(), 511),
+        (vkbloom.Pyramid(dither=True), 512),
+        (vkbloom.Pyramid(format="rg11b10ufloat"), 512),
+        (vkbloom.PygfxBloom(filter_radius=1.0, intensity=0.5), 64),
+    ],
+)
+def test_what_needs_the_whole_image(renderer: Renderer, settings: Settings, height: int) -> None:
+    image = band("uint8" if settings.dither else "float32", glows=False, height=height)
+    assert BloomByBands.of(renderer._core, settings, image, height, 16) is None
+
+
+def test_no_bloom_is_known(renderer: Renderer) -> None:
+    image = band("float32", glows=False)
+    for threshold in (0.1, 60000.0):
+        settings = vkbloom.Pyramid(threshold=threshold)
+        bloom = BloomByBands.of(renderer._core, settings, image, HEIGHT, 128)
+        assert bloom is not None
+        assert not bloom.is_without
+        assert sum(bloom.reduce(chunks(image))) == HEIGHT
+        assert bloom.is_without == (threshold > 1)
+
+
+def test_wrong_parts_are_refused(renderer: Renderer) -> None:
+    core, image = renderer._core, band("float32", glows=False, height=8)
+    settings = vkbloom.Pyramid(levels=2)
+    level = image.image[:4, :30].copy()
+
+    def plan(names: tuple[str, ...], part: tuple[int, tuple[str, ...], bool]) -> object:
+        return core.plan(image.source((level,)), settings, names, part)
+
+    assert plan(("up_0",), (8, ("down_0",), False))
+    with pytest.raises(ValueError, match="there is no image side"):
+        plan(("side",), (8, (), True))
+    with pytest.raises(ValueError, match="level_0 is of another size or format"):
+        plan(("up_0",), (16, ("down_0",), False))
+    with pytest.raises(ValueError, match="it needs the image"):
+        plan(("final",), (8, ("up_0",), False))
+    with pytest.raises(ValueError, match="has no such rows"):
+        plan(("down_0",), (31, (), True))
+    with pytest.raises(ValueError, match="8 are more than 7"):
+        plan(("final",), (8, ("up_0",) * 8, True))
+    with pytest.raises(ValueError, match="8 are more than 7"):
+        image.source((level,) * 8)
+    scene = vkbloom.sources.scene_source(vkbloom.Scene.ufo(), (8, 8), "forward", 0.0)
+    with pytest.raises(ValueError, match="only images have bands"):
+        core.bands(scene, settings, 8)
+    with pytest.raises(ValueError, match="only images have bands"):
+        core.plan(scene, settings, ("final",), (8, (), True))

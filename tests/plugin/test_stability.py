@@ -1,0 +1,313 @@
+"""Stability and resolution: figures of blurs that are known, and assertions on planted faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from vkbloom import DualKawase, KinoBloom, Pyramid, Renderer, testing
+from vkbloom.testing import Probe
+
+Image = NDArray[Any]
+SMALL = Probe(size=(48, 48), channels=1)
+TAPS = (1 / 8, 3 / 8, 3 / 8, 1 / 8)
+
+
+def gaussian(image: Image, sigma: float = 3.0) -> Image:
+    return np.asarray(ndimage.gaussian_filter(image, (sigma, sigma, 0), mode="nearest"))
+
+
+def halved(image: Image) -> Image:
+    """Reduce by 1 3 3 1, which keeps energy and centroid wherever the light is."""
+    for axis in (0, 1):
+        image = np.asarray(ndimage.correlate1d(image, TAPS, axis, origin=-1))
+    return image[::2, ::2]
+
+
+def doubled(image: Image, off: float = 0.0) -> Image:
+    """Enlarge by 2, bilinearly, the samples `off` texels from where they belong."""
+    height, width = image.shape[:2]
+    places = [(np.arange(2 * side) + 0.5) / 2 - 0.5 + off for side in (height, width)]
+    rows, columns = np.meshgrid(*places, indexing="ij")
+    planes = [
+        ndimage.map_coordinates(image[..., channel], (rows, columns), order=1, mode="nearest")
+        for channel in range(image.shape[2])
+    ]
+    return np.stack(planes, axis=-1)
+
+
+def chain(image: Image, reduce: Callable[[Image], Image] = halved, off: float = 0.0) -> Image:
+    """Two levels down and up."""
+    return gaussian(doubled(doubled(reduce(reduce(image)), off)), 3.0)
+
+
+def fails(assertion: Callable[..., None], *arguments: Any, **options: Any) -> str:
+    with pytest.raises(AssertionError) as caught:
+        assertion(*arguments, **options)
+    message = str(caught.value)
+    first, law = message.split("\n  law: ")
+    assert first.startswith(assertion.__name__ + ": ")
+    assert "allowed" in first
+    assert law
+    return message
+
+
+class TestStability:
+    def test_a_convolution_is_stable(self) -> None:
+        found = testing.stability(gaussian, texel=3, steps=4, probe=SMALL)
+        assert found.positions.shape == (3, 12, 2)
+        # Over three pixels around the middle, at the middle of each step.
+        np.testing.assert_allclose(found.positions[0, :, 0], 23.5 + (np.arange(12) - 5.5) / 4)
+        np.testing.assert_allclose(found.positions[0, :, 1], 23.5)
+        np.testing.assert_allclose(found.positions[2, :, 0], found.positions[2, :, 1])
+        np.testing.assert_allclose(found.energy, 1, rtol=1e-5)
+        np.testing.assert_allclose(found.shift, 0, atol=1e-5)
+        # Two axes of the kernel, and a light of half a pixel.
+        np.testing.assert_allclose(found.radius, math.sqrt(2 * 9 + 0.25 / 6), rtol=1e-3)
+        assert found.ripple < 1e-5
+        assert found.jitter < 1e-5
+        assert found.growth < 1e-5
+        # Between four pixels the light is spread over them, and no pixel is at its middle.
+        assert 0.02 < found.flicker < 0.06
+        assert str(found).splitlines()[0].split() == [
+            "along", "ripple", "jitter", "flicker", "growth",
+        ]  # fmt: skip
+
+    def test_the_identity_has_the_radius_of_the_light(self) -> None:
+        found = testing.stability(lambda image: image, texel=1, probe=SMALL)
+        np.testing.assert_allclose(found.radius, math.sqrt(0.25 / 6), rtol=1e-6)
+        # A quarter of it on each of four pixels, or all of it on one.
+        np.testing.assert_allclose(found.peak.max() / found.peak.min(), 1 / 0.25, rtol=0.4)
+
+    def test_a_chain_is_stable(self) -> None:
+        testing.assert_stable(chain, texel=4, steps=4, probe=SMALL)
+
+    def test_an_upsample_half_a_texel_off(self) -> None:
+        message = fails(
+            testing.assert_stable,
+            lambda image: chain(image, off=0.5),
+            texel=4,
+            steps=2,
+            probe=SMALL,
+        )
+        # Half a texel of the smaller level, two pixels, down and across.
+        assert "the centroid of the bloom is 2.83 pixels from that of the image" in message
+
+    def test_a_nearest_neighbour_reduction(self) -> None:
+        def nearest(image: Image) -> Image:
+            return chain(image, lambda larger: larger[::2, ::2])
+
+        message = fails(testing.assert_stable, nearest, texel=4, steps=2, probe=SMALL)
+        assert "the energy of the bloom changes by" in message
+        assert testing.stability(nearest, texel=4, steps=2, probe=SMALL).ripple > 2
+
+    def test_a_box_moves_in_jumps(self) -> None:
+        def boxes(image: Image) -> Image:
+            small = image.reshape(24, 2, 24, 2, 1).mean(axis=(1, 3))
+            return gaussian(small.repeat(2, axis=0).repeat(2, axis=1), 4.0)
+
+        found = testing.stability(boxes, texel=2, steps=4, probe=SMALL)
+        assert found.ripple < 1e-5
+        assert 0.4 < found.jitter < 0.75
+        testing.assert_stable(boxes, texel=2, steps=4, jitter=0.75, probe=SMALL)
+        fails(testing.assert_stable, boxes, texel=2, steps=4, jitter=0.4, probe=SMALL)
+
+    def test_a_pulse(self) -> None:
+        """Of each limit: the radius and the peak with it, at constant energy and place."""
+
+        def pulsing(image: Image) -> Image:
+            x = float(image.sum(axis=(0, 2)) @ np.arange(48)) / max(float(image.sum()), 1e-9)
+            return gaussian(image, 2.0 if x < 23.5 else 2.2)
+
+        # (A radius of 2.2 in place of 2, and the peak by the square of that.)
+        message = fails(testing.assert_stable, pulsing, texel=2, steps=4, probe=SMALL)
+        assert "the peak of the bloom changes by" in message
+        message = fails(testing.assert_stable, pulsing, texel=2, flicker=1.0, probe=SMALL)
+        assert "the radius of the bloom changes by 0.09" in message
+        testing.assert_stable(pulsing, texel=2, steps=4, flicker=1.0, growth=0.1, probe=SMALL)
+
+    @pytest.mark.parametrize("dtype", ["uint8", "float16"])
+    @pytest.mark.parametrize("channels", [None, 4])
+    def test_images(self, dtype: str, channels: int | None) -> None:
+        probe = Probe(size=(32, 24), dtype=dtype, channels=channels)
+
+        def bloom(image: Image) -> Image:
+            assert image.dtype == dtype
+            assert image.shape[2:] == (() if channels is None else (channels,))
+            return image
+
+        found = testing.stability(bloom, texel=2, steps=2, probe=probe)
+        np.testing.assert_allclose(found.energy, 1, atol=0.01)
+        np.testing.assert_allclose(found.shift, 0, atol=1e-12)
+
+    def test_light_that_is_always_there_counts_for_nothing(self) -> None:
+        found = testing.stability(lambda image: gaussian(image) + 0.1, texel=1, probe=SMALL)
+        np.testing.assert_allclose(found.energy, 1, rtol=1e-4)
+        assert found.jitter < 1e-3
+
+    def test_no_light(self) -> None:
+        assert math.isnan(testing.stability(np.zeros_like, texel=1, probe=SMALL).ripple)
+        assert "a light gives light" in fails(
+            testing.assert_stable, np.zeros_like, texel=1, probe=SMALL
+        )
+
+    def test_light_that_leaves_the_image(self) -> None:
+        with pytest.raises(ValueError, match="in the outermost pixels of an image of 20 x 20"):
+            testing.assert_stable(lambda image: gaussian(image, 4.0), probe=Probe(size=(20, 20)))
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"texel": 0}, "texel: 0 is outside 1 to"),
+            ({"steps": 0}, "steps: 0 is out of range"),
+            ({"settle": 3}, "settle: 3 is not 0; only a temporal bloom"),
+            ({"texel": 47, "probe": SMALL}, r"a path of 47 pixels leaves an image of \(48, 48\)"),
+        ],
+    )
+    def test_wrong_arguments(self, options: dict[str, Any], message: str) -> None:
+        with pytest.raises(ValueError, match=message):
+            testing.stability(gaussian, **options)
+        with pytest.raises(ValueError, match="growth: -1 is out of range"):
+            testing.assert_stable(gaussian, growth=-1)
+        with pytest.raises(TypeError, match="bloom: None is not callable"):
+            testing.stability(None, temporal="temporal" in options)  # type: ignore[arg-type]
+
+    def test_on_the_device(self, renderer: Renderer) -> None:
+        def bloom(settings: Any) -> Callable[[Image], Image]:
+            return lambda image: renderer.apply(image, settings, attachments="bloom")["bloom"]
+
+        testing.assert_stable(bloom(Pyramid(levels=3)), steps=1)
+        # Its reduction moves the light to the middle of a texel.
+        found = testing.stability(bloom(DualKawase(levels=3)), steps=1)
+        assert 1 < found.jitter < 5.7
+        # The median removes a light on one pixel, and not on two by two.
+        lamp = Probe(size=(128, 128), value=50.0)
+        assert testing.stability(bloom(KinoBloom()), texel=1, probe=lamp).ripple > 1
+
+
+class TestSequences:
+    @staticmethod
+    def history(share: float) -> Callable[[list[Image]], Iterator[Image]]:
+        """Return a bloom that mixes each image with what was before."""
+
+        def bloom(images: list[Image]) -> Iterator[Image]:
+            before = gaussian(images[0])
+            for image in images:
+                before = share * gaussian(image) + (1 - share) * before
+                yield before
+
+        return bloom
+
+    def test_without_history_as_one_by_one(self) -> None:
+        alone = testing.stability(gaussian, texel=1, probe=SMALL)
+        found = testing.stability(self.history(1.0), texel=1, temporal=True, probe=SMALL)
+        np.testing.assert_allclose(found.energy, alone.energy)
+        np.testing.assert_allclose(found.radius, alone.radius)
+
+    def test_history_lags(self) -> None:
+        def found(settle: int) -> testing.Stability:
+            return testing.stability(
+                self.history(0.25), texel=3, steps=4, temporal=True, settle=settle, probe=SMALL
+            )
+
+        # A mean age of (1 - 0.25) / 0.25 = 3 images, of a quarter of a pixel each; while the light
+        # is inside a pixel, the image does not change.
+        assert -1 < found(0).shift[0, -1, 0] < -0.5
+        assert found(0).shift[0, 0, 0] == pytest.approx(0, abs=1e-5)
+        np.testing.assert_allclose(found(4).shift, found(0).shift, atol=1e-5)
+        fails(testing.assert_stable, self.history(0.25), texel=3, temporal=True, probe=SMALL)
+
+    def test_images_that_are_missing(self) -> None:
+        with pytest.raises(ValueError, match="bloom: it returns 0 images for 1"):
+            testing.stability(lambda images: [], temporal=True, probe=SMALL)
+
+    def test_one_array_filled_again_and_again(self) -> None:
+        def bloom(images: list[Image]) -> Iterator[Image]:
+            out = np.empty_like(images[0])
+            for image in images:
+                out[:] = image
+                yield out
+
+        found = testing.stability(bloom, texel=2, steps=2, temporal=True, probe=SMALL)
+        np.testing.assert_allclose(found.shift, 0, atol=1e-12)
+
+
+class TestResolution:
+    def test_a_radius_in_shares_of_the_height(self) -> None:
+        def bloom(image: Image) -> Image:
+            return gaussian(image, image.shape[0] / 16)
+
+        found = testing.resolution_response(bloom, (1, 1.5, 2), probe=SMALL)
+        assert found.sizes == ((48, 48), (72, 72), (96, 96))
+        # Of a Gaussian and a square of 1/32: sqrt(-2 ln(1/2)) and sqrt(-2 ln(1/10)) sigma.
+        # A pixel is a third of sigma at the smallest size, and adds its own variance.
+        sigma = math.hypot(1 / 16, 1 / 32 / math.sqrt(12))
+        np.testing.assert_allclose(found.r50, 1.1774 * sigma, rtol=0.04)
+        np.testing.assert_allclose(found.r90, 2.1460 * sigma, rtol=0.04)
+        np.testing.assert_allclose(found.peak, (1 / 32) ** 2 / (2 * np.pi * sigma**2), rtol=0.04)
+        testing.assert_resolution_independent(bloom, (1, 1.5, 2), probe=SMALL)
+        assert len(str(found).splitlines()) == 4
+
+    def test_scenes_are_box_reductions_of_one_another(self) -> None:
+        seen = []
+
+        def bloom(image: Image) -> Image:
+            seen.append(image.astype(np.float64))
+            return image
+
+        testing.resolution_response(bloom, (1, 2), light=0.13, probe=SMALL)
+        small, large = seen[0], seen[2]
+        reduced = large.reshape(48, 2, 48, 2, 1).mean(axis=(1, 3))
+        np.testing.assert_allclose(small, reduced, atol=1e-6)
+        np.testing.assert_allclose(small.sum(), (0.13 * 48) ** 2, rtol=1e-5)
+
+    def test_a_radius_in_pixels(self) -> None:
+        message = fails(testing.assert_resolution_independent, gaussian, (1, 2), probe=SMALL)
+        assert "the radius of 50 % of the light" in message
+        assert "at 96 x 96" in message
+
+    def test_a_peak_that_changes(self) -> None:
+        def bloom(image: Image) -> Image:
+            return np.asarray(gaussian(image, image.shape[0] / 16) * image.shape[0] / 48)
+
+        assert "the peak of the bloom" in fails(
+            testing.assert_resolution_independent, bloom, (1, 2), probe=SMALL
+        )
+        testing.assert_resolution_independent(bloom, (1, 2), peak=0.7, probe=SMALL)
+
+    def test_no_light(self) -> None:
+        assert np.isnan(testing.resolution_response(np.zeros_like, (1,), probe=SMALL).r50).all()
+        fails(testing.assert_resolution_independent, np.zeros_like, (1, 2), probe=SMALL)
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"scales": ()}, "scales: empty"),
+            ({"scales": (0.3,)}, "scales: 0.3 makes 14.4 x 14.4 of an image of 48 x 48"),
+            ({"scales": (0,)}, "scales: 0 is out of range"),
+            ({"light": 0}, "light: 0 is out of range"),
+        ],
+    )
+    def test_wrong_arguments(self, options: dict[str, Any], message: str) -> None:
+        with pytest.raises(ValueError, match=message):
+            testing.resolution_response(gaussian, probe=SMALL, **options)
+
+    def test_on_the_device(self, renderer: Renderer) -> None:
+        def bloom(image: Image) -> Image:
+            levels = int(np.log2(image.shape[0])) - 3
+            settings = Pyramid(levels=levels, level_weights=(*[0.0] * (levels - 1), 1.0))
+            return renderer.apply(image, settings, attachments="bloom")["bloom"]
+
+        # The coarsest level alone is an eighth of the height at each size.
+        testing.assert_resolution_independent(bloom, (1, 2))
+        fails(
+            testing.assert_resolution_independent,
+            lambda image: renderer.apply(image, Pyramid(), attachments="bloom")["bloom"],
+            (1, 2),
+        )
