@@ -44,6 +44,7 @@ from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from vkbloom import psf, reference
+    from vkbloom.fits import FitResult, fit
     from vkbloom.grid import reductions
     from vkbloom.grid.checking import GridReport, check_grid
     from vkbloom.grid.curves import response_curves
@@ -64,10 +65,12 @@ _LATE_MODULES = {
 }
 _LATE = {
     "Camera": "vkbloom.scene",
+    "FitResult": "vkbloom.fits",
     "GridReport": "vkbloom.grid.checking",
     "Scene": "vkbloom.scene",
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
+    "fit": "vkbloom.fits",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
     "read": "vkbloom.io.array_files",
     "response_curves": "vkbloom.grid.curves",
@@ -86,6 +89,7 @@ __all__ = [
     "DualKawase",
     "Error",
     "FilamentBloom",
+    "FitResult",
     "Frames",
     "GodotBloom",
     "GridReport",
@@ -110,6 +114,7 @@ __all__ = [
     "check_grid",
     "contact_sheet",
     "explore",
+    "fit",
     "gaussian_weights",
     "grid_to_zarr",
     "presets",

@@ -128,13 +128,13 @@ class unreal(SampledPSF):
         object.__setattr__(self, "prefilter", prefilter)
         object.__setattr__(self, "scatter", check_number("scatter", self.scatter, 0, 1000))
 
-    def own_array(self) -> Array:
-        """Return the array in the size of the kernel image, around its point."""
+    def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
         height, width = _image_of(self).shape[:2]
         return self._for_frame(max(width, height) / self.size)
 
-    def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
-        """Return the energy per pixel for a frame of that size."""
+    def array(  # noqa: D102  as of PSF, for a frame of this size
+        self, size: tuple[int, int], pixels_per_degree: float | None = None
+    ) -> Array:
         return self.kernel(size, size)
 
     def kernel(  # noqa: D102  as of PSF
