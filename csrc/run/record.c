@@ -206,8 +206,8 @@ uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph
 }
 
 // The output whose memory the pass can store to instead of its image; NULL: none. No other pass may
-// read the image. If the request comes again, the pass stores to the image, so that a third time
-// nothing has to run.
+// read the image. An output without alpha needs a shader that stores three channels. If the request
+// comes again, the pass stores to the image, so that a third time nothing has to run.
 static struct vkb_output *find_stored(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct vkb_plan *plan = run->request->plan;
@@ -218,11 +218,13 @@ static struct vkb_output *find_stored(const struct vkb_run *run, const struct vk
     for (uint32_t i = 0; i < run->graph->pass_count; ++i)
         if (run->frame->planner.needed[i] && vkb_pass_reads(&run->graph->passes[i], image))
             return NULL;
-    for (uint32_t i = 0; i < plan->output_count; ++i)
+    for (uint32_t i = 0; i < plan->output_count; ++i) {
+        struct vkb_output *output = &run->request->outputs[i];
         if (plan->outputs[i] == image
-            && vkb_readback_takes_words(run->device, &run->request->outputs[i],
-                                        run->graph->images[image].height))
-            return &run->request->outputs[i];
+            && (vkb_readback_is_complete(output) || vkb_spirv[pass->shader].packed != pass->shader)
+            && vkb_readback_takes_words(run->device, output, run->graph->images[image].height))
+            return output;
+    }
     return NULL;
 }
 
@@ -250,15 +252,16 @@ static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pas
                                        VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
 }
 
+// `output`: what the pass stores to; NULL: its image.
 static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
-                           VkDeviceSize params, struct vkb_error *error)
+                           VkDeviceSize params, struct vkb_output *output, struct vkb_error *error)
 {
     const struct vkb_image *image = &run->images[pass->targets[0]]->image;
-    struct vkb_output *output = find_stored(run, pass);
-    const VkDeviceSize start = output ? output->offset : 0;
+    const size_t channel_size = vkb_formats[image->format].channel_size;
+    const VkDeviceSize start = output ? output->imported_offset : 0;
     struct band band = {
         .buffer.buffer = output ? output->imported : image->buffer,
-        .row_pitch = output ? image->width * vkb_pixel_size(image->format) : image->row_pitch,
+        .row_pitch = output ? image->width * output->channels * channel_size : image->row_pitch,
     };
     const struct binding binding = {.pass = pass, .params = params, .band = &band};
     const uint32_t rows = band_rows(run->device, pass, band.row_pitch);
@@ -288,8 +291,6 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
 
     if (pass->textured)
         return draw_surfaces(run, pass, mesh, params, error);
-    if (pass->reading == VKB_READING_WORDS)
-        return dispatch_words(run, pass, params, error);
     if (!bind_descriptors(run, &(struct binding){.pass = pass, .params = params}, error))
         return false;
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
@@ -307,14 +308,23 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
                         struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = &run->graph->passes[index];
+    const bool words = pass->reading == VKB_READING_WORDS;
+    struct vkb_output *output = words ? find_stored(run, pass) : NULL;
+    struct vkb_pass_row packed;
     VkPipeline pipeline;
 
+    if (output && !vkb_readback_is_complete(output)) {
+        memcpy(&packed, pass, sizeof packed);
+        packed.shader = vkb_spirv[pass->shader].packed;
+        pass = &packed;
+    }
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
                            error))
         return false;
     run->device->vk.vkCmdBindPipeline(run->submission->commands.buffer, vkb_pass_bind_point(pass),
                                       pipeline);
-    return draw(run, pass, write_params(run, pass), error);
+    return words ? dispatch_words(run, pass, write_params(run, pass), output, error)
+                 : draw(run, pass, write_params(run, pass), error);
 }
 
 static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
