@@ -255,6 +255,10 @@ class Renderer:
         are also in messages of the validation layer. RenderDoc hides VK_EXT_external_memory_host,
         so that results take the way through staging memory.
 
+        See Also
+        --------
+        plan : Names the passes.
+
         Examples
         --------
         Run by ``renderdoccmd capture -w python program.py``:
