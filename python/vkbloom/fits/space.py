@@ -234,7 +234,7 @@ def _number(
         raise ValueError(
             f"vary: {field.name}: None is not a number to start from; replace it by one"
         )
-    default = getattr(type(settings)(), field.name)
-    usual = max(abs(float(default or 0.0)), abs(float(value))) or 1.0
+    default = field.default if isinstance(field.default, int | float) else 0.0
+    usual = max(abs(float(default)), abs(float(value))) or 1.0
     is_wide = low >= 0 and high - low > _WIDE * usual
     return Axis(name=field.name, kind=kind, low=low, high=high, scale=usual if is_wide else None)
