@@ -21,6 +21,8 @@ STAGES = (".vert", ".frag", ".comp")
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
 # Shaders whose images are always words.
 WORDS_ALONE = {"strip.comp", "threshold.comp", "blend.comp"}
+# Shaders that load single floats and store words of each format, too.
+WORDS_STORED = {"fft.comp"}
 
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
@@ -50,6 +52,9 @@ def modules(shader: Path) -> list[Module]:
                 found.append(Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",)))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
             found.append(Module(f"{shader.stem}_words_{ours}", shader, words))
+            if shader.name in WORDS_STORED:
+                stored = ("-DWORDS", "-DCHANNEL_BYTES=4", f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}")
+                found.append(Module(f"{shader.stem}_stored_words_{ours}", shader, stored))
             if "finished(" in text:
                 packed = (*words, "-DTARGET_CHANNELS=3")
                 found.append(Module(f"{shader.stem}_packed_{ours}", shader, packed))

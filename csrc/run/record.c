@@ -168,10 +168,12 @@ static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
 static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass, uint32_t rows)
 {
     const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
+    const uint32_t width = (target->width + pass->block_width - 1) / pass->block_width;
+    const uint32_t height = (rows + pass->block_height - 1) / pass->block_height;
 
     run->device->vk.vkCmdDispatch(run->submission->commands.buffer,
-                                  (target->width + pass->block_width - 1) / pass->block_width,
-                                  (rows + pass->block_height - 1) / pass->block_height, 1);
+                                  pass->groups_width ? pass->groups_width : width,
+                                  pass->groups_height ? pass->groups_height : height, 1);
 }
 
 // The most rows that one storage buffer descriptor can cover. They are a multiple of the block's
@@ -329,9 +331,12 @@ static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
 {
     for (uint32_t i = first; i < end; ++i) {
         const struct vkb_pass_row *pass = &run->graph->passes[i];
-        for (uint32_t read = 0; read < pass->read_count; ++read)
-            vkb_image_transition(run->device, run->submission->commands.buffer,
-                                 &run->images[pass->reads[read]]->image, vkb_pass_reads_as(pass));
+        for (uint32_t read = 0; read < pass->read_count; ++read) {
+            struct vkb_image *image = &run->images[pass->reads[read]]->image;
+            if (!vkb_pass_writes(pass, pass->reads[read]))
+                vkb_image_transition(run->device, run->submission->commands.buffer, image,
+                                     vkb_pass_reads_as(pass));
+        }
     }
 }
 
@@ -397,17 +402,19 @@ static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_erro
 {
     struct vkb_device *device = run->device;
     struct vkb_submission *submission = run->submission;
+    const struct vkb_pass_row *pass = &run->graph->passes[index];
     VkCommandBuffer commands = submission->commands.buffer;
 
     // The timer starts before the barriers, since lavapipe takes a timestamp at the next barrier.
     vkb_timer_start(device, commands, &submission->timer);
     transition_reads(run, index, index + 1);
-    vkb_image_transition(device, commands,
-                         &run->images[run->graph->passes[index].targets[0]]->image,
-                         VKB_ACCESS_DISPATCH_STORED);
+    vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
+                         vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
+                                                 : VKB_ACCESS_DISPATCH_STORED);
     if (!record_pass(run, index, VK_NULL_HANDLE, error))
         return false;
     vkb_timer_stop(device, commands, &submission->timer);
+    add_timing(run, index);
     return true;
 }
 
@@ -450,17 +457,18 @@ static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end
             return false;
     device->vk.vkCmdEndRenderPass(commands);
     vkb_timer_stop(device, commands, &submission->timer);
+    add_timing(run, first);
     return true;
 }
 
 bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_error *error)
 {
     struct vkb_run *run = context;
-    const bool is_dispatch = run->graph->passes[first].geometry == VKB_GEOMETRY_DISPATCH;
 
-    if (is_dispatch ? !record_dispatch(run, first, error)
-                    : !record_render_pass(run, first, end, error))
-        return false;
-    add_timing(run, first);
+    if (run->graph->passes[first].geometry != VKB_GEOMETRY_DISPATCH)
+        return record_render_pass(run, first, end, error);
+    for (uint32_t i = first; i < end; ++i)
+        if (!record_dispatch(run, i, error))
+            return false;
     return true;
 }

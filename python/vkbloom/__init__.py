@@ -29,6 +29,7 @@ from vkbloom._core import (
     ValidationError,
 )
 from vkbloom.adapter import AdapterInfo, adapters
+from vkbloom.convolution import Convolution
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
@@ -85,6 +86,7 @@ __all__ = [
     "BevyBloom",
     "BlenderGlare",
     "Camera",
+    "Convolution",
     "DeviceLostError",
     "DualKawase",
     "Error",

@@ -63,6 +63,7 @@ class TestControls:
             without = set(defaults) - set(fields)
             refused = {
                 "blender": {"knee"},
+                "convolution": {"psf", "kernel_size", "pixels_per_degree"},
                 "filament": {"knee"},
                 "godot": {"knee", "level_weights"},
                 "hdrp": {"knee", "threshold"},
