@@ -426,8 +426,11 @@ class ColorVideoVDP(Comparing):
     --------
     >>> from vkbloom.grid.reductions import ColorVideoVDP
     >>> final = np.full((64, 64, 3), 0.5, np.float32)
-    >>> reduction = ColorVideoVDP(against=final, nits_per_unit=203, pixels_per_degree=60)
-    >>> reduction.units
+    >>> ColorVideoVDP(against=final, pixels_per_degree=60)
+    Traceback (most recent call last):
+        ...
+    ValueError: nits_per_unit: None is no number; ColorVideoVDP needs it
+    >>> ColorVideoVDP.units
     'JOD'
     """
 
