@@ -21,6 +21,8 @@ STAGES = (".vert", ".frag", ".comp")
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
 # Shaders whose images are always words.
 WORDS_ALONE = {"strip.comp", "threshold.comp", "blend.comp"}
+# Shaders that load single floats and store words of each format, too.
+WORDS_STORED = {"fft.comp"}
 
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
@@ -38,7 +40,8 @@ def modules(shader: Path) -> list[Module]:
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
     is compiled for each format that it may load from: for images as words, and for storage images,
-    unless only CPUs run it.
+    unless only CPUs run it. If it can make the finished picture, it is also compiled for a target
+    of three channels.
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
@@ -49,6 +52,12 @@ def modules(shader: Path) -> list[Module]:
                 found.append(Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",)))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
             found.append(Module(f"{shader.stem}_words_{ours}", shader, words))
+            if shader.name in WORDS_STORED:
+                stored = ("-DWORDS", "-DCHANNEL_BYTES=4", f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}")
+                found.append(Module(f"{shader.stem}_stored_words_{ours}", shader, stored))
+            if "finished(" in text:
+                packed = (*words, "-DTARGET_CHANNELS=3")
+                found.append(Module(f"{shader.stem}_packed_{ours}", shader, packed))
         return found
     if "SOURCE_FORMAT" in text:
         return [
@@ -131,17 +140,19 @@ def write_spirv() -> None:
     rows = ""
     for module in built:
         dispatch = f"{module.shader.stem}_dispatch"
-        twin = dispatch if dispatch in names else module.name
-        rows += (
-            f'    {{"{module.name}", {module.name}, sizeof {module.name}, VKB_SHADER_{twin}}},\n'
+        packed = module.name.replace("_words_", "_packed_")
+        twins = ", ".join(
+            f"VKB_SHADER_{twin if twin in names else module.name}" for twin in (dispatch, packed)
         )
+        rows += f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twins}}},\n'
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
         "#include <stddef.h>\n#include <stdint.h>\n\n"
         f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
-        "// `dispatch`: the same pass as a compute shader, or itself where there is none.\n"
+        "// `dispatch`: the same pass as a compute shader; `packed`: with a target of three\n"
+        "// channels; each is the shader itself where there is none.\n"
         "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
-        "    enum vkb_shader dispatch;\n};\n"
+        "    enum vkb_shader dispatch, packed;\n};\n"
         "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
     )
     (SPIRV / "spirv.c").write_text(

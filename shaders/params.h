@@ -146,6 +146,52 @@
     COMPOSITE_ROWS(B, READS, INPUT) \
     READS(B, white)
 
+// A stage of a Fourier transform along one axis (fft.comp): `count` butterflies in each of `across`
+// lines of `padded` elements; the elements of a butterfly are `step` apart, and those before `kept`
+// are stored. Where it pads: `extent` texels are there, and from the place `turn` on the line goes
+// on before the first of them. With a product with colours: the radices of rows, of so many
+// elements, and those of columns without the last one, by which it finds the frequency of the other
+// sign.
+#define FFT_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, count) \
+    INPUT(B, int, across) \
+    INPUT(B, int, step) \
+    INPUT(B, int, kept) \
+    INPUT(B, int, padded) \
+    INPUT(B, int, extent) \
+    INPUT(B, int, turn) \
+    INPUT(B, int, boundary) \
+    INPUT(B, int, row_length) \
+    INPUT(B, int, row_a) \
+    INPUT(B, int, row_b) \
+    INPUT(B, int, row_c) \
+    INPUT(B, int, row_d) \
+    INPUT(B, int, block_a) \
+    INPUT(B, int, block_b) \
+    INPUT(B, int, block_c) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, prefilter_min) \
+    INPUT(B, float, prefilter_max) \
+    INPUT(B, float, prefilter_factor)
+
+// The kernel at its places in the padded lines (fft_kernel.comp): for each axis the kernel's
+// extent, the offsets that count, and the period; `grey` if all channels are equal.
+#define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, padded_x) \
+    INPUT(B, int, boundary_x) \
+    INPUT(B, int, extent_x) \
+    INPUT(B, int, period_x) \
+    INPUT(B, int, before_x) \
+    INPUT(B, int, after_x) \
+    INPUT(B, int, padded_y) \
+    INPUT(B, int, boundary_y) \
+    INPUT(B, int, extent_y) \
+    INPUT(B, int, period_y) \
+    INPUT(B, int, before_y) \
+    INPUT(B, int, after_y) \
+    INPUT(B, int, grey) \
+    INPUT(B, float, gain)
+
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
     BLOCK(threshold, THRESHOLD_BLOCK) \
@@ -157,6 +203,8 @@
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
+    BLOCK(fft, FFT_BLOCK) \
+    BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
@@ -243,6 +291,13 @@
 #define TILE_RADIUS                   16
 #define FUSED_VEC4S                   5
 
+// Of a Fourier transform: the invocations of a workgroup, and the most elements of a butterfly.
+// Brighter values than FFT_LIMIT would overflow in sums.
+#define FFT_COLUMNS    8
+#define FFT_ROWS       8
+#define FFT_MOST_RADIX 64
+#define FFT_LIMIT      1e28
+
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
 #define MAX_LEVELS      16
@@ -252,7 +307,8 @@
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
 // applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
-// first level. LEVELS is the number of levels that a pass adds up.
+// first level. LEVELS is the number of levels that a pass adds up. RADIX_A to STAGE are of Fourier
+// transforms (fft.comp).
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -277,7 +333,13 @@
     CONSTANT(20, NODE, node) \
     CONSTANT(21, ALPHA, alpha) \
     CONSTANT(22, MASKED, masked) \
-    CONSTANT(23, STORED, stored)
+    CONSTANT(23, STORED, stored) \
+    CONSTANT(24, RADIX_A, radix_a) \
+    CONSTANT(25, RADIX_B, radix_b) \
+    CONSTANT(26, INVERSE, inverse) \
+    CONSTANT(27, ROTATED, rotated) \
+    CONSTANT(28, PADDED, padded) \
+    CONSTANT(29, STAGE, stage)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -309,12 +371,19 @@
     NAME(TEXEL_OWN, 0, own) \
     NAME(TEXEL_X, 1, x)
 
+#define BOUNDARY_NAMES(NAME) \
+    NAME(BOUNDARY_ZERO, 0, zero) \
+    NAME(BOUNDARY_EDGE, 1, edge) \
+    NAME(BOUNDARY_WRAP, 2, wrap) \
+    NAME(BOUNDARY_WRAP_X, 3, wrap_x)
+
 #define CHOICES(CHOICE) \
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
     CHOICE(encoding, ENCODING_NAMES) \
     CHOICE(alpha, ALPHA_NAMES) \
-    CHOICE(texel, TEXEL_NAMES)
+    CHOICE(texel, TEXEL_NAMES) \
+    CHOICE(boundary, BOUNDARY_NAMES)
 
 // Modes that the core chooses, with the same names in C and GLSL.
 #define MODE_NAMES(NAME) \
@@ -339,4 +408,9 @@
     NAME(UPSAMPLE_LINEAR, 1, linear) \
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
-    NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic)
+    NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
+    NAME(STAGE_PLAIN, 0, plain) \
+    NAME(STAGE_FIRST, 1, first_stage) \
+    NAME(STAGE_GREY, 2, grey) \
+    NAME(STAGE_COLOURS, 3, colours) \
+    NAME(STAGE_LAST, 4, last_stage)

@@ -26,3 +26,18 @@ def hdr_picture(width: int, height: int, channels: int, dtype: str, seed: int = 
         return np.rint(255 * values).astype(np.uint8)
     # Beyond what 8 bits hold, and below 0.
     return (8 * values - 0.5).astype(dtype)
+
+
+def noise_image(*shape: int, dtype: str = "float32", seed: int = 5) -> NDArray[Any]:
+    """Return noise of any shape and dtype in 0..1; integers are scaled."""
+    values = np.random.default_rng(seed).random(shape)
+    if np.dtype(dtype).kind == "u":
+        return np.rint(values * np.iinfo(dtype).max).astype(dtype)
+    return values.astype(dtype)
+
+
+def changed(a: NDArray[Any], place: tuple[int, int, int], value: float) -> NDArray[Any]:
+    """Return a copy with one value changed."""
+    b = a.copy()
+    b[place] = value
+    return b

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom import DualKawase, Frames, Pyramid, Separable, Settings, _core, reference
+from vkbloom import DualKawase, Frames, GodotBloom, Pyramid, Separable, Settings, _core, reference
 
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 _DTYPES = {format: dtype for dtype, format in FORMATS.items()}
@@ -87,6 +87,18 @@ def assert_close(
     )
 
 
+def _slope(image: NDArray[Any], settings: Settings) -> Limit:
+    """Return how much of a difference of the bloom, after its intensity, is in `final` at most.
+
+    Godot's screen is s + g - s g / white, of which s may be any number.
+    """
+    if not isinstance(settings, GodotBloom) or settings.composite != "screen":
+        return 1.0
+    scene = real(image) * 2.0**settings.exposure
+    slope: NDArray[np.float64] = np.maximum(1.0, np.abs(1.0 - scene / settings.white))
+    return slope
+
+
 def assert_matches_reference(
     frames: Frames,
     image: NDArray[Any],
@@ -141,10 +153,12 @@ def assert_matches_reference(
     if settings.bloom and _DTYPES[format] != image.dtype:
         # The coarser bloom's rounding goes through the composite into a finer final.
         of_bloom = np.broadcast_to(limits["bloom"], frames["bloom"].shape)[..., : image.shape[2]]
-        limits["final"] = limits["final"] + settings.intensity * of_bloom
+        slope = settings.intensity * _slope(image, settings)
+        limits["final"] = limits["final"] + slope * of_bloom
     for name, array in frames.items():
         assert_close(name, array, expected[name], limits[name])
-        if name != "final" and settings.alpha != "blur":
+        # (A kernel has no alpha.)
+        if name not in ("final", "kernel") and settings.alpha != "blur":
             assert (real(array[..., 3]) == 1).all(), f"{name}: alpha is not 1"
     if image.shape[2] == 4 and settings.alpha == "keep":
         np.testing.assert_array_equal(frames["final"][..., 3], image[..., 3])

@@ -72,11 +72,12 @@ static bool step(struct vkb_dry_run *dry_run, struct vkb_plan_step *planned, boo
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         struct vkb_dry_image *image = find_image(dry_run, graph->images[i].name);
         contents[i] = image && fits(image, &graph->images[i]) ? &image->content : NULL;
-        if (!graph->images[i].input)
+        if (!vkb_is_given(&graph->images[i]))
             continue;
         if (!(contents[i] = resolve(dry_run, &graph->images[i], error)))
             return false;
-        contents[i]->version = dry_run->source_version;
+        contents[i]->version =
+            graph->images[i].input ? dry_run->source_version : graph->images[i].serial;
     }
     if (!vkb_planner_mark(&dry_run->planner, planned, error))
         return false;

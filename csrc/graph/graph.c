@@ -64,6 +64,8 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     PACK(fused);
     PACK(block_width);
     PACK(block_height);
+    PACK(groups_width);
+    PACK(groups_height);
     PACK(targets);
     PACK(target_count);
     PACK(depth);
@@ -81,7 +83,7 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
     for (uint32_t i = 0; i < a->image_count; ++i) {
         const struct vkb_image_row *x = &a->images[i], *y = &b->images[i];
         if (x->format != y->format || x->width != y->width || x->height != y->height
-            || strcmp(x->name, y->name) != 0)
+            || x->serial != y->serial || strcmp(x->name, y->name) != 0)
             return false;
     }
     return true;
@@ -95,11 +97,19 @@ static bool share_targets(const struct vkb_pass_row *a, const struct vkb_pass_ro
         && memcmp(a->targets, b->targets, a->target_count * sizeof a->targets[0]) == 0;
 }
 
+static bool goes_on(const struct vkb_pass_row *first, const struct vkb_pass_row *next)
+{
+    return first->geometry == VKB_GEOMETRY_DISPATCH && vkb_pass_in_place(next)
+        && first->targets[0] == next->targets[0];
+}
+
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first)
 {
     uint32_t end = first + 1;
 
-    while (end < graph->pass_count && share_targets(&graph->passes[first], &graph->passes[end]))
+    while (end < graph->pass_count
+           && (share_targets(&graph->passes[first], &graph->passes[end])
+               || goes_on(&graph->passes[first], &graph->passes[end])))
         ++end;
     return end;
 }
@@ -110,6 +120,11 @@ bool vkb_pass_reads(const struct vkb_pass_row *pass, uint32_t image)
         if (pass->reads[i] == image)
             return true;
     return false;
+}
+
+bool vkb_pass_in_place(const struct vkb_pass_row *pass)
+{
+    return pass->geometry == VKB_GEOMETRY_DISPATCH && vkb_pass_reads(pass, pass->targets[0]);
 }
 
 bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image)
@@ -205,13 +220,13 @@ uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
     return row->channels ? row->channels : vkb_formats[row->format].channels;
 }
 
-// Whether the image is an input, or written before pass `pass_index`.
+// Whether the image is given, or written before pass `pass_index`.
 static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
 {
     for (uint32_t i = 0; i < pass_index; ++i)
         if (vkb_pass_writes(&graph->passes[i], image))
             return true;
-    return graph->images[image].input != VKB_INPUT_NONE;
+    return vkb_is_given(&graph->images[image]);
 }
 
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
@@ -253,13 +268,15 @@ static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uin
     if ((row->format == VKB_FORMAT_DEPTH32_FLOAT) != depth)
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s: %s has the wrong kind of format",
                         pass->name, row->name);
-    if (vkb_pass_reads(pass, target))
+    if (vkb_pass_reads(pass, target)
+        && (!vkb_pass_in_place(pass) || pass_index == 0
+            || vkb_graph_group_end(graph, pass_index - 1) <= pass_index))
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s reads its own target %s",
                         pass->name, row->name);
     if (row->width != graph->images[first].width || row->height != graph->images[first].height)
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has targets of several sizes",
                         pass->name);
-    // Earlier writers must share the render pass of this pass.
+    // Earlier writers must be in the group of this pass.
     for (uint32_t i = pass_index; i-- > 0;) {
         if (vkb_graph_group_end(graph, i) > pass_index || (pass->fused && i == pass_index - 1))
             continue;

@@ -30,8 +30,8 @@ enum vkb_input_kind {
     VKB_INPUT_COUNT = VKB_INPUT_LEVEL + GATHERED_LEVELS,
 };
 
-// An image is either an input, or written by one sequence of consecutive passes. So its content
-// stays valid until this sequence is out of date.
+// An image is either given by the host, or written by one sequence of consecutive passes. So its
+// content stays valid until this sequence is out of date.
 struct vkb_image_row {
     char name[VKB_NAME_SIZE];
     enum vkb_format format;
@@ -39,7 +39,16 @@ struct vkb_image_row {
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
     enum vkb_input_kind input;
+    // Filled by the host once: the pixels, without gaps, and their number; 0: it is not.
+    const void *pixels;
+    uint64_t serial;
 };
+
+// Whether the host fills the image, not a pass.
+static inline bool vkb_is_given(const struct vkb_image_row *row)
+{
+    return row->input || row->serial;
+}
 
 // What a pass draws; depth test and culling are derived from it. A dispatch draws nothing: its
 // compute shader writes one target, and each workgroup writes one block of pixels.
@@ -72,7 +81,8 @@ enum vkb_blend {
 };
 
 // Bindings: 0 is the parameter block, then the images read, in order, then the target of a
-// dispatch. A skybox reads the scene's cubemap at binding 1; textured triangles read the textures
+// dispatch, which can be among the images read: each invocation then stores where it has loaded. A
+// skybox reads the scene's cubemap at binding 1; textured triangles read the textures
 // of base colour and emission. Consecutive draws with the same targets share a render pass, with
 // the load operation of the first.
 struct vkb_pass_row {
@@ -86,7 +96,8 @@ struct vkb_pass_row {
     uint32_t read_count;
     enum vkb_reading reading;
     bool fused;  // a fused pass: may replace the pass before it, with the same target
-    uint32_t block_width, block_height;  // of a dispatch: pixels of a workgroup
+    uint32_t block_width, block_height;    // of a dispatch: pixels of a workgroup
+    uint32_t groups_width, groups_height;  // number of workgroups; 0: what covers the target
     uint32_t targets[VKB_MAX_TARGETS];
     uint32_t target_count;
     uint32_t depth;  // VKB_NO_IMAGE: none
@@ -125,7 +136,8 @@ bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t 
 // Whether both graphs have the same images in the same order; their passes may differ.
 bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b);
 
-// The index after the last pass that shares a render pass with pass `first`.
+// The index after the last pass of the group of pass `first`: of those that share a render pass,
+// or that go on in place.
 uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 
 // Writes the fields of the row to `bytes`, which has space for a row, without padding. Two rows are
@@ -133,6 +145,9 @@ uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes);
 
 bool vkb_pass_reads(const struct vkb_pass_row *pass, uint32_t image);
+// Whether the pass is a dispatch that reads and writes one image. It is in the group of the pass
+// before, which writes that image.
+bool vkb_pass_in_place(const struct vkb_pass_row *pass);
 bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
 
 // The images that a pass writes, the depth last, into an array of VKB_MAX_TARGETS + 1. Returns

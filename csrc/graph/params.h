@@ -112,6 +112,7 @@ enum vkb_tonemap { TONEMAP_NAMES(VKB_NAME_ENUM) };
 enum vkb_encoding { ENCODING_NAMES(VKB_NAME_ENUM) };
 enum vkb_alpha { ALPHA_NAMES(VKB_NAME_ENUM) };
 enum vkb_texel { TEXEL_NAMES(VKB_NAME_ENUM) };
+enum vkb_boundary { BOUNDARY_NAMES(VKB_NAME_ENUM) };
 enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
 #undef VKB_NAME_ENUM
 

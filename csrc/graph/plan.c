@@ -46,7 +46,8 @@ static bool append(struct vkb_planner *planner, const void *bytes, size_t size,
 }
 
 // Writes the recipe of the targets of passes first..end-1: the rows of these passes, with the
-// versions of the images that they read instead of the indices in the graph.
+// versions of the images that they read instead of the indices in the graph. What a pass reads in
+// place has none.
 static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step *step,
                          uint32_t first, uint32_t end, struct vkb_error *error)
 {
@@ -57,7 +58,8 @@ static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step
         uint64_t versions[VKB_MAX_READS + 1] = {0};
 
         for (uint32_t read = 0; read < row.read_count; ++read)
-            versions[read] = step->contents[row.reads[read]]->version;
+            if (!vkb_pass_writes(&row, row.reads[read]))
+                versions[read] = step->contents[row.reads[read]]->version;
         if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
             versions[VKB_MAX_READS] = step->scene;
         memset(row.reads, 0, sizeof row.reads);
@@ -70,12 +72,12 @@ static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step
     return true;
 }
 
-// Whether the image exists and holds the result of a current pass before `end`, or is the input.
+// Whether the image exists and holds the result of a current pass before `end`, or is given.
 static bool is_current(const struct vkb_planner *planner, const struct vkb_plan_step *step,
                        uint32_t image, uint32_t end)
 {
     const struct vkb_graph *graph = &step->plan->graph;
-    bool current = graph->images[image].input != VKB_INPUT_NONE;
+    bool current = vkb_is_given(&graph->images[image]);
 
     for (uint32_t i = 0; i < end; ++i)
         current = current || (planner->current[i] && vkb_pass_writes(&graph->passes[i], image));
@@ -118,7 +120,9 @@ static bool mark_current(struct vkb_planner *planner, const struct vkb_plan_step
         end = vkb_graph_group_end(graph, first);
         for (uint32_t i = first; i < end; ++i)
             for (uint32_t read = 0; read < graph->passes[i].read_count; ++read)
-                found = found && is_current(planner, step, graph->passes[i].reads[read], first);
+                found = found
+                     && (vkb_pass_writes(&graph->passes[i], graph->passes[i].reads[read])
+                         || is_current(planner, step, graph->passes[i].reads[read], first));
         if (found && !compare_recipe(planner, step, first, end, &found, error))
             return false;
         for (uint32_t i = first; i < end; ++i)

@@ -6,7 +6,7 @@
 // derive the sizes from the frame.
 static const struct vkb_size FORWARD_BUFFERS = {256, 256};
 
-static struct vkb_size buffer_size(const struct vkb_settings *settings, struct vkb_size frame)
+struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct vkb_size frame)
 {
     if (!settings->bloom_width && settings->values.bloom_scale == 1.0
         && !vkb_is_published(settings))
@@ -45,7 +45,7 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
     if (settings->values.bloom) {
         struct vkb_bloom_source glow = {
             .mask = VKB_NO_IMAGE,
-            .buffers = buffer_size(settings, source->size),
+            .buffers = vkb_forward_buffers(settings, source->size),
             .final = source->size,
             .format = settings->format ? settings->format : VKB_FORMAT_RGBA8_UNORM,
         };

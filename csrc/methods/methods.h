@@ -32,6 +32,8 @@ bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
                      struct vkb_error *error);
 bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
                        struct vkb_graph *graph, struct vkb_error *error);
+// The size of the bloom buffers of a forward scene.
+struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct vkb_size frame);
 bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_scene_source *source,
                         struct vkb_graph *graph, struct vkb_error *error);
 

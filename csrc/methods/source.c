@@ -1,5 +1,7 @@
 #include "methods/source.h"
 
+#include <string.h>
+
 bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings *settings,
                       uint32_t max_side, struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -14,6 +16,21 @@ bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings
             && vkb_build_image(settings, &source->image, graph, error);
     }
     return vkb_fail(error, VKB_ERROR_GENERAL, "source: there is nothing in it");
+}
+
+bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings *settings,
+                      uint32_t max_side, struct vkb_size *frame, struct vkb_size *buffers,
+                      struct vkb_error *error)
+{
+    const bool scene = source->kind == VKB_SOURCE_SCENE;
+
+    *frame = scene ? source->scene.size : source->image.size;
+    if (!vkb_check_sizes(settings, scene ? "size" : "image", *frame, max_side, error))
+        return false;
+    *buffers = scene && strcmp(source->shading, "forward") == 0
+                 ? vkb_forward_buffers(settings, *frame)
+                 : vkb_bloom_size(settings, *frame);
+    return true;
 }
 
 static bool levels_fit(const struct vkb_image_source *planned, const struct vkb_image_source *given)

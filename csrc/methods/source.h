@@ -21,6 +21,12 @@ struct vkb_source {
 bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings *settings,
                       uint32_t max_side, struct vkb_graph *graph, struct vkb_error *error);
 
+// The sizes that the source's graph begins with: of the frame, and of its bloom buffers. A VALUE
+// error where they are out of range.
+bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings *settings,
+                      uint32_t max_side, struct vkb_size *frame, struct vkb_size *buffers,
+                      struct vkb_error *error);
+
 // Whether a graph of `planned` can run with the data of `given`: both need the same kind and the
 // same optional parts, images also the same size and format. Camera and time may differ, since the
 // graph has them as parameters.

@@ -19,6 +19,15 @@ struct vkb_bloom_source {
     enum vkb_format format;
 };
 
+// A shader that is compiled once for each format that it loads.
+#define VKB_BY_FORMAT(shader) \
+    { \
+        [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
+        [VKB_FORMAT_RGBA16_FLOAT] = VKB_SHADER_##shader##_rgba16float, \
+        [VKB_FORMAT_RGBA32_FLOAT] = VKB_SHADER_##shader##_rgba32float, \
+        [VKB_FORMAT_RG11B10_UFLOAT] = VKB_SHADER_##shader##_rgba32float, \
+    }
+
 // Adds an image that a pass will write.
 bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
                     struct vkb_size size, bool framebuffer, uint32_t *index,

@@ -13,6 +13,7 @@
     METHOD(SEPARABLE, separable, false) \
     METHOD(PYRAMID, pyramid, false) \
     METHOD(DUAL_KAWASE, dual_kawase, false) \
+    METHOD(CONVOLUTION, convolution, false) \
     METHOD(BEVY, bevy, true) \
     METHOD(KINO, kino, true) \
     METHOD(FILAMENT, filament, true) \
@@ -34,6 +35,16 @@ struct vkb_layer {
     float scale, strength;
 };
 
+// The kernel of a convolution in pixels of the bloom buffers: four floats each, row by row, which
+// the owner of the settings keeps.
+struct vkb_kernel_data {
+    const float *pixels;
+    uint32_t width, height;
+    uint64_t serial;     // no other kernel's
+    bool grey;           // all channels are equal
+    float prefilter[3];  // min, max, factor; min above max: none
+};
+
 struct vkb_settings {
     enum vkb_method method;
     struct vkb_values values;  // the numbers, at the offsets of vkb_value_rows
@@ -47,6 +58,7 @@ struct vkb_settings {
     uint32_t layer_count;
     float level_weights[MAX_LEVELS];
     uint32_t level_weight_count;  // 0: none are given
+    struct vkb_kernel_data kernel;
 };
 
 static inline bool vkb_is_published(const struct vkb_settings *settings)

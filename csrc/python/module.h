@@ -149,6 +149,17 @@ bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *im
 bool vkb_read_mask(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
 
+// The kernel of a convolution, held until vkb_release_kernel, which may be called on a zeroed one.
+struct vkb_held_kernel {
+    Py_buffer view;
+    bool held;
+};
+
+// Asks a convolution's settings for the kernel of these sizes.
+bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                     struct vkb_held_kernel *held, struct vkb_kernel_data *kernel);
+void vkb_release_kernel(struct vkb_held_kernel *held);
+
 // An image is the caller's array, or one that stays on the device of a renderer.
 struct vkb_source_object {
     PyObject_HEAD
@@ -179,6 +190,7 @@ struct vkb_plan_object {
     struct vkb_plan plan;
     uint64_t renderer;  // serial of its renderer; 0: none, for inspection only
     PyObject *outputs;  // ((name, shape, dtype), ...)
+    struct vkb_held_kernel kernel;
 };
 
 // Size in bytes of an output in the caller's array.

@@ -133,10 +133,26 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
         && vkb_image_cache_check(device, graph, error);
 }
 
+// The kernel of a convolution for the source's sizes.
+static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_device *device,
+                        PyObject *settings_object, struct vkb_settings *settings,
+                        struct vkb_plan_object *self)
+{
+    struct vkb_size frame, buffers;
+    struct vkb_error error = {0};
+
+    if (settings->method != VKB_METHOD_CONVOLUTION || !settings->values.bloom)
+        return true;
+    if (vkb_source_sizes(&self->source, settings, device->max_side, &frame, &buffers, &error))
+        return vkb_read_kernel(settings_object, frame, buffers, &self->kernel, &settings->kernel);
+    vkb_raise(state, &error);
+    return false;
+}
+
 static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
                           enum vkb_variants variants, uint64_t renderer, PyObject *source,
-                          const struct vkb_settings *settings, const struct vkb_part *part,
-                          PyObject *names)
+                          PyObject *settings_object, struct vkb_settings *settings,
+                          const struct vkb_part *part, PyObject *names)
 {
     struct vkb_plan_object *self = vkb_new_object(state->plan_type);
     struct vkb_error error = {0};
@@ -145,6 +161,10 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         return NULL;
     self->source = ((struct vkb_source_object *)source)->source;
     self->renderer = renderer;
+    if (!hold_kernel(state, device, settings_object, settings, self)) {
+        Py_DECREF(self);
+        return NULL;
+    }
     if (!build_graph(device, variants, &self->source, settings, part, &self->plan.graph, &error)) {
         Py_DECREF(self);
         return vkb_raise(state, &error);
@@ -185,7 +205,7 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
     return new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
-                    &settings, given ? &part : NULL, names);
+                    settings_object, &settings, given ? &part : NULL, names);
 }
 
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
@@ -208,7 +228,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     device.adapter.device_type = variants == VKB_VARIANTS_CPU
                                    ? VK_PHYSICAL_DEVICE_TYPE_CPU
                                    : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-    return new_plan(state, &device, variants, 0, source, &settings, NULL, names);
+    return new_plan(state, &device, variants, 0, source, settings_object, &settings, NULL, names);
 }
 
 // The images that the pass reads, each once; returns how many.
@@ -423,6 +443,8 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
 {
     Py_VISIT(Py_TYPE(object));
     Py_VISIT(((struct vkb_plan_object *)object)->outputs);
+    if (((struct vkb_plan_object *)object)->kernel.held)
+        Py_VISIT(((struct vkb_plan_object *)object)->kernel.view.obj);
     return 0;
 }
 
@@ -432,6 +454,7 @@ static void dealloc(PyObject *object)
 
     PyObject_GC_UnTrack(object);
     vkb_plan_destroy(&self->plan);
+    vkb_release_kernel(&self->kernel);
     Py_XDECREF(self->outputs);
     vkb_free_object(object);
 }

@@ -16,6 +16,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     while (frame->screens)
         vkb_screen_destroy(device, frame, frame->screens);
     vkb_submissions_destroy(device, &frame->submissions);
+    vkb_buffer_destroy(device, &frame->constants);
     vkb_image_cache_destroy(device, &frame->cache);
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         vkb_upload_destroy(device, &frame->uploads[kind]);
@@ -187,6 +188,55 @@ static void record_inputs(struct vkb_run *run)
     }
 }
 
+// Whether the image holds the pixels of the row.
+static bool holds_constant(const struct vkb_cached_image *cached, const struct vkb_image_row *row)
+{
+    return cached->content.valid && cached->content.version == row->serial;
+}
+
+// The first image of the graph that is filled once and does not hold its pixels; NULL: there is
+// none. A graph has one such image at most.
+static bool stage_constant(struct vkb_run *run, struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < run->graph->image_count; ++i) {
+        const struct vkb_image_row *row = &run->graph->images[i];
+        const size_t size = (size_t)row->width * row->height * vkb_pixel_size(row->format);
+        if (!row->serial)
+            continue;
+        if (!resolve(run, i, error))
+            return false;
+        if (holds_constant(run->images[i], row))
+            continue;
+        run->images[i]->content.valid = false;
+        if (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
+            || !vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                   size, &run->frame->constants, error))
+            return false;
+        memcpy(run->frame->constants.mapped, row->pixels, size);
+        if (!vkb_buffer_flush(run->device, &run->frame->constants, error))
+            return false;
+        run->constant = run->images[i];
+        run->constant->content.version = row->serial;
+    }
+    return true;
+}
+
+static void record_constant(struct vkb_run *run)
+{
+    struct vkb_image *image = &run->constant->image;
+    VkBufferImageCopy copy = {
+        .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+        .imageExtent = {image->width, image->height, 1},
+    };
+
+    vkb_image_transition(run->device, run->submission->commands.buffer, image,
+                         VKB_ACCESS_COPY_TARGET);
+    run->device->vk.vkCmdCopyBufferToImage(
+        run->submission->commands.buffer, run->frame->constants.handle, image->handle,
+        vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1, &copy);
+    run->constant->content.valid = true;
+}
+
 // The version of the scene, or of the input that was written last.
 static uint64_t source_version(const struct vkb_run *run)
 {
@@ -250,6 +300,8 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
     record_inputs(run);
+    if (run->constant)
+        record_constant(run);
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
                             error))
@@ -264,7 +316,8 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
 {
     run->graph = &requests[0].plan->graph;
     return (!source->scene || load_scene(run, source->scene, error))
-        && stage_inputs(run, source, error) && reserve(run, requests, request_count, error)
+        && stage_inputs(run, source, error) && stage_constant(run, error)
+        && reserve(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }
 

@@ -18,6 +18,7 @@ struct vkb_frame {
     struct vkb_pipelines pipelines;
     struct vkb_scene scene;
     struct vkb_upload uploads[VKB_INPUT_COUNT];  // by kind
+    struct vkb_buffer constants;                 // staging memory of images that are filled once
     struct vkb_image_cache cache;
     struct vkb_planner planner;
     uint64_t submitted;  // submissions so far

@@ -131,13 +131,52 @@ static bool check_format(const struct vkb_device *device, const struct vkb_graph
     return true;
 }
 
+// Dispatches that variants chose do not come here without them.
+static bool check_dispatches(const struct vkb_device *device, const struct vkb_graph *graph,
+                             struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].geometry == VKB_GEOMETRY_DISPATCH && !device->dispatch)
+            return vkb_fail(error, VKB_ERROR_GENERAL,
+                            "the compute shaders of %s cannot write images, which the pass %s "
+                            "needs",
+                            device->adapter.name, graph->passes[i].name);
+    return true;
+}
+
+// The images of a convolution, which are many times larger than the frame, must fit the largest
+// heap of the device together.
+static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
+                         struct vkb_error *error)
+{
+    uint64_t needed = 0, largest = 0;
+    bool convolves = false;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const struct vkb_image_row *row = &graph->images[i];
+        convolves = convolves || row->serial;
+        needed += (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
+    }
+    for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
+        if (device->memory.memoryHeaps[i].size > largest)
+            largest = device->memory.memoryHeaps[i].size;
+    // Plans without a renderer know no heaps.
+    if (convolves && largest && needed > largest)
+        return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+                        "%llu MiB of images are needed, and the adapter %s has %llu; use a smaller "
+                        "bloom_scale",
+                        (unsigned long long)(needed >> 20), device->adapter.name,
+                        (unsigned long long)(largest >> 20));
+    return true;
+}
+
 bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
                            struct vkb_error *error)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
         if (!check_format(device, graph, i, error))
             return false;
-    return true;
+    return check_dispatches(device, graph, error) && check_memory(device, graph, error);
 }
 
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,

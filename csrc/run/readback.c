@@ -8,6 +8,17 @@ static size_t row_size(const struct vkb_output *output)
     return (size_t)output->width * vkb_pixel_size(output->format);
 }
 
+bool vkb_readback_is_complete(const struct vkb_output *output)
+{
+    return output->channels == vkb_formats[output->format].channels;
+}
+
+// Bytes of a row in the caller's memory.
+static size_t output_row_size(const struct vkb_output *output)
+{
+    return (size_t)output->width * output->channels * vkb_formats[output->format].channel_size;
+}
+
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback)
 {
     vkb_readback_release(device, readback);
@@ -27,24 +38,24 @@ static bool import_pages(const struct vkb_device *device, struct vkb_output *out
                               &run->buffer, &start))
         return false;
     output->imported = run->buffer.handle;
-    output->offset = start + (VkDeviceSize)((char *)output->memory - (char *)run->memory);
+    output->imported_offset = start + (VkDeviceSize)((char *)output->memory - (char *)run->memory);
     return true;
 }
 
 static bool import(const struct vkb_device *device, struct vkb_readback *readback, size_t size,
                    struct vkb_output *output)
 {
-    const size_t pixel_size = vkb_pixel_size(output->format);
     struct vkb_buffer *buffer = &readback->imports[readback->import_count];
 
-    // The device writes complete pixels, to addresses that are multiples of their size.
-    if (output->channels != vkb_formats[output->format].channels
-        || (uintptr_t)output->memory % pixel_size != 0)
+    // A copy writes complete pixels, to addresses that are multiples of their size.
+    if (vkb_readback_is_complete(output)
+            ? (uintptr_t)output->memory % vkb_pixel_size(output->format) != 0
+            : !device->words || output_row_size(output) % VKB_WORD_SIZE != 0)
         return false;
     if (output->pages)
         return import_pages(device, output);
     if (!vkb_buffer_import(device, vkb_device_import_usage(device), output->memory, size, buffer,
-                           &output->offset))
+                           &output->imported_offset))
         return false;
     output->imported = buffer->handle;
     ++readback->import_count;
@@ -62,11 +73,12 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     if (!output->memory)
         return true;
     const size_t size = row_size(output) * output->row_count;
-    if (size >= VKB_IMPORTED_BYTES) {
+    const size_t output_size = output_row_size(output) * output->row_count;
+    if (output_size >= VKB_IMPORTED_BYTES) {
         if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
                       readback->import_count + 1, sizeof *readback->imports))
             return false;
-        if (import(device, readback, size, output))
+        if (import(device, readback, output_size, output) && vkb_readback_is_complete(output))
             return true;
     }
     output->offset = readback->used;
@@ -80,8 +92,9 @@ bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_
 {
     const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
 
-    return output->imported && output->row_count == height && row_size(output) % VKB_WORD_SIZE == 0
-        && output->offset % VKB_WORD_SIZE == 0 && output->offset % align == 0;
+    return output->imported && output->row_count == height
+        && output_row_size(output) % VKB_WORD_SIZE == 0
+        && output->imported_offset % VKB_WORD_SIZE == 0 && output->imported_offset % align == 0;
 }
 
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
@@ -95,9 +108,10 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
                          const struct vkb_readback *readback, struct vkb_image *image,
                          const struct vkb_output *output)
 {
-    const VkBuffer to = output->imported ? output->imported : readback->staging.handle;
+    const bool direct = output->imported && vkb_readback_is_complete(output);
+    const VkBuffer to = direct ? output->imported : readback->staging.handle;
     VkBufferImageCopy copy = {
-        .bufferOffset = output->offset,
+        .bufferOffset = direct ? output->imported_offset : output->offset,
         .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
         .imageOffset = {0, (int32_t)output->first_row, 0},
         .imageExtent = {image->width, output->row_count, 1},
@@ -131,10 +145,10 @@ void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_ou
 {
     const size_t pixels = (size_t)output->width * output->row_count;
 
-    if (output->imported || !output->memory)
+    if (output->stored || !output->memory || (output->imported && vkb_readback_is_complete(output)))
         return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
-    if (output->channels == vkb_formats[output->format].channels) {
+    if (vkb_readback_is_complete(output)) {
         memcpy(output->memory, from, row_size(output) * output->row_count);
         return;
     }

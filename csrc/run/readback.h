@@ -21,10 +21,11 @@ struct vkb_output {
     // Set by vkb_readback_plan.
     enum vkb_format format;
     uint32_t width;
-    VkBuffer imported;    // the caller's memory as a buffer; VK_NULL_HANDLE: uses staging memory
-    VkDeviceSize offset;  // in that buffer or in the staging memory
+    VkBuffer imported;  // the caller's memory as a buffer; VK_NULL_HANDLE: uses staging memory
+    VkDeviceSize imported_offset;
+    VkDeviceSize offset;  // in the staging memory; unused if the device copies to imported memory
     // Set while the passes are recorded: the last pass stores to the imported memory, so there is
-    // no copy.
+    // no copy. Only so does the device write fewer channels than the image has.
     bool stored;
 };
 
@@ -41,6 +42,8 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
 bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
                        enum vkb_format format, uint32_t width, struct vkb_output *output,
                        struct vkb_error *error);
+// Whether the output has all channels of its image.
+bool vkb_readback_is_complete(const struct vkb_output *output);
 // Whether a pass can store words to the output's memory: it must have all `height` rows of the
 // image.
 bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,

@@ -168,10 +168,12 @@ static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
 static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass, uint32_t rows)
 {
     const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
+    const uint32_t width = (target->width + pass->block_width - 1) / pass->block_width;
+    const uint32_t height = (rows + pass->block_height - 1) / pass->block_height;
 
     run->device->vk.vkCmdDispatch(run->submission->commands.buffer,
-                                  (target->width + pass->block_width - 1) / pass->block_width,
-                                  (rows + pass->block_height - 1) / pass->block_height, 1);
+                                  pass->groups_width ? pass->groups_width : width,
+                                  pass->groups_height ? pass->groups_height : height, 1);
 }
 
 // The most rows that one storage buffer descriptor can cover. They are a multiple of the block's
@@ -204,8 +206,8 @@ uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph
 }
 
 // The output whose memory the pass can store to instead of its image; NULL: none. No other pass may
-// read the image. If the request comes again, the pass stores to the image, so that a third time
-// nothing has to run.
+// read the image. An output without alpha needs a shader that stores three channels. If the request
+// comes again, the pass stores to the image, so that a third time nothing has to run.
 static struct vkb_output *find_stored(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct vkb_plan *plan = run->request->plan;
@@ -216,11 +218,13 @@ static struct vkb_output *find_stored(const struct vkb_run *run, const struct vk
     for (uint32_t i = 0; i < run->graph->pass_count; ++i)
         if (run->frame->planner.needed[i] && vkb_pass_reads(&run->graph->passes[i], image))
             return NULL;
-    for (uint32_t i = 0; i < plan->output_count; ++i)
+    for (uint32_t i = 0; i < plan->output_count; ++i) {
+        struct vkb_output *output = &run->request->outputs[i];
         if (plan->outputs[i] == image
-            && vkb_readback_takes_words(run->device, &run->request->outputs[i],
-                                        run->graph->images[image].height))
-            return &run->request->outputs[i];
+            && (vkb_readback_is_complete(output) || vkb_spirv[pass->shader].packed != pass->shader)
+            && vkb_readback_takes_words(run->device, output, run->graph->images[image].height))
+            return output;
+    }
     return NULL;
 }
 
@@ -248,15 +252,16 @@ static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pas
                                        VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
 }
 
+// `output`: what the pass stores to; NULL: its image.
 static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
-                           VkDeviceSize params, struct vkb_error *error)
+                           VkDeviceSize params, struct vkb_output *output, struct vkb_error *error)
 {
     const struct vkb_image *image = &run->images[pass->targets[0]]->image;
-    struct vkb_output *output = find_stored(run, pass);
-    const VkDeviceSize start = output ? output->offset : 0;
+    const size_t channel_size = vkb_formats[image->format].channel_size;
+    const VkDeviceSize start = output ? output->imported_offset : 0;
     struct band band = {
         .buffer.buffer = output ? output->imported : image->buffer,
-        .row_pitch = output ? image->width * vkb_pixel_size(image->format) : image->row_pitch,
+        .row_pitch = output ? image->width * output->channels * channel_size : image->row_pitch,
     };
     const struct binding binding = {.pass = pass, .params = params, .band = &band};
     const uint32_t rows = band_rows(run->device, pass, band.row_pitch);
@@ -286,8 +291,6 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
 
     if (pass->textured)
         return draw_surfaces(run, pass, mesh, params, error);
-    if (pass->reading == VKB_READING_WORDS)
-        return dispatch_words(run, pass, params, error);
     if (!bind_descriptors(run, &(struct binding){.pass = pass, .params = params}, error))
         return false;
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
@@ -305,23 +308,35 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
                         struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = &run->graph->passes[index];
+    const bool words = pass->reading == VKB_READING_WORDS;
+    struct vkb_output *output = words ? find_stored(run, pass) : NULL;
+    struct vkb_pass_row packed;
     VkPipeline pipeline;
 
+    if (output && !vkb_readback_is_complete(output)) {
+        memcpy(&packed, pass, sizeof packed);
+        packed.shader = vkb_spirv[pass->shader].packed;
+        pass = &packed;
+    }
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
                            error))
         return false;
     run->device->vk.vkCmdBindPipeline(run->submission->commands.buffer, vkb_pass_bind_point(pass),
                                       pipeline);
-    return draw(run, pass, write_params(run, pass), error);
+    return words ? dispatch_words(run, pass, write_params(run, pass), output, error)
+                 : draw(run, pass, write_params(run, pass), error);
 }
 
 static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
 {
     for (uint32_t i = first; i < end; ++i) {
         const struct vkb_pass_row *pass = &run->graph->passes[i];
-        for (uint32_t read = 0; read < pass->read_count; ++read)
-            vkb_image_transition(run->device, run->submission->commands.buffer,
-                                 &run->images[pass->reads[read]]->image, vkb_pass_reads_as(pass));
+        for (uint32_t read = 0; read < pass->read_count; ++read) {
+            struct vkb_image *image = &run->images[pass->reads[read]]->image;
+            if (!vkb_pass_writes(pass, pass->reads[read]))
+                vkb_image_transition(run->device, run->submission->commands.buffer, image,
+                                     vkb_pass_reads_as(pass));
+        }
     }
 }
 
@@ -387,17 +402,19 @@ static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_erro
 {
     struct vkb_device *device = run->device;
     struct vkb_submission *submission = run->submission;
+    const struct vkb_pass_row *pass = &run->graph->passes[index];
     VkCommandBuffer commands = submission->commands.buffer;
 
     // The timer starts before the barriers, since lavapipe takes a timestamp at the next barrier.
     vkb_timer_start(device, commands, &submission->timer);
     transition_reads(run, index, index + 1);
-    vkb_image_transition(device, commands,
-                         &run->images[run->graph->passes[index].targets[0]]->image,
-                         VKB_ACCESS_DISPATCH_STORED);
+    vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
+                         vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
+                                                 : VKB_ACCESS_DISPATCH_STORED);
     if (!record_pass(run, index, VK_NULL_HANDLE, error))
         return false;
     vkb_timer_stop(device, commands, &submission->timer);
+    add_timing(run, index);
     return true;
 }
 
@@ -440,17 +457,18 @@ static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end
             return false;
     device->vk.vkCmdEndRenderPass(commands);
     vkb_timer_stop(device, commands, &submission->timer);
+    add_timing(run, first);
     return true;
 }
 
 bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_error *error)
 {
     struct vkb_run *run = context;
-    const bool is_dispatch = run->graph->passes[first].geometry == VKB_GEOMETRY_DISPATCH;
 
-    if (is_dispatch ? !record_dispatch(run, first, error)
-                    : !record_render_pass(run, first, end, error))
-        return false;
-    add_timing(run, first);
+    if (run->graph->passes[first].geometry != VKB_GEOMETRY_DISPATCH)
+        return record_render_pass(run, first, end, error);
+    for (uint32_t i = first; i < end; ++i)
+        if (!record_dispatch(run, i, error))
+            return false;
     return true;
 }

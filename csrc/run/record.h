@@ -16,6 +16,7 @@ struct vkb_run {
     struct vkb_cached_image *inputs[VKB_INPUT_COUNT];   // by kind; NULL: none
     const struct vkb_upload *uploads[VKB_INPUT_COUNT];  // the sources of their pixels
     bool send_input[VKB_INPUT_COUNT];                   // the device does not have these pixels yet
+    struct vkb_cached_image *constant;  // to be filled by this submission; NULL: none
 };
 
 // The most descriptor sets that the graph's passes need, without those of surfaces.

@@ -27,15 +27,6 @@ vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lin
 // Levels of exactly half and exactly twice the size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 
-// A shader that is compiled once for each format that it loads.
-#define VKB_BY_FORMAT(shader) \
-    { \
-        [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
-        [VKB_FORMAT_RGBA16_FLOAT] = VKB_SHADER_##shader##_rgba16float, \
-        [VKB_FORMAT_RGBA32_FLOAT] = VKB_SHADER_##shader##_rgba32float, \
-        [VKB_FORMAT_RG11B10_UFLOAT] = VKB_SHADER_##shader##_rgba32float, \
-    }
-
 // The same for images as words.
 #define VKB_WORDS_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_words)
 

@@ -165,6 +165,34 @@ static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb
     return !*fits || vkb_add_fullscreen(choice, pass, error);
 }
 
+static const enum vkb_shader fft_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft);
+static const enum vkb_shader fft_stored_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft_stored);
+
+// A storage buffer must reach the complete target: an invocation stores to places far apart.
+static bool reaches(const struct vkb_device *device, const struct vkb_image_row *row)
+{
+    return (uint64_t)vkb_image_row_pitch(row->format, row->width) * row->height
+        <= device->limits.maxStorageBufferRange;
+}
+
+static bool add_transform(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                          bool *fits, struct vkb_error *error)
+{
+    const struct vkb_image_row *from = &choice->graph->images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
+    struct vkb_pass_row row;
+
+    *fits = pass->block == VKB_BLOCK_fft && vkb_fits_words(choice, pass)
+         && reaches(choice->device, target);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.reading = VKB_READING_WORDS;
+    row.shader = pass->constants.stage == STAGE_LAST ? fft_stored_shaders[target->format]
+                                                     : fft_shaders[from->format];
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 struct variant {
     enum vkb_variants variants;
     const char *name;
@@ -185,6 +213,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "halved", vkb_add_halved, 0},
     {VKB_VARIANTS_CPU, "doubled", vkb_add_doubled, 0},
     {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
+    {VKB_VARIANTS_CPU, "words", add_transform, 0},
     {VKB_VARIANTS_CPU, "pixels", add_pixels, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
     {VKB_VARIANTS_GPU, "from_lines", vkb_add_from_lines, 0},

@@ -63,6 +63,13 @@ static const struct access_info {
             .writes = VK_ACCESS_SHADER_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_GENERAL,
         },
+    [VKB_ACCESS_DISPATCH_CHANGED] =
+        {
+            .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+            .reads = VK_ACCESS_SHADER_READ_BIT,
+            .writes = VK_ACCESS_SHADER_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_GENERAL,
+        },
     [VKB_ACCESS_COPY_SOURCE] =
         {
             .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,

@@ -14,6 +14,7 @@ enum vkb_access {
     VKB_ACCESS_DISPATCH_SAMPLED,  // read by a compute shader, through a sampler
     VKB_ACCESS_DISPATCH_LOADED,   // read by a compute shader, as a storage image
     VKB_ACCESS_DISPATCH_STORED,   // written by a compute shader
+    VKB_ACCESS_DISPATCH_CHANGED,  // loaded and stored by one compute shader
     VKB_ACCESS_COPY_SOURCE,
     VKB_ACCESS_COPY_TARGET,
     VKB_ACCESS_ACQUIRED,   // of a swapchain's image, whose content is discarded

@@ -14,8 +14,17 @@ import vkbloom
 
 @pytest.fixture(scope="session")
 def bloom_renderer() -> Iterator[vkbloom.Renderer]:
-    """Run on the software driver, which gives the same golden frames on every machine."""
-    with vkbloom.Renderer("software") as renderer:
+    """Run on the software driver, which gives the same golden frames on every machine.
+
+    Wrong use of Vulkan fails a test, where the Khronos validation layer is installed.
+    """
+    try:
+        renderer = vkbloom.Renderer("software", validation=True)
+    except vkbloom.Error as error:
+        if isinstance(error, vkbloom.ValidationError) or "validation" not in str(error):
+            raise
+        renderer = vkbloom.Renderer("software")
+    with renderer:
         yield renderer
 
 

@@ -29,6 +29,7 @@ from vkbloom._core import (
     ValidationError,
 )
 from vkbloom.adapter import AdapterInfo, adapters
+from vkbloom.convolution import Convolution
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
@@ -43,6 +44,7 @@ from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from vkbloom import psf, reference
+    from vkbloom.fits import FitResult, fit
     from vkbloom.grid import reductions
     from vkbloom.grid.checking import GridReport, check_grid
     from vkbloom.grid.curves import response_curves
@@ -63,10 +65,12 @@ _LATE_MODULES = {
 }
 _LATE = {
     "Camera": "vkbloom.scene",
+    "FitResult": "vkbloom.fits",
     "GridReport": "vkbloom.grid.checking",
     "Scene": "vkbloom.scene",
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
+    "fit": "vkbloom.fits",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
     "read": "vkbloom.io.array_files",
     "response_curves": "vkbloom.grid.curves",
@@ -80,10 +84,12 @@ __all__ = [
     "BevyBloom",
     "BlenderGlare",
     "Camera",
+    "Convolution",
     "DeviceLostError",
     "DualKawase",
     "Error",
     "FilamentBloom",
+    "FitResult",
     "Frames",
     "GodotBloom",
     "GridReport",
@@ -108,6 +114,7 @@ __all__ = [
     "check_grid",
     "contact_sheet",
     "explore",
+    "fit",
     "gaussian_weights",
     "grid_to_zarr",
     "presets",

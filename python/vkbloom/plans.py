@@ -139,6 +139,10 @@ class Plan:
             Framebuffers are boxes with their size and dtype, other images have round corners, and
             passes are hexagons with their shader. GitHub, JupyterLab and many editors draw it.
 
+        See Also
+        --------
+        Renderer.plan : Returns a plan.
+
         Examples
         --------
         >>> import numpy as np

@@ -8,7 +8,12 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from vkbloom.convolution import Convolution
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
+from vkbloom.psf.aperture import aperture, iris
+from vkbloom.psf.eye import spencer
+from vkbloom.psf.lens import harvey_shack
+from vkbloom.psf.renderers import fog_glow, unreal
 from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.settings import DualKawase, Pyramid, Separable
 
@@ -62,6 +67,14 @@ class _Presets(dict[str, "Settings"]):
 #:   up to 4.5 and from 4.6 on.
 #: - ``"blender_bloom"``: the Glare node of Blender 4.5, type Bloom, quality High, its defaults.
 #: - ``"pygfx"``: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
+#: - ``"spencer_photopic"``: the glare of an eye at day, `vkbloom.psf.spencer`. It and the next
+#:   but one and the last describe all light of a point, so that their bloom replaces the picture.
+#: - ``"blender_fog_glow"``: the Glare node of Blender 4.3, type Fog Glow, `vkbloom.psf.fog_glow`.
+#: - ``"unreal_convolution"``: convolution bloom of Unreal Engine, with its prefilter and the
+#:   energy of its centre, `vkbloom.psf.unreal`; the kernel image is ``"iris_6"``'s.
+#: - ``"camera_lens"``: the scattered light of a lens of 14 surfaces, `vkbloom.psf.harvey_shack`,
+#:   which is 2.5 % of all.
+#: - ``"iris_6"``: diffraction at an iris of six blades at f/8, `vkbloom.psf.aperture`.
 presets: Mapping[str, Settings] = MappingProxyType(
     _Presets(
         {
@@ -92,6 +105,16 @@ presets: Mapping[str, Settings] = MappingProxyType(
             "godot_4_6": GodotBloom(),
             "blender_bloom": BlenderGlare(),
             "pygfx": PygfxBloom(),
+            "spencer_photopic": Convolution(spencer(), boundary="edge", composite="mix"),
+            "blender_fog_glow": Convolution(fog_glow(256), threshold=1.0),
+            # Not normalized: its sums are the kernel's tint.
+            "unreal_convolution": Convolution(
+                unreal(aperture(iris(blades=6))), normalize=False, composite="mix"
+            ),
+            "camera_lens": Convolution(
+                harvey_shack(), boundary="edge", composite="mix", intensity=0.025
+            ),
+            "iris_6": Convolution(aperture(iris(blades=6)), boundary="edge", composite="mix"),
         }
     )
 )

@@ -213,6 +213,17 @@ class Renderer:
         ------
         ValidationError
             With validation: an object was not destroyed.
+
+        See Also
+        --------
+        closed : Whether it was called.
+
+        Examples
+        --------
+        >>> renderer = vkbloom.Renderer("software")
+        >>> renderer.close()
+        >>> renderer.closed
+        True
         """
         self._core.close()
 
@@ -302,10 +313,25 @@ class Renderer:
         OutOfMemoryError, DeviceLostError, ValidationError, Error
             The device failed. After any but a lost device the renderer can be used again.
 
+        See Also
+        --------
+        render_many : Many settings.
+        apply : The same for an image.
+        plan : The framebuffers of a call.
+
         Notes
         -----
         A pass runs only if its inputs, its settings or its size have changed since it ran last. The
         ``timings`` of the result name the passes that ran.
+
+        Examples
+        --------
+        >>> settings = vkbloom.Separable(bloom_size=(32, 32))
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     scene = vkbloom.Scene.ufo()
+        ...     frames = renderer.render(scene, settings, (64, 48), attachments="final")
+        >>> frames["final"].shape
+        (48, 64, 4)
         """
         settings = check_settings(settings)
         source = scene_source(scene, size, shading, time)
@@ -364,6 +390,12 @@ class Renderer:
         OutOfMemoryError, DeviceLostError, ValidationError, Error
             The device failed. After any but a lost device the renderer can be used again.
 
+        See Also
+        --------
+        apply_many, apply_each : Many settings, or many images.
+        upload : Keeps an image on the device.
+        render : The same for a scene.
+
         Notes
         -----
         An image with the same bytes as before is not uploaded again. Passes run only if their
@@ -412,11 +444,24 @@ class Renderer:
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
 
+        See Also
+        --------
+        apply_each : Many images.
+        grid : All combinations of settings.
+
         Notes
         -----
         The device works on the next settings while the caller uses a frame. So after the first
         frame, settings are taken from the iterable before earlier frames are yielded. An error in
         one of them is raised after the frames before it.
+
+        Examples
+        --------
+        >>> image = np.full((16, 16, 3), 0.5, np.float32)
+        >>> settings = [vkbloom.Pyramid(levels=2, intensity=intensity) for intensity in (0.0, 1.0)]
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     [frames["final"].max().item() for frames in renderer.apply_many(image, settings)]
+        [0.5, 1.0]
         """
         names = check_attachments(attachments)
         return self._run_many(image_source(image), settings_seq, names)
@@ -577,9 +622,24 @@ class Renderer:
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
 
+        See Also
+        --------
+        render : One Settings.
+        grid : All combinations of settings.
+
         Notes
         -----
         As of `apply_many`.
+
+        Examples
+        --------
+        >>> first = vkbloom.Separable(bloom_size=(32, 32))
+        >>> sequence = [first, first.replace(exposure=1.0)]
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     for frames in renderer.render_many(vkbloom.Scene.ufo(), sequence, size=(64, 48)):
+        ...         passes = list(frames.timings)
+        >>> passes  # of the second: only the exposure has changed
+        ['final']
         """
         names = check_attachments(attachments)
         return self._run_many(scene_source(scene, size, shading, time), settings_seq, names)
@@ -681,6 +741,8 @@ class Renderer:
         settings: Settings | None = None,
         axes: Mapping[str, Iterable[Any]] | None = None,
         *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
         size: tuple[int, int] | None = None,
         shading: Shading = "forward",
         time: float = 0.0,
@@ -702,6 +764,8 @@ class Renderer:
             `vkbloom.presets`, the axis "settings" a list of Settings of any methods. These two axes
             exclude each other and the argument `settings`. Other axes change each of their
             settings.
+        mask, emission : ndarray, optional
+            Of all images, as for `apply`.
         size : (int, int), optional
             Width and height of a scene's frames. Default: (1280, 720).
         shading, time
@@ -741,6 +805,11 @@ class Renderer:
         OutOfMemoryError, DeviceLostError, ValidationError, Error
             The device failed.
 
+        See Also
+        --------
+        grid_to_zarr : The same in a store on disk.
+        contact_sheet, response_curves : Pictures and plots of the result.
+
         Notes
         -----
         Points are rendered in the order that runs the fewest passes, whatever the order of the
@@ -766,6 +835,8 @@ class Renderer:
             source,
             settings,
             axes,
+            mask=mask,
+            emission=emission,
             size=size,
             shading=shading,
             time=time,

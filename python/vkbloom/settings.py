@@ -225,6 +225,10 @@ class Settings:
         TypeError
             The method has no such field, or a value has the wrong type.
 
+        See Also
+        --------
+        to_dict : The fields by name.
+
         Examples
         --------
         >>> vkbloom.Separable(loops=2).replace(blur_scale=4).blur_scale
@@ -243,6 +247,11 @@ class Settings:
         See Also
         --------
         from_dict : Makes settings from the result.
+
+        Examples
+        --------
+        >>> vkbloom.Pyramid(levels=3).to_dict()["levels"]
+        3
         """
         return {"method": self.method, **dataclasses.asdict(self)}
 
@@ -268,6 +277,10 @@ class Settings:
             of range.
         TypeError
             `fields` is not a mapping, or a value has the wrong type.
+
+        See Also
+        --------
+        to_dict : The fields by name.
 
         Examples
         --------
@@ -295,7 +308,18 @@ class Settings:
         return cast("Self", made)
 
     def to_json(self) -> str:
-        """Return `to_dict` as JSON text."""
+        """Return `to_dict` as JSON text.
+
+        See Also
+        --------
+        from_json : Makes settings from the result.
+
+        Examples
+        --------
+        >>> text = vkbloom.Pyramid(levels=3).to_json()
+        >>> vkbloom.Pyramid.from_json(text).levels
+        3
+        """
         import json  # noqa: PLC0415  costs start-up time
 
         return json.dumps(self.to_dict())
@@ -317,6 +341,16 @@ class Settings:
         ------
         ValueError, TypeError
             The text is not a JSON object, or as for `from_dict`.
+
+        See Also
+        --------
+        to_json : Returns the text.
+
+        Examples
+        --------
+        >>> from vkbloom import Settings
+        >>> Settings.from_json('{"method": "pyramid", "levels": 3}').levels
+        3
         """
         import json  # noqa: PLC0415  costs start-up time
 

@@ -197,6 +197,10 @@ class Surface:
         OutOfMemoryError, DeviceLostError, ValidationError, Error
             The device failed, or the window is gone.
 
+        See Also
+        --------
+        Renderer.render, Renderer.apply : Return the framebuffers as arrays.
+
         Notes
         -----
         Levels of uint8 are shown as they are. Floats are light: they are cut off at 0 and 1 and
@@ -238,6 +242,16 @@ class Surface:
         ------
         ValidationError
             With validation on: something was left behind.
+
+        See Also
+        --------
+        Renderer.close : Closes the renderer.
+
+        Examples
+        --------
+        >>> def show(surface, scene, settings):
+        ...     surface.present(scene, settings)
+        ...     surface.close()
         """
         self._pending.clear()
         self._core.close()

@@ -33,7 +33,6 @@ WRITE_IMAGE(3);
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS
-#define STORE_CHANNELS 4
 #include "variants/store.glsl"
 
 void main()

@@ -14,7 +14,6 @@ READ_IMAGE(2, own);
 WRITE_IMAGE(3);
 
 #define HAS_OWN (ADD_OWN != 0)
-#define OWN_CHANNELS 4
 
 uvec4 shade(uvec4 level, vec4 sum, ivec2 pixel)
 {

@@ -1,7 +1,7 @@
 // Upsampling to exactly twice the size. An invocation writes a strip from top to bottom and loads
 // each texel once. The including shader includes pixels.glsl and defines: `smaller`; `own`, an
-// image of the target's size (HAS_OWN: whether it is read; OWN_CHANNELS: its channels and the
-// target's); and shade(), which computes a pixel from the pixel of `own` and the upsampled sum.
+// image of the target's size (HAS_OWN: whether it is read); and shade(), which computes a pixel
+// from the pixel of `own` and the upsampled sum.
 #include "lib/doubling.glsl"
 
 #ifdef WORDS
@@ -25,13 +25,12 @@ const int KEPT = 5;
 #define LOAD load_own
 #define LOAD_IMAGE own
 #define LOAD_NUMBER 2
-#define LOAD_CHANNELS OWN_CHANNELS
+#define LOAD_CHANNELS 4
 #define LOAD_FROM 0
 #define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS
-#define STORE_CHANNELS OWN_CHANNELS
 #include "variants/store.glsl"
 
 void main()

@@ -15,7 +15,6 @@ READ_IMAGE(2, own);
 WRITE_IMAGE(3);
 
 #define HAS_OWN true
-#define OWN_CHANNELS 4
 
 uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
 {

@@ -32,7 +32,6 @@ WRITE_IMAGE(2);
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS
-#define STORE_CHANNELS 4
 #include "variants/store.glsl"
 
 vec4 thresholded(vec4 value)

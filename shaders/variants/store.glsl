@@ -1,10 +1,10 @@
 // Defines the function that stores a run of STORE_COUNT pixels to a row of the target. The run is a
-// multiple of 16 bytes. Pixels have STORE_CHANNELS channels (4 in a storage image).
+// multiple of 16 bytes. Pixels have TARGET_CHANNELS channels (4 in a storage image).
 
 void store(int first, int row, uvec4 raw[STORE_COUNT])
 {
 #ifdef WORDS
-    const int BYTES = STORE_CHANNELS * CHANNEL_BYTES;
+    const int BYTES = TARGET_CHANNELS * CHANNEL_BYTES;
     const int COUNT = STORE_COUNT * BYTES / 16;
     int start = first * BYTES / 16;
     int last = (target_shape.x * BYTES - 1) / 16;
@@ -15,10 +15,10 @@ void store(int first, int row, uvec4 raw[STORE_COUNT])
             // The pixel at which this quarter of a word begins, and the number of its bytes that
             // the previous quarter has.
             int byte = 16 * i + 4 * j, pixel = byte / BYTES, skipped = byte % BYTES;
-#if STORE_CHANNELS * CHANNEL_BYTES == 3
+#if TARGET_CHANNELS * CHANNEL_BYTES == 3
             word[j] = (raw[pixel].x & 0xffffffu) >> 8 * skipped;
             word[j] |= raw[min(pixel + 1, STORE_COUNT - 1)].x << (24 - 8 * skipped);
-#elif STORE_CHANNELS * CHANNEL_BYTES == 6
+#elif TARGET_CHANNELS * CHANNEL_BYTES == 6
             word[j] = skipped == 0   ? raw[pixel].x
                     : skipped == 2 ? raw[pixel].x >> 16 | raw[pixel].y << 16
                                    : (raw[pixel].y & 0xffffu)

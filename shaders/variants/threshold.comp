@@ -25,7 +25,6 @@ WRITE_IMAGE(2);
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS
-#define STORE_CHANNELS 4
 #include "variants/store.glsl"
 
 void main()

@@ -208,8 +208,12 @@ def test_layers_and_parts(
 @pytest.mark.parametrize(
     ("kind", "pixels", "reason"),
     [
-        ("mask", light(50, 40, 1, "uint8"), "40 x 50 pixels are not the image's 41 x 50"),
-        ("emission", light(49, 41, 3, "uint8"), "41 x 49 pixels are not the image's 41 x 50"),
+        ("mask", light(50, 40, 1, "uint8"), "mask: shape (50, 40) is not the image's, (50, 41)"),
+        (
+            "emission",
+            light(49, 41, 3, "uint8"),
+            "emission: shape (49, 41) is not the image's, (50, 41)",
+        ),
         ("mask", light(50, 41, 3, "uint8"), "a mask is grey"),
     ],
 )
@@ -219,8 +223,7 @@ def test_what_does_not_go_with_it(
     path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
     other = stored(tmp_path / "other.png", pixels)
     result = run(path, tmp_path / "b.png", f"--{kind}", other)
-    assert result.exit_code == 1
-    assert result.stderr.count("\n") == 1
+    assert result.exit_code == (2 if "shape" in reason else 1)
     assert reason in result.stderr
     assert not (tmp_path / "b.png").exists()
     assert not by_rows

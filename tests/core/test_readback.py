@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.images import picture
-from vkbloom import Renderer, Scene, Separable, _core
+from vkbloom import Pyramid, Renderer, Scene, Separable, Settings, _core
 
 OFF = Separable(bloom=False)
 DTYPES = ["uint8", "float16", "float32"]
@@ -94,6 +94,35 @@ def test_a_final_that_comes_again_is_kept(
         np.testing.assert_array_equal(final, finals[0])
     assert runs[0] == ["final"]
     assert runs[2:] == [[], []]
+
+
+# A fused pass, an upsampling and a composite store the picture without its alpha. In the second
+# size the rows are complete words but no complete blocks; in the third they are no complete words.
+@pytest.mark.parametrize("size", [(960, 600), (944, 403), (701, 603)], ids=str)
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize(
+    "settings",
+    [Separable(threshold=0.4), Pyramid(levels=3), Separable(threshold=0.4, blur_scale=2.0)],
+    ids=["separable", "pyramid", "long"],
+)
+def test_three_channels_are_stored_without_alpha(
+    renderer: Renderer, settings: Settings, dtype: str, size: tuple[int, int]
+) -> None:
+    image = picture(*size, 4, dtype, 4)
+    if dtype != "uint8":
+        image[5, 7, 1], image[402, 700, 2] = np.nan, np.inf
+    expected = renderer.apply(image, settings, attachments=("final",))["final"][..., :3]
+    image = np.ascontiguousarray(image[..., :3])
+    # New memory, memory around it that must stay, and memory to which a pass cannot store.
+    new = renderer.apply(image, settings, attachments=("final",))["final"]
+    np.testing.assert_array_equal(new, expected)
+    for start in (16, 4):
+        renderer.apply(image[::-1], settings, attachments=("final",))
+        out, around = placed(image.shape, dtype, start)
+        renderer.apply(image, settings, attachments=("final",), out={"final": out})
+        np.testing.assert_array_equal(out, expected)
+        out.view(np.uint8)[:] = 0xA5
+        assert (around == 0xA5).all()
 
 
 def test_large_frames_in_the_air(new_renderer: Callable[[], Renderer]) -> None:

@@ -28,7 +28,7 @@ PAGES = [
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 # Commands of `sh` blocks that do not end, take long, or need a cluster: only their arguments are
 # parsed.
-ENDLESS = ("explore",)
+ENDLESS = ("explore", "view")
 
 
 def blocks(page: Path, language: str) -> list[str]:

@@ -26,6 +26,19 @@ WITHOUT_EXAMPLE = {
     "ShaderError",
     "ValidationError",
 }
+# Classes whose methods have examples, too.
+METHODS_OF = (
+    vkbloom.Frames,
+    vkbloom.Plan,
+    vkbloom.Renderer,
+    vkbloom.Scene,
+    vkbloom.Settings,
+    vkbloom.Surface,
+    psf.PSF,
+    testing.FrameRegression,
+    testing.Probe,
+    testing.Tolerances,
+)
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
@@ -68,9 +81,22 @@ def public() -> Iterator[Any]:
     yield pytest.param(pytest_vkbloom.frame_regression, id="frame_regression")
 
 
-@pytest.mark.parametrize("member", list(public()))
+def with_methods() -> Iterator[Any]:
+    """The public objects, and the public methods of some classes."""
+    for parameters in public():
+        yield parameters
+        member = parameters.values[0]
+        for name in vars(member) if member in METHODS_OF else ():
+            method = getattr(member, name)
+            if not name.startswith("_") and (
+                inspect.isfunction(method) or inspect.ismethod(method)
+            ):
+                yield pytest.param(method, id=f"{parameters.id}.{name}")
+
+
+@pytest.mark.parametrize("member", list(with_methods()))
 def test_public_objects_have_an_example(member: Any) -> None:
-    """And name what else to look at."""
+    """They also name related objects."""
     text = inspect.getdoc(member) or ""
     for section in ("Examples", "See Also"):
         assert f"{section}\n{'-' * len(section)}" in text, section

@@ -426,6 +426,13 @@ def test_files(page: Page, tmp_path: Path) -> None:
     page.locator(".vkb-status", has_text="50 × 30 float32").wait_for()
     wait_for_code(page, "vkbloom.BevyBloom()")
     assert page.get_by_label("shading").count() == 0
+    black = vkbloom.write(tmp_path / "mask.png", np.zeros((30, 50, 3), np.uint8))
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Open mask").click()
+    chooser.value.set_files(black)
+    page.get_by_role("button", name="Remove mask").click()
+    page.get_by_role("button", name="Open mask").wait_for()
+    page.get_by_role("button", name="Open emission").wait_for()
     field(page, "bloom").uncheck()
     wait_for_code(page, "vkbloom.BevyBloom(bloom=False)")
     with page.expect_download() as download:

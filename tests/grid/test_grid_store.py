@@ -136,6 +136,33 @@ class TestWhole:
         assert list(listed["image"].values) == ["x", "y"]
         assert check_grid(tmp_path / "c.zarr").complete
 
+    def test_masks_and_emissions_belong_to_the_source(
+        self, tmp_path: Path, renderer: Renderer
+    ) -> None:
+        levels = np.arange(16 * 21, dtype=np.uint16).reshape(16, 21).astype(np.uint8)
+        given: dict[str, Any] = {
+            "mask": levels,
+            "emission": noise(16, 21, 3, dtype="float32", seed=5),
+        }
+        axes = {"exposure": [0.0, 1.0]}
+        store = tmp_path / "glow.zarr"
+        both = [source(), noise(16, 21, 3, dtype="float32", seed=6)]
+        grid = grid_to_zarr(both, Pyramid(), axes, store, **given)
+        for number, image in enumerate(both):
+            expected = renderer.apply(image, Pyramid(exposure=1.0), **given)["final"]
+            assert np.array_equal(grid["final"].isel(image=number, exposure=1), expected)
+        in_memory = renderer.grid(both, Pyramid(), axes, **given, progress=False)
+        assert np.array_equal(in_memory["final"], grid["final"])
+        assert grid_to_zarr(both, Pyramid(), axes, store, **given).attrs["passes_run"] == 0
+        with pytest.raises(ValueError, match=r"source\.mask\.sha256"):
+            grid_to_zarr(both, Pyramid(), axes, store, **{**given, "mask": 255 - levels})
+        with pytest.raises(ValueError, match=r"mask: shape \(2, 2\) is not the image's"):
+            renderer.grid(both, Pyramid(), axes, mask=np.ones((2, 2), np.uint8))
+        with pytest.raises(ValueError, match="mask: the source is a scene"):
+            renderer.grid(vkbloom.Scene.ufo(), axes=axes, mask=levels)
+        with pytest.raises(ValueError, match="uploaded already"):
+            renderer.grid(renderer.upload(source()), axes=axes, mask=levels)
+
     def test_default_chunks_hold_about_a_megabyte(self, tmp_path: Path) -> None:
         axes = {"intensity": np.linspace(0, 1, 40), "blur_scale": np.linspace(1, 2, 3)}
         picture = noise(128, 96, 3, dtype="uint8")
@@ -284,6 +311,8 @@ class TestRefused:
             ({"axes": dict(reversed(AXES.items()))}, "order of axes"),
             ({"axes": {**AXES, "knee": [0.0]}}, "axes.knee: not in the store"),
             ({"source": noise(16, 21, 3, dtype="float32", seed=9)}, "source.images"),
+            ({"mask": np.ones((16, 21), np.uint8)}, "source.mask: not in the store"),
+            ({"emission": source()}, "source.emission: not in the store"),
             ({"attachments": "final"}, "variables.bloom: .* not requested"),
             ({"reduce": {**REDUCE, "mean": reductions.Mean(attachment="glow")}}, "reduce.mean"),
             ({"chunks": {}}, r"chunk: \[3, 1, 2\] in the store, \[1, 1, 1\] requested"),

@@ -9,7 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.images import hdr_picture
 from tests.methods.cases import DTYPES, by_turns
+from tests.tolerance import assert_matches_reference
 from vkbloom import (
     BlenderGlare,
     GodotBloom,
@@ -88,6 +90,16 @@ def test_screen_lets_the_scene_be_bright(renderer: Renderer) -> None:
     frames = renderer.apply(image, settings)
     assert frames["bloom"][..., :3].min() > 1
     assert_allclose(frames["final"], 3.0 + 1.0 - 3.0, rtol=1e-5)
+
+
+@pytest.mark.parametrize("changes", [{"threshold": None}, {"white": 8.0, "intensity": 1.0}])
+def test_screen_multiplies_the_rounding_of_the_bloom(
+    renderer: Renderer, changes: dict[str, Any]
+) -> None:
+    """By 1 - s / white, for a scene s that reaches 30."""
+    settings = presets["godot_4_6"].replace(format="rgba8unorm", glow_bloom=1.0, **changes)
+    image = 4 * hdr_picture(136, 144, 4, "float32", 1)
+    assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
 def test_soft_light_comes_after_the_curve() -> None:

@@ -13,6 +13,7 @@ from tests.methods.cases import by_turns
 from tests.tolerance import real
 from vkbloom import (
     BevyBloom,
+    Convolution,
     DualKawase,
     FilamentBloom,
     HdrpBloom,
@@ -25,6 +26,7 @@ from vkbloom import (
     UnrealBloom,
     UrpBloom,
     presets,
+    psf,
     reference,
 )
 
@@ -33,7 +35,8 @@ Array = NDArray[Any]
 # (width, height): odd, even, tall, wide, smaller than the chains are long.
 SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (211, 157)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
-PUBLISHED = sorted(set(presets) - {"tutorial", "outline", "deferred"})
+CONVOLUTIONS = [name for name in presets if isinstance(presets[name], Convolution)]
+PUBLISHED = sorted(set(presets) - {"tutorial", "outline", "deferred", *CONVOLUTIONS})
 
 
 def lights(size: tuple[int, int], dtype: str, seed: int = 3) -> Array:
@@ -92,6 +95,24 @@ def test_a_preset_is_its_reference(
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_a_preset_as_it_is(renderer: Renderer, name: str, dtype: str) -> None:
     check(renderer, lights((97, 45), dtype), presets[name])
+
+
+@pytest.mark.parametrize("name", CONVOLUTIONS)
+def test_a_convolution_is_its_reference(renderer: Renderer, name: str) -> None:
+    """Sizes and formats of convolutions have tests of their own, test_convolution.py."""
+    image = lights((48, 29), "float32")
+    check(renderer, image, presets[name])
+    image[4, 5, 0], image[10, 20, 1] = np.nan, np.inf
+    bloom = renderer.apply(image, presets[name])["bloom"]
+    expected = reference.apply(image, presets[name])["bloom"]
+    assert_allclose(bloom, expected, rtol=0, atol=1e-5 * expected.max())
+    if presets[name].to_dict()["boundary"] == "edge":
+        flat = renderer.apply(np.ones((29, 48, 3), np.float32), presets[name])
+        assert_allclose(flat["bloom"][..., :3], 1, rtol=1e-5)
+
+
+def test_the_share_of_a_lens() -> None:
+    assert_allclose(psf.harvey_shack().energy(), presets["camera_lens"].intensity, rtol=0.01)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)

@@ -1,24 +1,17 @@
-"""Comparisons of images, in Python and on the command line."""
+"""Comparisons of images in Python."""
 
 from __future__ import annotations
 
-import json
 import math
-import re
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
-from vkbloom import Frames, Separable
+from tests.images import changed, noise_image
 from vkbloom.cli.compare import tolerances_of
-from vkbloom.cli.program import program
-from vkbloom.io.image_writing import save
-from vkbloom.io.images import Picture
 from vkbloom.io.srgb import decode_srgb
 from vkbloom.views.comparison import Comparison, compare, difference, flip_map
 from vkbloom.views.tolerances import Tolerances, failures
@@ -35,25 +28,11 @@ def reasons(found: Comparison, tolerances: Tolerances | None = None) -> tuple[st
 FIGURES = ("max_error", "mean_error", "percent_over", "ssim", "psnr", "flip")
 
 
-def image(*shape: int, dtype: str = "float32", seed: int = 5) -> NDArray[Any]:
-    """Return noise in 0..1."""
-    values = np.random.default_rng(seed).random(shape)
-    if np.dtype(dtype).kind == "u":
-        return np.rint(values * np.iinfo(dtype).max).astype(dtype)
-    return values.astype(dtype)
-
-
-def changed(a: NDArray[Any], place: tuple[int, int, int], value: float) -> NDArray[Any]:
-    b = a.copy()
-    b[place] = value
-    return b
-
-
 class TestFigures:
     @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32", "float64"])
     @pytest.mark.parametrize("shape", [(16, 16), (16, 16, 1), (16, 16, 2), (16, 16, 3), (9, 8, 5)])
     def test_identical(self, dtype: str, shape: tuple[int, ...]) -> None:
-        a = image(*shape, dtype=dtype)
+        a = noise_image(*shape, dtype=dtype)
         found = compare(a, a.copy())
         assert found.identical
         assert reasons(found) == ()
@@ -93,18 +72,18 @@ class TestFigures:
         assert reasons(found, tolerances_of(max_error=1 / largest)) == ()
 
     def test_8_bits_against_16(self) -> None:
-        a = image(16, 16, 3, dtype="uint8")
+        a = noise_image(16, 16, 3, dtype="uint8")
         b = a.astype(np.uint16) * np.uint16(257)
         assert compare(a, b).identical
         assert compare(a, changed(b, (0, 0, 0), b[0, 0, 0] ^ 1)).max_error == 1 / 65535
 
     def test_half_against_float(self) -> None:
-        a = image(16, 16, 3, dtype="float16")
+        a = noise_image(16, 16, 3, dtype="float16")
         assert compare(a, a.astype(np.float32)).identical
 
     @pytest.mark.parametrize("dtype", ["uint8", "float32"])
     def test_ssim_and_psnr_are_those_of_scikit_image(self, dtype: str) -> None:
-        a = image(40, 50, 4, dtype=dtype)
+        a = noise_image(40, 50, 4, dtype=dtype)
         b = np.roll(a, 1, axis=1)
         scale = 255 if dtype == "uint8" else 1
         found = compare(a, b)
@@ -116,7 +95,7 @@ class TestFigures:
         assert found.data_range == 1
 
     def test_the_range_of_floats_covers_them(self) -> None:
-        a = image(16, 16, 3) * np.float32(4) - np.float32(2)
+        a = noise_image(16, 16, 3) * np.float32(4) - np.float32(2)
         a[0, 0, 0], a[0, 0, 1] = 6, -3
         b = a + np.float32(0.5)
         found = compare(a, b)
@@ -131,7 +110,7 @@ class TestFigures:
     @pytest.mark.parametrize("channels", [1, 2, 3, 4])
     @pytest.mark.parametrize("dtype", ["uint8", "float32"])
     def test_flip_is_that_of_openimageio(self, dtype: str, channels: int) -> None:
-        a, b = (image(20, 24, channels, dtype=dtype, seed=seed) for seed in (1, 2))
+        a, b = (noise_image(20, 24, channels, dtype=dtype, seed=seed) for seed in (1, 2))
         buffers = []
         for values in (a, b):
             linear = decode_srgb(values / 255) if dtype == "uint8" else values
@@ -151,7 +130,7 @@ class TestFigures:
         assert compare(black, np.full_like(black, 1)).flip < 0.1  # type: ignore[operator]
 
     def test_alpha_counts_but_for_flip(self) -> None:
-        a = image(16, 16, 4)
+        a = noise_image(16, 16, 4)
         found = compare(a, changed(a, (3, 4, 3), a[3, 4, 3] + 1))
         assert found.max_error_at == (4, 3, 3)
         assert found.flip == 0
@@ -160,7 +139,7 @@ class TestFigures:
 
     @pytest.mark.parametrize("shape", [(1, 1, 3), (6, 100, 3), (100, 6, 1)])
     def test_ssim_needs_7_pixels(self, shape: tuple[int, ...]) -> None:
-        a, b = image(*shape), image(*shape, seed=6)
+        a, b = noise_image(*shape), noise_image(*shape, seed=6)
         found = compare(a, b)
         assert found.ssim is None
         assert found.not_computed == {"ssim": "a side is under the window's 7 pixels"}
@@ -172,7 +151,7 @@ class TestFigures:
 
     def test_an_openimageio_without_flip(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delattr(oiio.ImageBufAlgo, "FLIP_diff")
-        a = image(8, 8, 3)
+        a = noise_image(8, 8, 3)
         found = compare(a, a)
         assert (found.flip, found.identical) == (None, True)
         assert found.not_computed == {"flip": "OpenImageIO 3.2 is needed"}
@@ -206,7 +185,7 @@ class TestFigures:
 
     @pytest.mark.parametrize("wanted", [(), ("ssim",), ("psnr",), ("flip",), ("ssim", "flip")])
     def test_metrics_that_are_asked_for(self, wanted: tuple[Any, ...]) -> None:
-        a, b = image(16, 16, 3), image(16, 16, 3, seed=6)
+        a, b = noise_image(16, 16, 3), noise_image(16, 16, 3, seed=6)
         whole, found = compare(a, b), compare(a, b, metrics=wanted)
         for name in ("ssim", "psnr", "flip"):
             asked = name in wanted
@@ -218,7 +197,7 @@ class TestFigures:
     ) -> None:
         for package in ("skimage.metrics", "OpenImageIO"):
             monkeypatch.setitem(sys.modules, package, None)
-        a = image(8, 8, 3)
+        a = noise_image(8, 8, 3)
         assert compare(a, a, metrics=()).identical
         for name in ("ssim", "psnr", "flip"):
             with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\["):
@@ -226,7 +205,7 @@ class TestFigures:
 
     @pytest.mark.parametrize("dtype", ["uint8", "float32"])
     def test_flip_map(self, dtype: str) -> None:
-        a = image(24, 32, 3, dtype=dtype)
+        a = noise_image(24, 32, 3, dtype=dtype)
         b = a.copy()
         b[:, 16:] = b[::-1, 16:]
         found = flip_map(a, b)
@@ -242,9 +221,17 @@ class TestMismatches:
     @pytest.mark.parametrize(
         ("a", "b", "reason"),
         [
-            (image(9, 8, 3), image(8, 9, 3), "the sizes differ, 8 x 9 against 9 x 8"),
-            (image(9, 8, 3), image(9, 8, 4), "the numbers of channels differ, 3 against 4"),
-            (image(9, 8), image(9, 8, 3), "the numbers of channels differ, 1 against 3"),
+            (noise_image(9, 8, 3), noise_image(8, 9, 3), "the sizes differ, 8 x 9 against 9 x 8"),
+            (
+                noise_image(9, 8, 3),
+                noise_image(9, 8, 4),
+                "the numbers of channels differ, 3 against 4",
+            ),
+            (
+                noise_image(9, 8),
+                noise_image(9, 8, 3),
+                "the numbers of channels differ, 1 against 3",
+            ),
             (
                 np.zeros((9, 8, 3), np.uint8),
                 np.zeros((9, 8, 3), np.float32),
@@ -271,7 +258,7 @@ class TestMismatches:
     @pytest.mark.parametrize("swapped", [False, True])
     @pytest.mark.parametrize("allow_nan", [False, True])
     def test_in_one_image_only(self, one: float, swapped: bool, allow_nan: bool) -> None:
-        a = image(10, 12, 3)
+        a = noise_image(10, 12, 3)
         pair = (a, changed(a, (4, 5, 1), one))
         found = compare(*(pair[::-1] if swapped else pair), allow_nan=allow_nan)
         reason = "NaN or infinity in one image only, 1 values, the first at x 5, y 4, channel 1"
@@ -283,7 +270,7 @@ class TestMismatches:
         assert (found.max_error, found.mean_error) == (0, 0)
 
     def test_other_kinds_of_not_finite(self) -> None:
-        a = image(10, 12, 3)
+        a = noise_image(10, 12, 3)
         for one, other in ((math.inf, -math.inf), (math.nan, math.inf)):
             found = compare(
                 changed(a, (0, 0, 0), one), changed(a, (0, 0, 0), other), allow_nan=True
@@ -292,7 +279,7 @@ class TestMismatches:
 
     @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
     def test_in_both_images(self, value: float) -> None:
-        a = changed(image(10, 12, 3), (4, 5, 1), value)
+        a = changed(noise_image(10, 12, 3), (4, 5, 1), value)
         b = changed(a, (0, 0, 0), a[0, 0, 0] + 0.5)
         reason = "NaN or infinity in both images, 1 values, the first at x 5, y 4, channel 1"
         assert reasons(compare(a, a), tolerances_of(max_error=1)) == (reason,)
@@ -329,7 +316,7 @@ class TestTolerances:
         ],
     )
     def test_each_to_both_sides(self, figure: str, limit: str, towards: int) -> None:
-        a, b = image(20, 20, 3), np.clip(image(20, 20, 3) * np.float32(0.9), 0, 1)
+        a, b = noise_image(20, 20, 3), np.clip(noise_image(20, 20, 3) * np.float32(0.9), 0, 1)
         found = compare(a, b)
         value = getattr(found, figure)
         assert reasons(found, tolerances_of(**{limit: value})) == ()
@@ -354,7 +341,7 @@ class TestTolerances:
         assert len(reasons(some, tolerances_of(max_error=0.25, fail_percent=4))) == 1
 
     def test_all_that_fail_are_told(self) -> None:
-        found = compare(self.A, image(20, 20, 3))
+        found = compare(self.A, noise_image(20, 20, 3))
         limits = tolerances_of(max_error=0, min_ssim=1, min_psnr=99, max_flip=0)
         assert len(reasons(found, limits)) == 4
 
@@ -401,10 +388,10 @@ class TestArguments:
     def test_what_is_no_image(self, a: Any, error: type[Exception], message: str) -> None:
         for function in (compare, difference):
             with pytest.raises(error, match=message):
-                function(a, image(8, 8, 3))
+                function(a, noise_image(8, 8, 3))
 
     def test_numbers(self) -> None:
-        a = image(8, 8, 3)
+        a = noise_image(8, 8, 3)
         for value in (0, -1, math.nan, math.inf):
             with pytest.raises(ValueError, match="data_range"):
                 compare(a, a, data_range=value)
@@ -421,16 +408,16 @@ class TestArguments:
     ) -> None:
         monkeypatch.setitem(sys.modules, package, None)
         with pytest.raises(ModuleNotFoundError, match=rf"pip install vkbloom\[{extra}\]"):
-            compare(image(8, 8, 3), image(8, 8, 3))
+            compare(noise_image(8, 8, 3), noise_image(8, 8, 3))
 
     @pytest.mark.parametrize("relative", [-0.1, math.nan, math.inf])
     def test_relative_out_of_range(self, relative: float) -> None:
         with pytest.raises(ValueError, match=r"relative: .* is out of range"):
-            compare(image(8, 8), image(8, 8), relative=relative)
+            compare(noise_image(8, 8), noise_image(8, 8), relative=relative)
 
     def test_unknown_metric(self) -> None:
         with pytest.raises(ValueError, match="metrics: 'mse' is not one of ssim, psnr, flip"):
-            compare(image(8, 8), image(8, 8), metrics=("mse",))  # type: ignore[arg-type]
+            compare(noise_image(8, 8), noise_image(8, 8), metrics=("mse",))  # type: ignore[arg-type]
 
 
 class TestDifference:
@@ -465,225 +452,10 @@ class TestDifference:
         assert picture.tolist() == [[[0, 0, 0], [1, 0, 1]]]
 
     def test_nothing_is_black(self) -> None:
-        a = changed(image(4, 4, 3), (0, 0, 0), math.nan)
+        a = changed(noise_image(4, 4, 3), (0, 0, 0), math.nan)
         picture, scale = difference(a, a)
         assert scale == 1
         assert not picture.any()
 
 
 # The command
-
-
-@pytest.fixture
-def files(tmp_path: Path) -> dict[str, Path]:
-    """Return files by name: two that differ by one level, and some that are no match."""
-    a = image(16, 24, 3, dtype="uint8")
-    b = changed(a, (3, 7, 2), int(a[3, 7, 2]) ^ 1)
-    arrays: dict[str, NDArray[Any]] = {
-        "a.png": a,
-        "b.png": b,
-        "small.png": a[:6],
-        "alpha.png": np.dstack([a, np.full((16, 24, 1), 255, np.uint8)]),
-        "float.exr": image(16, 24, 3),
-        "nan.exr": changed(image(16, 24, 3), (1, 2, 0), math.nan),
-    }
-    for name, array in arrays.items():
-        numbers = "uint8" if array.dtype == np.uint8 else "float"
-        save(Picture.of_values(array, numbers), tmp_path / name)
-    return {name: tmp_path / name for name in arrays}
-
-
-def run(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(program, ["compare", *(str(argument) for argument in arguments)])
-
-
-class TestCommand:
-    def test_identical_files(self, files: dict[str, Path]) -> None:
-        result = run(files["a.png"], files["a.png"])
-        assert (result.exit_code, result.stderr) == (0, "")
-        assert result.stdout.endswith("\nidentical\n")
-        assert "PSNR       inf dB\n" in result.stdout
-
-    def test_any_difference_fails_without_limits(self, files: dict[str, Path]) -> None:
-        result = run(files["a.png"], files["b.png"])
-        assert (result.exit_code, result.stderr) == (1, "")
-        assert "\nFAILED: 0.2604 % of the pixels differ; largest difference 0.003" in result.stdout
-        assert re.search(r"max error  0\.00392157 at x 7, y 3, channel B: ", result.stdout)
-        assert "pixels     0.260417 % differ\n" in result.stdout
-        assert all(re.search(rf"^  {name} +\d", result.stdout, re.M) for name in ("SSIM", "FLIP"))
-
-    @pytest.mark.parametrize(
-        ("limits", "status"),
-        [
-            ("--max-error 0.004", 0),
-            ("--max-error 0.0039", 1),
-            ("--min-ssim 0.99", 0),
-            ("--min-ssim 1", 1),
-            ("--min-psnr 60", 0),
-            ("--min-psnr 90", 1),
-            ("--max-flip 0.001", 0),
-            ("--max-flip 0", 1),
-            ("--fail-percent 0.3", 0),
-            ("--fail-percent 0.2", 1),
-            ("--fail-percent 0 --max-error 0.004", 0),
-            ("--fail-percent 0 --max-error 0.0039", 1),
-            ("--max-error 0.004 --min-psnr 90", 1),
-            ("--max-error none", 1),
-        ],
-    )
-    def test_limits(self, files: dict[str, Path], limits: str, status: int) -> None:
-        result = run(files["a.png"], files["b.png"], *limits.split())
-        assert result.exit_code == status
-        assert ("\nFAILED: " in result.stdout) is bool(status)
-        assert result.stdout.endswith("\npassed\n") is not bool(status)
-
-    @pytest.mark.parametrize(
-        ("a", "b", "reason"),
-        [
-            ("a.png", "small.png", "the sizes differ, 24 x 16 against 24 x 6"),
-            ("a.png", "alpha.png", "the numbers of channels differ, 3 against 4"),
-            ("a.png", "float.exr", "integers against floats, uint8 against float32"),
-            ("float.exr", "nan.exr", "NaN or infinity in one image only, 1 values, the first at"),
-            ("nan.exr", "float.exr", "NaN or infinity in one image only, 1 values, the first at"),
-            ("nan.exr", "nan.exr", "NaN or infinity in both images, 1 values, the first at x 2,"),
-        ],
-    )
-    def test_no_match_is_a_failure(
-        self, files: dict[str, Path], a: str, b: str, reason: str
-    ) -> None:
-        for limits in ((), ("--max-error", "1e9", "--min-ssim", "-1", "--min-psnr", "-inf")):
-            result = run(files[a], files[b], *limits)
-            assert result.exit_code == 1
-            assert f"\nFAILED: {reason}" in result.stdout
-
-    def test_nan_can_be_allowed(self, files: dict[str, Path]) -> None:
-        assert run(files["nan.exr"], files["nan.exr"], "--allow-nan").exit_code == 0
-        assert run(files["nan.exr"], files["float.exr"], "--allow-nan").exit_code == 1
-
-    def test_windows_differ(self, files: dict[str, Path], tmp_path: Path) -> None:
-        moved = tmp_path / "moved.exr"
-        spec = oiio.ImageSpec(24, 16, 3, "float")
-        spec.x, spec.full_x = 5, 5
-        writer = oiio.ImageOutput.create(str(moved))
-        assert writer.open(str(moved), spec)
-        assert writer.write_image(image(16, 24, 3))
-        assert writer.close()
-        result = run(files["float.exr"], moved)
-        assert result.exit_code == 1
-        assert (
-            "FAILED: the windows differ, data at 0,0 and display 24 x 16 at 0,0 against data at "
-            "5,0 and display 24 x 16 at 5,0\n"
-        ) in result.stdout
-        assert run(moved, moved).exit_code == 0
-
-    def test_ssim_of_small_images(self, files: dict[str, Path]) -> None:
-        small = files["small.png"]
-        result = run(small, small)
-        assert result.exit_code == 0
-        assert "SSIM       not computed: a side is under the window's 7 pixels\n" in result.stdout
-        assert run(small, small, "--min-ssim", "0").exit_code == 1
-
-    def test_one_of_several_parts_is_named(self, tmp_path: Path) -> None:
-        """Files whose first parts are equal are not thereby equal."""
-        values = np.random.default_rng(0).random((8, 9, 3)).astype(np.float32)
-        for name, final in (("a.exr", values), ("b.exr", values / 2)):
-            arrays = {"glow": values, "final": final}
-            frames = Frames(arrays, timings={}, settings=Separable(), info={})
-            frames.save(tmp_path / name)
-        paths = (tmp_path / "a.exr", tmp_path / "b.exr")
-        result = run(*paths)
-        assert (result.exit_code, result.stdout) == (2, "")
-        assert "choose one with --subimage: parts 0 glow, 1 final" in result.stderr
-        assert run(*paths, "--subimage", "0").exit_code == 0
-        assert run(*paths, "--subimage", "1").exit_code == 1
-
-    def test_json(self, files: dict[str, Path]) -> None:
-        result = run(files["a.png"], files["b.png"], "--json", "--max-error", "0.001")
-        found = json.loads(result.stdout, parse_constant=pytest.fail)
-        assert (result.exit_code, result.stderr) == (1, "")
-        assert (found["a"], found["b"]) == (str(files["a.png"]), str(files["b.png"]))
-        assert (found["passed"], found["identical"]) == (False, False)
-        (reason,) = found["failures"]
-        assert reason.startswith("largest difference 0.00392157 at x 7, y 3, channel 2: ")
-        assert reason.endswith(", over 0.001, the most allowed")
-        assert found["max_error"] == 1 / 255
-        assert found["max_error_at"] == [7, 3, 2]
-        assert len(found["max_error_values"]) == 2
-        fields = set(Comparison.__dataclass_fields__)
-        assert found.keys() == fields | {"a", "b", "passed", "failures", "identical", "diff_scale"}
-
-    def test_json_has_no_infinity(self, files: dict[str, Path]) -> None:
-        found = json.loads(
-            run(files["a.png"], files["a.png"], "--json").stdout, parse_constant=pytest.fail
-        )
-        assert (found["psnr"], found["identical"], found["passed"]) == (None, True, True)
-
-    @pytest.mark.parametrize("name", ["d.png", "d.exr"])
-    def test_difference_picture(self, files: dict[str, Path], tmp_path: Path, name: str) -> None:
-        out = tmp_path / name
-        result = run(files["a.png"], files["b.png"], "--diff", out)
-        assert result.exit_code == 1
-        assert result.stdout.endswith(f"\nwrote {out}, differences times 255\n")
-        pixels = oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT)
-        assert pixels.shape == (16, 24, 3)
-        assert np.count_nonzero(pixels) == 1
-        assert pixels[3, 7, 2] == 1
-        run(files["a.png"], files["b.png"], "--diff", out, "--diff-scale", "51")
-        assert oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT)[3, 7, 2] == pytest.approx(0.2)
-
-    def test_no_difference_picture(self, files: dict[str, Path], tmp_path: Path) -> None:
-        out = tmp_path / "d.png"
-        result = run(files["a.png"], files["small.png"], "--diff", out)
-        assert result.exit_code == 1
-        assert result.stderr == (
-            f"vkbloom: note: {out} is not written: the images have no values to compare\n"
-        )
-        assert not out.exists()
-
-    @pytest.mark.parametrize(
-        ("arguments", "status", "message"),
-        [
-            ("no.png a.png", 1, "no.png: No such file or directory"),
-            ("a.png bad.png", 1, "bad.png: is not a readable image"),
-            ("a.png b.png --subimage 1", 1, "a.png: subimage 1 is not in 0..0"),
-            ("a.png b.png --subimage -1", 2, "--subimage"),
-            ("a.png", 2, "Missing argument 'B'"),
-            ("a.png b.png --min-ssim 2", 2, "ssim: 2.0 is out of range, -1 to 1"),
-            ("a.png b.png --max-error nan", 2, "max_error: nan is out of range"),
-            ("a.png b.png --min-ssim high", 2, "'--min-ssim': 'high'"),
-            ("a.png b.png --data-range 0", 2, "data_range: 0.0 is out of range"),
-            ("a.png b.png --diff d.unknown", 2, "'.unknown' is not the extension of a writable"),
-            ("a.png b.png --diff d.png --diff-scale 0", 2, "scale: 0.0 is out of range"),
-            ("a.png b.png --diff-scale 2", 2, "--diff-scale needs --diff"),
-            ("a.png b.png --diff none/d.png", 1, "none/d.png: No such file or directory"),
-        ],
-    )
-    def test_what_cannot_be_done_is_one_line(
-        self,
-        files: dict[str, Path],
-        monkeypatch: pytest.MonkeyPatch,
-        arguments: str,
-        status: int,
-        message: str,
-    ) -> None:
-        folder = files["a.png"].parent
-        monkeypatch.chdir(folder)
-        Path("bad.png").write_bytes(b"not a PNG")
-        result = run(*arguments.split())
-        assert result.exit_code == status
-        assert result.stdout == ""
-        assert result.stderr.startswith("vkbloom: ")
-        assert result.stderr.count("\n") == 1
-        assert message in result.stderr
-        assert {path.name for path in folder.iterdir()} == {*files, "bad.png"}
-
-    def test_the_originals_frames(self, shared_data: Path) -> None:
-        frames = shared_data / "seed_frames"
-        assert run(frames / "glow.png", frames / "glow.png").exit_code == 0
-        result = run(frames / "glow.png", frames / "blur_vertical.png", "--json")
-        found = json.loads(result.stdout)
-        assert result.exit_code == 1
-        assert found["max_error"] > 0.5
-        assert 0.3 < found["ssim"] < 1
-        assert 0 < found["flip"] < 0.5
-        assert 10 < found["psnr"] < 30

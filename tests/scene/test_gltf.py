@@ -205,7 +205,7 @@ def test_index_types(tmp_path: Path, component: int) -> None:
 
 @pytest.mark.parametrize(("component", "full"), [(BYTE, 255), (SHORT, 65535)])
 @pytest.mark.parametrize("width", [3, 4])
-def test_whole_number_colours(tmp_path: Path, component: int, full: int, width: int) -> None:
+def test_integer_colours(tmp_path: Path, component: int, full: int, width: int) -> None:
     document = triangle()
     attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
     values = [[full, 0, full // 5, full][:width]] * 3
@@ -452,11 +452,11 @@ def at(document: dict[str, Any], path: str, value: Any) -> None:
         ("nodes.0.scale", [2e38, 2e38, 2e38], "not finite"),
         ("meshes.0.primitives", [], "no triangles"),
         ("meshes.0.primitives.0.mode", 7, "mode is 7"),
-        ("meshes.0.primitives.0.mode", True, "whole number"),
+        ("meshes.0.primitives.0.mode", True, "an integer is needed"),
         ("meshes.0.primitives.0.indices", 99, "index into accessors is 99"),
         ("meshes.0.primitives.0.indices", 1, "SCALAR"),
         ("meshes.0.primitives.0.material", -1, "index into materials is -1"),
-        ("accessors.0.count", 2, "whole triangles"),
+        ("accessors.0.count", 2, "complete triangles"),
         ("accessors.0.count", 4, "ends at byte 4"),
         ("accessors.0.count", 10**12, "count is"),
         ("accessors.0.count", 0, "count is 0"),

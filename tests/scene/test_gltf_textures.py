@@ -289,7 +289,7 @@ def test_samplers(
 
 
 @pytest.mark.parametrize(("component", "full"), [(BYTE, 255), (SHORT, 65535)])
-def test_normalized_whole_numbers(load: Load, component: int, full: int) -> None:
+def test_normalized_integers(load: Load, component: int, full: int) -> None:
     document = textured()
     attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
     places = np.array([[0, 0], [0, full], [full, full], [full // 3, 0]])
@@ -398,7 +398,11 @@ ATTRIBUTES = ("meshes", 0, "primitives", 0, "attributes")
         ((*INFO, "texCoord"), -1, r"baseColorTexture\.texCoord"),
         ((*INFO, "texCoord"), 1, r"has no TEXCOORD_1.*materials\[0\]"),
         (INFO, 5, "not a glTF 2.0 document"),
-        ((*INFO, "extensions"), {"KHR_texture_transform": 5}, "KHR_texture_transform is no object"),
+        (
+            (*INFO, "extensions"),
+            {"KHR_texture_transform": 5},
+            "KHR_texture_transform is not an object",
+        ),
         ((*INFO, "extensions"), {"KHR_texture_transform": {"scale": [1]}}, "scale"),
         ((*INFO, "extensions"), {"KHR_texture_transform": {"rotation": "a"}}, "rotation"),
         ((*INFO, "extensions"), {"KHR_texture_transform": {"texCoord": 0.5}}, "texCoord"),
@@ -420,7 +424,7 @@ ATTRIBUTES = ("meshes", 0, "primitives", 0, "attributes")
         (("images", 0, "uri"), "../a.png", r"images\[0\].*leads out"),
         (("images", 0, "uri"), "/a.png", r"images\[0\].*leads out"),
         (("images", 0, "uri"), "link.png", r"images\[0\].*leads out"),
-        (("images", 0, "uri"), ".", r"images\[0\].*is no file"),
+        (("images", 0, "uri"), ".", r"images\[0\].*is not a file"),
         ((*ATTRIBUTES, "TEXCOORD_0"), 99, r"index into accessors is 99"),
         ((*ATTRIBUTES, "TEXCOORD_0"), 0, "SCALAR.*VEC2"),
         ((*ATTRIBUTES, "TEXCOORD_0"), 1, "VEC3.*VEC2"),

@@ -16,7 +16,7 @@ from vkbloom.cli import fields
 from vkbloom.cli.image_files import read
 from vkbloom.cli.program import as_wrong_use
 
-__all__ = ["REDUCTIONS", "axis_values", "chunk_counts", "named_reductions"]
+__all__ = ["REDUCTIONS", "axis_bounds", "axis_values", "chunk_counts", "named_reductions"]
 
 REDUCTIONS: Final[Mapping[str, type[reductions.Reduction]]] = {
     "mean": reductions.Mean,
@@ -121,6 +121,22 @@ def _range(word: str, parts: Sequence[str], room: int) -> Sequence[float]:
         raise click.UsageError(f"--axis {word}: FIRST and LAST are not both above 0, as :log needs")
     spread = np.geomspace if is_log else np.linspace
     return [float(value) for value in spread(first, last, count)]
+
+
+def axis_bounds(words: Sequence[str]) -> dict[str, Sequence[Any]]:
+    """Parse each ``NAME=LOW:HIGH``, or of a choice ``NAME=A,B``, into the bounds of a fit."""
+    found: dict[str, Sequence[Any]] = {}
+    for word in words:
+        name, sign, text = word.partition("=")
+        low, colon, high = text.partition(":")
+        try:
+            values: Sequence[Any] = (float(low), float(high)) if colon else text.split(",")
+        except ValueError:
+            sign = ""
+        if not sign or not text:
+            raise click.UsageError(f"--bounds: {word!r} is not NAME=LOW:HIGH or NAME=A,B,...")
+        found[name.strip().replace("-", "_")] = values
+    return found
 
 
 def chunk_counts(words: Sequence[str]) -> dict[str, int] | None:

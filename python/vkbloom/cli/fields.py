@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -11,7 +12,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol
 
 import click
 
+import vkbloom
+from vkbloom import psf
 from vkbloom.cli.program import given
+from vkbloom.convolution import PSFLike
+from vkbloom.psf.base import PSF
 from vkbloom.views.descriptions import described_parameters
 
 if TYPE_CHECKING:
@@ -55,10 +60,27 @@ def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
     return tuple(_read_numbers(pair, ":") for pair in word.split(","))
 
 
+def _read_psf(word: str) -> PSF:
+    """Read a function with its parameters, such as spencer:state=scotopic, or an image file."""
+    name, _, rest = word.partition(":")
+    if name not in psf.__all__:
+        return psf.samples(vkbloom.read(word)[..., :3])
+    parameters = dict(part.split("=", 1) for part in rest.split(",") if part)
+    return PSF.from_dict({"psf": name} | {key: _plain(text) for key, text in parameters.items()})
+
+
+def _plain(text: str) -> object:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
 #: The type of an option for (width, height).
 SIZE: Final = _Word("WxH", _read_size)
 
 _OPTION_TYPES: Final[Mapping[object, _ParamType]] = {
+    PSFLike: _Word("NAME[:A=1,...]|FILE", _read_psf),
     float: click.FLOAT,
     int: click.INT,
     tuple[int, int]: SIZE,
@@ -76,14 +98,14 @@ def option_type(annotation: object) -> _ParamType:
     TypeError
         The annotation has no option type.
     """
+    if annotation in _OPTION_TYPES:
+        return _OPTION_TYPES[annotation]
     if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
         (inner,) = (part for part in typing.get_args(annotation) if part is not types.NoneType)
         return _or_none(option_type(inner))
     if typing.get_origin(annotation) is Literal:
         return click.Choice(typing.get_args(annotation))
-    if annotation not in _OPTION_TYPES:
-        raise TypeError(f"annotation: {annotation!r} has no option type; add one to _OPTION_TYPES")
-    return _OPTION_TYPES[annotation]
+    raise TypeError(f"annotation: {annotation!r} has no option type; add one to _OPTION_TYPES")
 
 
 def _or_none(kind: _ParamType) -> _Word:
@@ -101,6 +123,8 @@ def _spelled(value: object, separator: str = ",") -> str:
             return "on" if value else "off"
         case float():
             return f"{value:.12g}"
+        case PSF():
+            return type(value).__name__
         case tuple():
             return separator.join(_spelled(part, ":") for part in value)
         case _:

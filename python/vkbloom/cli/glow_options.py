@@ -8,19 +8,17 @@ from collections.abc import Callable
 from typing import Any
 
 import click
-import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.cli.image_files import read_picture
 from vkbloom.io.array_files import multiplied
+from vkbloom.io.glows import alike, grey_mask
 from vkbloom.io.images import Colour, Picture
 
 __all__ = [
     "accompanying",
-    "alike",
     "glow_options",
-    "grey_mask",
     "has_straight",
     "premultiplied",
     "uploaded",
@@ -70,7 +68,7 @@ def accompanying(
     OSError, ValueError
         A file cannot be read, or the mask has colours.
     """
-    values = None if mask is None else grey_mask(read_picture(mask, 0, "linear"), mask)
+    values = None if mask is None else grey_mask(read_picture(mask, 0, "linear").pixels, mask)
     glow = None
     if emission is not None:
         read = read_picture(emission, 0, colour, raw=raw)
@@ -93,27 +91,6 @@ def premultiplied(picture: Picture) -> Picture:
     if not has_straight(picture):
         return picture
     return dataclasses.replace(picture, pixels=multiplied(picture.pixels))
-
-
-def grey_mask(picture: Picture, file: str) -> Array:
-    """Return the values of a mask; a ValueError for one with colours names the file."""
-    pixels = picture.pixels
-    if (pixels[..., :3] != pixels[..., :1]).any():
-        raise ValueError(f"{file}: a mask is grey, and this image has colours")
-    return pixels[..., 0]
-
-
-def alike(emission: Array, image: Array) -> Array:
-    """Return an emission with the channels and the dtype of an image; files may differ in both."""
-    channels = image.shape[2]
-    if emission.shape[2] < channels:
-        one = 255 if emission.dtype == np.uint8 else 1
-        alpha = np.full((*emission.shape[:2], 1), one, emission.dtype)
-        emission = np.concatenate([emission, alpha], axis=2)
-    if (emission.dtype == np.uint8) != (image.dtype == np.uint8):
-        # --raw of one and floats of the other: as they come.
-        return emission[..., :channels]
-    return emission[..., :channels].astype(image.dtype, copy=False)
 
 
 def uploaded(

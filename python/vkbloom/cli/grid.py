@@ -24,6 +24,7 @@ from vkbloom.checks import import_extra
 from vkbloom.cli import axis_options, no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
+from vkbloom.cli.glow_options import accompanying, glow_options
 from vkbloom.cli.image_files import (
     input_colour_option,
     layer_option,
@@ -131,6 +132,7 @@ _STORE: Final = ".zarr"
 @click.option("--raw", is_flag=True, help="Take the values of 8-bit files as they are.")
 @subimage_option
 @layer_option
+@glow_options
 @device_options
 @scene_options
 @settings_options
@@ -156,6 +158,8 @@ def command(
     raw: bool,
     subimage: int,
     layer: str | None,
+    mask: str | None,
+    emission: str | None,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -199,6 +203,7 @@ def command(
         "time": time,
         "attachments": _names(attachments),
         "reduce": reduce,
+        **_glows(pictures, mask, emission, input_colour, raw=raw),
     }
     with as_wrong_use():
         grid = ask(source, begun, axes, **shared)
@@ -289,6 +294,22 @@ def _source(
     # Labels are the file names, or numbers if a file is given twice.
     labels = images if len(set(images)) == len(images) else map(str, range(len(images)))
     return {label: picture.pixels for label, picture in zip(labels, pictures, strict=True)}
+
+
+def _glows(
+    pictures: Sequence[Picture],
+    mask: str | None,
+    emission: str | None,
+    colour: Colour | None,
+    *,
+    raw: bool,
+) -> dict[str, Any]:
+    """Return the arguments `mask` and `emission` of a grid of images."""
+    if pictures:
+        return accompanying(mask, emission, colour, raw=raw)(pictures[0].pixels)
+    if mask or emission:
+        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
+    return {}
 
 
 def _names(attachments: str) -> str | tuple[str, ...]:

@@ -10,6 +10,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import click
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
@@ -18,9 +19,10 @@ import vkbloom
 from vkbloom.banded import Band, BloomByBands, ImageByBands
 from vkbloom.checks import check_emission, check_mask
 from vkbloom.cli import no_bloom
-from vkbloom.cli.glow_options import alike, grey_mask, has_straight, premultiplied
+from vkbloom.cli.glow_options import has_straight, premultiplied
 from vkbloom.cli.image_files import decoded, not_of_bytes, note, note_parts, note_specials
 from vkbloom.io.array_files import divided
+from vkbloom.io.glows import alike, grey_mask
 from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage
 from vkbloom.io.rows import Rows, opened_rows, written_rows
 
@@ -179,9 +181,8 @@ class _Reading:
             )
             for name, other in (("emission", emission), ("mask", mask)):
                 if other is not None and other.size != self._size:
-                    raise ValueError(
-                        f"{name}: {other.size[0]} x {other.size[1]} pixels are not the image's "
-                        f"{self._size[0]} x {self._size[1]}"
+                    raise click.UsageError(
+                        f"{name}: shape {other.size[::-1]} is not the image's, {self._size[::-1]}"
                     )
             for stored in rows.bands():
                 picture = self._decoded(stored, how.colour, notes[0])
@@ -205,7 +206,7 @@ class _Reading:
         if mask is not None:
             read = decoded(mask.take(len(image)), self._how.mask or "", "linear")
             notes[2].add(read)
-            values = check_mask(grey_mask(read, self._how.mask or ""), image.shape[:2])
+            values = check_mask(grey_mask(read.pixels, self._how.mask or ""), image.shape[:2])
         return Band(image, glow, values)
 
     def _decoded(self, stored: StoredImage, colour: Colour | None, notes: _Notes) -> Picture:

@@ -14,7 +14,17 @@ from click.core import ParameterSource
 import vkbloom
 
 #: Names of the modules of this package that have a click command called `command`.
-COMMANDS: Final = ("render", "apply", "explore", "grid", "compare", "adapters", "doctor")
+COMMANDS: Final = (
+    "render",
+    "apply",
+    "view",
+    "explore",
+    "grid",
+    "fit",
+    "compare",
+    "adapters",
+    "doctor",
+)
 
 #: The status after Ctrl-C, as shells report it.
 INTERRUPTED: Final = 130

@@ -9,6 +9,7 @@ from typing import Any, Final, Literal
 
 from vkbloom import _core
 from vkbloom.presets import presets
+from vkbloom.psf.base import PSF
 from vkbloom.settings import Settings, field_range, methods
 from vkbloom.views.descriptions import described_parameters
 
@@ -202,5 +203,7 @@ def _arguments(settings: Settings, begun: Settings) -> str:
 
 
 def _literal(value: object) -> str:
+    if isinstance(value, PSF):
+        return f"vkbloom.psf.{value!r}"
     # Names of choices need no escapes.
     return f'"{value}"' if isinstance(value, str) else repr(value)

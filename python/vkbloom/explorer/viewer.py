@@ -11,7 +11,9 @@ frame    sides: settings of "a", "b" or both;          of each side: a picture (
          framebuffer, size, time, stops; at; of a      framebuffer's facts, settings as code, the
          scene shading, glow                           values under the pointer; or an error
 probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
-open     name; the content of a file as a buffer       source, and the settings to begin with
+open     name; the content of a file as a buffer;      source, and the settings to begin with
+         as: "image", "mask" or "emission"; without a
+         file the mask or the emission is removed
 save     settings; all else as of frame                a picture of the source's own size
 ======== ============================================= =========================================
 
@@ -35,6 +37,7 @@ from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_number, check_size
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
+from vkbloom.io.glows import alike, grey_mask
 from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
 from vkbloom.settings import SHADINGS, check_settings, check_shading
@@ -58,6 +61,8 @@ _FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError)
 _LARGEST_GLOW: Final = 1e4
 # A deferred scene has light above white, which needs a tone map.
 _DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
+
+_GLOWS: Final = ("mask", "emission")
 
 Answer = tuple[dict[str, Any], list[bytes]]
 
@@ -151,6 +156,7 @@ class Viewer:
         if mask is not None:
             # With a channel axis, as `reduced` requires.
             given["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
+        self._glows = {name: "" for name in given if name != "image"}
         self._scene, self._image = None, given
         self._own_size = (image.shape[1], image.shape[0])
         self._reduced = (self._own_size, self._image)
@@ -201,23 +207,17 @@ class Viewer:
             "shadings": [] if scene is None else list(SHADINGS),
             "shading": self._shading,
             "glow": None if scene is None or scene.glow is None else scene.glow_intensity,
+            "glows": None if scene is not None else self._glows,
         }
 
     def _open(self, message: Mapping[str, Any], files: Sequence[bytes]) -> Answer:
-        """Replace the source by an image file."""
-        from vkbloom.io.array_files import read  # noqa: PLC0415  needs OpenImageIO
-
+        """Replace the source by an image file, or its mask or its emission."""
         name = PurePath(str(message.get("name", ""))).name
-        if len(files) != 1:
-            raise ValueError("open: the content of one file is needed")
-        with tempfile.TemporaryDirectory() as folder:
-            # The file name may be anything. Only its extension is used, for the format.
-            path = Path(folder, f"image{PurePath(name).suffix[:8]}")
-            path.write_bytes(files[0])
-            try:
-                image = read(path)
-            except (OSError, ValueError) as error:
-                raise ValueError(str(error).replace(str(path), name)) from error
+        kind = message.get("as", "image")
+        if kind in _GLOWS:
+            self._open_glow(kind, name, files)
+            return {"as": kind, **self._source()}, []
+        image = _read(name, files)
         was_scene = self._scene is not None
         self._show_image(image)
         self._name = name
@@ -225,7 +225,24 @@ class Viewer:
         if was_scene:
             # With a scene's settings a photograph would be white.
             self._begin(None)
-        return self._source(), []
+        return {"as": "image", **self._source()}, []
+
+    def _open_glow(self, kind: str, name: str, files: Sequence[bytes]) -> None:
+        """Give the image a mask or an emission, or take it away."""
+        if self._scene is not None:
+            raise ValueError(f"{kind}: the source is a scene; open an image first")
+        image = self._image["image"]
+        given = {one: array for one, array in self._image.items() if one != kind}
+        glows = {one: text for one, text in self._glows.items() if one != kind}
+        if files:
+            glows[kind] = name
+            given[kind] = (
+                check_emission(alike(_read(name, files), image), image)
+                if kind == "emission"
+                else check_mask(_read(name, files, is_mask=True), image.shape[:2])[..., np.newaxis]
+            )
+        self._image, self._glows = given, glows
+        self._reduced = (self._own_size, given)
 
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
@@ -342,6 +359,28 @@ class Viewer:
         while len(self._shown) > _VIEWS_KEPT:
             del self._shown[next(iter(self._shown))]
         return arrays
+
+
+def _read(name: str, files: Sequence[bytes], *, is_mask: bool = False) -> NDArray[Any]:
+    """Return the image of a file's content; its errors name the file."""
+    from vkbloom.io import image_reading  # noqa: PLC0415  needs OpenImageIO
+    from vkbloom.io.array_files import read  # noqa: PLC0415
+
+    if len(files) != 1:
+        raise ValueError("open: the content of one file is needed")
+    with tempfile.TemporaryDirectory() as folder:
+        # The file name may be anything. Only its extension is used, for the format.
+        path = Path(folder, f"image{PurePath(name).suffix[:8]}")
+        path.write_bytes(files[0])
+        try:
+            if is_mask:
+                return grey_mask(
+                    image_reading.decode(image_reading.load(path), "linear").pixels, name
+                )
+            return read(path)
+        except (OSError, ValueError) as error:
+            text = str(error).replace(str(path), name)
+            raise ValueError(text if name in text else f"{name}: {text}") from error
 
 
 def _finite(timings: Mapping[str, float]) -> dict[str, float]:

@@ -172,6 +172,8 @@ def ask(
     settings: Settings | None,
     axes: Mapping[str, Any] | None,
     *,
+    mask: object = None,
+    emission: object = None,
     size: tuple[int, int] | None,
     shading: str,
     time: float,
@@ -182,7 +184,7 @@ def ask(
 
     Parameters
     ----------
-    source, settings, axes, size, shading, time, attachments, reduce
+    source, settings, axes, mask, emission, size, shading, time, attachments, reduce
         As for `vkbloom.Renderer.grid`.
 
     Returns
@@ -196,7 +198,7 @@ def ask(
     """
     if settings is not None:
         settings = check_settings(settings)
-    checked = read_source(source, size, shading, time)
+    checked = read_source(source, size, shading, time, mask=mask, emission=emission)
     found = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     if checked.labels:
         found = (image_axis(checked.labels), *found)

@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 
 from vkbloom import _core
-from vkbloom.checks import check_attachments, check_image, check_size, check_time
+from vkbloom.checks import (
+    check_attachments,
+    check_emission,
+    check_image,
+    check_mask,
+    check_size,
+    check_time,
+)
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
 from vkbloom.image import Image
@@ -104,35 +111,41 @@ def visit(
 
 
 class ImageSource:
-    """One image, or several images of the same shape."""
+    """One image, or several images of the same shape, which share a mask and an emission."""
 
     has_time = False
     #: The place of points without an image axis.
     place = 0.0
 
     def __init__(
-        self, images: Sequence[NDArray[Any] | Image], labels: tuple[Any, ...] = ()
+        self,
+        images: Sequence[NDArray[Any] | Image],
+        labels: tuple[Any, ...] = (),
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
     ) -> None:
         self.images = tuple(images)
         self.labels = labels
+        self.mask = mask
+        self.emission = emission
         #: Images on a renderer's device by place, the latest last.
         self._uploaded: tuple[_core.Renderer | None, dict[int, _core.Source]] = None, {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The device is not sent to other processes.
-        return type(self), (self.images, self.labels)
+        return type(self), (self.images, self.labels, self.mask, self.emission)
 
     def on(self, renderer: FrameRenderer, place: float) -> _core.Source:
         """Return an image on a renderer's device. The latest images are kept there."""
         image = self.images[int(place)]
         if isinstance(image, Image):
-            return image_source(image)
+            return self.for_core(place)
         core, held = self._uploaded
         if core is not renderer._core:
             core, held = self._uploaded = renderer._core, {}
         if int(place) not in held:
             spare = held.pop(next(iter(held))) if len(held) == IMAGES_AHEAD else None
-            held[int(place)] = core.upload(image_source(image), spare, True)
+            held[int(place)] = core.upload(self.for_core(place), spare, True)
         return held[int(place)]
 
     def plan(self, renderer: FrameRenderer, settings: Settings, place: float) -> Plan:
@@ -141,19 +154,21 @@ class ImageSource:
 
     def for_core(self, place: float) -> _core.Source:
         """Return the core's Source of an image."""
-        return image_source(self.images[int(place)])
+        return image_source(self.images[int(place)], self.mask, self.emission)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
         """The identity of the source: shapes, dtypes and digests."""
+        given = {"mask": self.mask, "emission": self.emission}
         return {
             "kind": "image",
-            "images": [
-                {"shape": list(image.shape), "dtype": image.dtype.name, "sha256": digest(image)}
-                for image in self.images
-                if not isinstance(image, Image)
-            ],
+            "images": [_described(image) for image in self.images if not isinstance(image, Image)],
+            **{name: _described(array) for name, array in given.items() if array is not None},
         }
+
+
+def _described(array: NDArray[Any]) -> dict[str, Any]:
+    return {"shape": list(array.shape), "dtype": array.dtype.name, "sha256": digest(array)}
 
 
 class SceneSource:
@@ -204,7 +219,15 @@ class SceneSource:
 Source: TypeAlias = ImageSource | SceneSource
 
 
-def read_source(source: object, size: tuple[int, int] | None, shading: str, time: float) -> Source:
+def read_source(
+    source: object,
+    size: tuple[int, int] | None,
+    shading: str,
+    time: float,
+    *,
+    mask: object = None,
+    emission: object = None,
+) -> Source:
     """Check the source of a grid.
 
     Parameters
@@ -217,6 +240,8 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         Shading of a scene.
     time : float
         Time of a scene's animation; its period is 1.
+    mask, emission : ndarray, optional
+        Of all images.
 
     Returns
     -------
@@ -229,7 +254,11 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
     """
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
+    given = {"mask": mask, "emission": emission}
     if isinstance(source, Scene):
+        for name, array in given.items():
+            if array is not None:
+                raise ValueError(f"{name}: the source is a scene; leave the argument out")
         frame = check_size("size", size or _SCENE_SIZE)
         return SceneSource(source, frame, check_shading(shading), check_time(time))
     for name, is_given in (
@@ -240,7 +269,7 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         if is_given:
             raise ValueError(f"{name}: the source is not a scene; leave the argument out")
     if is_image(source):
-        return ImageSource([_checked(source)])
+        return _image_source([_checked(source)], (), **given)
     labels: list[Any]
     if isinstance(source, Mapping):
         images, labels = list(source.values()), [str(label) for label in source]
@@ -252,7 +281,25 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
         )
     if not images:
         raise ValueError("source: the list of images is empty")
-    return ImageSource([_checked(image) for image in images], tuple(labels))
+    return _image_source([_checked(image) for image in images], tuple(labels), **given)
+
+
+def _image_source(
+    images: list[NDArray[Any] | Image], labels: tuple[Any, ...], mask: object, emission: object
+) -> ImageSource:
+    """Return the source; a mask and an emission must fit each of the images."""
+    if mask is None and emission is None:
+        return ImageSource(images, labels)
+    held_mask = held_emission = None
+    for image in images:
+        # Refuses one that is uploaded.
+        image_source(image, mask, emission)
+        assert not isinstance(image, Image)
+        if mask is not None:
+            held_mask = check_mask(mask, (image.shape[0], image.shape[1]))
+        if emission is not None:
+            held_emission = check_emission(emission, image)
+    return ImageSource(images, labels, held_mask, held_emission)
 
 
 def _checked(image: object) -> NDArray[Any] | Image:

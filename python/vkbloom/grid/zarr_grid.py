@@ -38,6 +38,8 @@ def grid_to_zarr(
     *,
     client: Client | None = None,
     chunks: Mapping[str, int] | None = None,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
     size: tuple[int, int] | None = None,
     shading: Shading = "forward",
     time: float = 0.0,
@@ -58,7 +60,7 @@ def grid_to_zarr(
 
     Parameters
     ----------
-    source, settings, axes, size, shading, time, attachments, reduce, progress
+    source, settings, axes, mask, emission, size, shading, time, attachments, reduce, progress
         As for `vkbloom.Renderer.grid`.
     store : str, path-like or zarr.abc.store.Store
         A folder, a URL that fsspec supports, or a store. With a `client`, all its workers must be
@@ -126,6 +128,8 @@ def grid_to_zarr(
         source,
         settings,
         axes,
+        mask=mask,
+        emission=emission,
         size=size,
         shading=shading,
         time=time,

@@ -161,21 +161,21 @@ def written_rows(
     attributes: Mapping[str, str],
     quality: int | None,
 ) -> Iterator[Callable[[Picture], tuple[str, ...]]]:
-    """Give a function that writes the next rows, and returns notes as `image_writing.save` does.
+    """Yield a function that writes the next rows, and returns notes as `image_writing.save` does.
 
-    The file is there when all are written.
+    The file is created or replaced when all rows are written.
 
     Parameters
     ----------
     path, colour, attributes, quality
         As for `image_writing.save`.
     height : int
-        Rows in all.
+        Height of the image in rows.
 
     Raises
     ------
     OSError, ValueError
-        As `image_writing.save`.
+        As for `image_writing.save`.
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)
@@ -184,14 +184,8 @@ def written_rows(
     told: dict[str, str | int] = {**attributes}
     if quality is not None:
         told["CompressionQuality"] = quality
-    temporary = safe_writing.reserve(target, 0)
-    writer: Any = oiio.ImageOutput.create(str(temporary))
     layout: tuple[int, str] | None = None
     row = 0
-
-    def check(done: bool) -> None:
-        if not done:
-            raise safe_writing.write_error(writer, temporary, target)
 
     def add(picture: Picture) -> tuple[str, ...]:
         nonlocal layout, row
@@ -217,12 +211,5 @@ def written_rows(
         row += len(rows)
         return notes
 
-    try:
+    with safe_writing.writing(oiio, target) as (writer, temporary, check):
         yield add
-        check(writer.close())
-        safe_writing.check_complete(oiio, temporary, target)
-        safe_writing.put_in_place(temporary, target)
-    finally:
-        # Read, so that OpenImageIO does not print it.
-        writer.geterror()
-        temporary.unlink(missing_ok=True)

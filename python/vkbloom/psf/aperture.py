@@ -99,7 +99,18 @@ class iris:
         return np.array(_mask(self), dtype=dtype, copy=copy)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the parameters by name."""
+        """Return the parameters by name.
+
+        See Also
+        --------
+        aperture : Uses an iris.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.iris(blades=7).to_dict()["blades"]
+        7
+        """
         return dataclasses.asdict(self)
 
 

@@ -70,6 +70,19 @@ class PSF(abc.ABC):
         ndarray of float64, shape (height, width, 3)
             Linear RGB. The point is at [height // 2, width // 2]. The values are integrals over
             the pixels, not samples at their centres.
+
+        See Also
+        --------
+        kernel : For the convolution of a frame.
+        save : Writes it to a file.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
+        array([[0.058, 0.093, 0.058],
+               [0.093, 0.147, 0.093],
+               [0.058, 0.093, 0.058]])
         """
 
     @abc.abstractmethod
@@ -81,6 +94,16 @@ class PSF(abc.ABC):
         ndarray of float64, shape (3,)
             Linear RGB: of degrees the integral over the hemisphere, of pixels the sum over all of
             the plane.
+
+        See Also
+        --------
+        encircled_energy : The part inside circles.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.gaussian(sigma=1).energy()
+        array([1., 1., 1.])
         """
 
     @abc.abstractmethod
@@ -96,6 +119,16 @@ class PSF(abc.ABC):
         -------
         ndarray of float64, shape (N, 3)
             Linear RGB; `energy` where the circle is large enough.
+
+        See Also
+        --------
+        energy : The energy of the complete function.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.gaussian(sigma=1).encircled_energy([1, 3])[:, 0].round(3)
+        array([0.393, 0.989])
         """
 
     @abc.abstractmethod
@@ -111,6 +144,16 @@ class PSF(abc.ABC):
         -------
         ndarray of float64, shape (N, 3)
             Absolute value of the Fourier transform, divided by `energy`: 1 at 0.
+
+        See Also
+        --------
+        array : The function itself.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.gaussian(sigma=1).mtf([0, 0.1])[:, 0].round(3)
+        array([1.   , 0.821])
         """
 
     def kernel(
@@ -134,6 +177,16 @@ class PSF(abc.ABC):
         Returns
         -------
         ndarray of float64, shape (height, width, 3)
+
+        See Also
+        --------
+        array : An array of any size.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.gaussian(sigma=1).kernel((8, 6)).shape
+        (11, 15, 3)
         """
         width, height = frame
         scale = pixels_per_degree or max(frame) / FRAME_DEGREES
@@ -163,6 +216,19 @@ class PSF(abc.ABC):
         ------
         ValueError, OSError, ModuleNotFoundError
             As of `vkbloom.write`.
+
+        See Also
+        --------
+        vkbloom.write : Writes any array.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from vkbloom import psf
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = psf.gaussian(sigma=1).save(f"{folder}/kernel.exr", size=(9, 9))
+        ...     vkbloom.read(path).shape
+        (9, 9, 3)
         """
         from vkbloom.io import array_files  # noqa: PLC0415  costs start-up time
 
@@ -175,6 +241,16 @@ class PSF(abc.ABC):
         -------
         dict
             Plain values that JSON can hold.
+
+        See Also
+        --------
+        from_dict : Makes the function from the result.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.gaussian(sigma=2).to_dict()
+        {'psf': 'gaussian', 'sigma': 2.0}
         """
         fields = dataclasses.fields(cast("Any", self))
         values = {field.name: _plain(getattr(self, field.name)) for field in fields}
@@ -199,6 +275,16 @@ class PSF(abc.ABC):
             There is no such function or parameter, or a value is out of range.
         TypeError
             `fields` is no mapping, or a value has the wrong type.
+
+        See Also
+        --------
+        to_dict : The parameters by name.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.PSF.from_dict({"psf": "gaussian", "sigma": 2})
+        gaussian(sigma=2.0)
         """
         if not isinstance(fields, Mapping):
             raise TypeError(f"psf: a mapping is needed, not {type(fields).__name__}")
@@ -216,7 +302,18 @@ class PSF(abc.ABC):
         return cast("Self", cast("Any", kinds[name])(**values))
 
     def to_json(self) -> str:
-        """Return `to_dict` as JSON text."""
+        """Return `to_dict` as JSON text.
+
+        See Also
+        --------
+        from_json : Makes the function from the result.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.gaussian(sigma=2).to_json()
+        '{"psf": "gaussian", "sigma": 2.0}'
+        """
         import json  # noqa: PLC0415  costs start-up time
 
         return json.dumps(self.to_dict())
@@ -237,6 +334,16 @@ class PSF(abc.ABC):
         ------
         ValueError, TypeError
             The text is no JSON object, or as for `from_dict`.
+
+        See Also
+        --------
+        to_json : Returns the text.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.PSF.from_json('{"psf": "gaussian", "sigma": 2}')
+        gaussian(sigma=2.0)
         """
         import json  # noqa: PLC0415  costs start-up time
 

@@ -116,6 +116,16 @@ class RadialPSF(PSF):
         -------
         ndarray of float64, shape (..., 3)
             Linear RGB.
+
+        See Also
+        --------
+        array : The energy of each pixel.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.cie_general(age=35).density(10.0).round(3)
+        array([0.072, 0.072, 0.072])
         """
 
     def array(  # noqa: D102  as of PSF

@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vkbloom.checks import check_floats, check_index, check_number
-from vkbloom.psf.base import Array, centred
+from vkbloom.psf.base import PSF, Array, centred
 from vkbloom.psf.resampling import box_resample
 from vkbloom.psf.sampled import SampledPSF, check_values, rgb
 
@@ -70,8 +71,9 @@ class unreal(SampledPSF):
 
     Parameters
     ----------
-    image : array-like, shape (h, w) or (h, w, 3)
-        The kernel, finite and at least 0; it is copied, as float32.
+    image : array-like, shape (h, w) or (h, w, 3), or PSF
+        The kernel, finite and at least 0; an array is copied, as float32. Of a function that is
+        defined in pixels its own array, without negative values.
     center : (float, float) or None
         Place of the point in the image as shares of its width and height. None: the brightest
         texel.
@@ -113,10 +115,7 @@ class unreal(SampledPSF):
     scatter: float = 1.0
 
     def __post_init__(self) -> None:
-        image = check_values("image", self.image)
-        if (image.array < 0).any() or not image.array.any():
-            raise ValueError("image: its values are not at least 0, some of them above 0")
-        object.__setattr__(self, "image", image)
+        object.__setattr__(self, "image", _check_image(self.image))
         if self.center is not None:
             center = check_floats("center", self.center)
             if len(center) != 2 or not all(0 <= share <= 1 for share in center):
@@ -129,13 +128,13 @@ class unreal(SampledPSF):
         object.__setattr__(self, "prefilter", prefilter)
         object.__setattr__(self, "scatter", check_number("scatter", self.scatter, 0, 1000))
 
-    def own_array(self) -> Array:
-        """Return the array in the size of the kernel image, around its point."""
-        height, width = self.image.array.shape[:2]
+    def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
+        height, width = _image_of(self).shape[:2]
         return self._for_frame(max(width, height) / self.size)
 
-    def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
-        """Return the energy per pixel for a frame of that size."""
+    def array(  # noqa: D102  as of PSF, for a frame of this size
+        self, size: tuple[int, int], pixels_per_degree: float | None = None
+    ) -> Array:
         return self.kernel(size, size)
 
     def kernel(  # noqa: D102  as of PSF
@@ -154,8 +153,8 @@ class unreal(SampledPSF):
 @functools.lru_cache(maxsize=2)
 def _scattered(psf: unreal, longer_side: float) -> Array:
     """Return the kernel of a frame with that longer side."""
-    image = rgb(psf.image)
-    row, column = _place(psf.image, psf.center)
+    image = _image_of(psf)
+    row, column = _place(image, psf.center)
     centre = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
     around = image[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3].copy()
     top, left = row - max(row - 2, 0), column - max(column - 2, 0)
@@ -177,15 +176,34 @@ def _scattered(psf: unreal, longer_side: float) -> Array:
     return kernel
 
 
-def _place(image: ArrayValue, center: tuple[float, float] | None) -> tuple[int, int]:
+def _check_image(image: Any) -> SampledPSF | ArrayValue:
+    if isinstance(image, Mapping) and "psf" in image:
+        image = PSF.from_dict(image)
+    if isinstance(image, PSF):
+        if not isinstance(image, SampledPSF):
+            raise ValueError(f"image: {image!r} is no array; use its array(size)")
+        return image
+    held = check_values("image", image)
+    if (held.array < 0).any() or not held.array.any():
+        raise ValueError("image: its values are not at least 0, some of them above 0")
+    return held
+
+
+def _image_of(psf: unreal) -> Array:
+    """Return the kernel image, (h, w, 3)."""
+    if isinstance(psf.image, SampledPSF):
+        return np.maximum(psf.image.own_array(), 0)
+    return rgb(psf.image)
+
+
+def _place(image: Array, center: tuple[float, float] | None) -> tuple[int, int]:
     """Return row and column of the point."""
-    array = image.array
-    height, width = array.shape[:2]
+    height, width = image.shape[:2]
     if center is not None:
         return (
             min(height - 1, math.floor(center[1] * height)),
             min(width - 1, math.floor(center[0] * width)),
         )
-    brightness = array if array.ndim == 2 else array @ np.array([0.2126, 0.7152, 0.0722])
+    brightness = image @ np.array([0.2126, 0.7152, 0.0722])
     row, column = np.unravel_index(int(np.argmax(brightness)), (height, width))
     return int(row), int(column)

@@ -27,7 +27,18 @@ class SampledPSF(PSF):
 
     @abc.abstractmethod
     def own_array(self) -> Array:
-        """Return the energy per pixel in the function's own size, (h, w, 3), zero outside."""
+        """Return the energy per pixel in the function's own size, (h, w, 3), zero outside.
+
+        See Also
+        --------
+        array : An array of any size.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).own_array().shape
+        (3, 3, 3)
+        """
 
     def array(  # noqa: D102  as of PSF
         self, size: tuple[int, int], pixels_per_degree: float | None = None
@@ -48,6 +59,16 @@ class SampledPSF(PSF):
         Returns
         -------
         ndarray of float64, shape (N, 3)
+
+        See Also
+        --------
+        energy : The energy of the complete function.
+
+        Examples
+        --------
+        >>> from vkbloom import psf
+        >>> psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).encircled_energy([0, 1])[:, 0]
+        array([4., 8.])
         """
         values = self.own_array()
         y, x = (np.arange(side) - side // 2 for side in values.shape[:2])

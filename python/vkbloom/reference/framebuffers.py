@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from . import (
     bevy,
     blender,
+    convolution,
     dual_kawase,
     filament,
     godot,
@@ -70,7 +71,7 @@ class _Method(NamedTuple):
     """
 
     passes: Callable[..., dict[str, Array]]
-    gain: Callable[..., float]
+    gain: Callable[..., Any]
     published: bool = False
     sized: bool = False
 
@@ -87,6 +88,7 @@ _METHODS = {
     "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
     "godot": _Method(godot.passes, godot.gain, published=True),
     "blender": _Method(blender.passes, blender.gain, published=True),
+    "convolution": _Method(convolution.passes, convolution.gain, sized=True),
     "pygfx": _Method(pygfx.passes, pygfx.gain, published=True, sized=True),
 }
 
@@ -179,7 +181,7 @@ def apply(
     else:
         glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), weights))
         blurred = method.passes(glow, settings, (width, height), store)
-    framebuffers = {name: _with_alpha(part) for name, part in {"glow": glow, **blurred}.items()}
+    framebuffers = _with_alphas({"glow": glow, **blurred})
     # The share of the scene from which the bloom is made.
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     bloom = framebuffers["bloom"]
@@ -257,7 +259,7 @@ def passes(
         framebuffers = method.passes(colours, settings, size, store)
     if not has_alpha:
         return framebuffers
-    return {name: _with_alpha(rgb) for name, rgb in framebuffers.items()}
+    return _with_alphas(framebuffers)
 
 
 def blur(
@@ -297,7 +299,7 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
-def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
+def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     """Return the bloom of a flat image of 1, without clamps and before the intensity.
 
     Parameters
@@ -310,7 +312,8 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> float:
 
     Returns
     -------
-    float
+    float, or ndarray of float64, shape (3,)
+        Of `vkbloom.Convolution` one number for each channel, without a boundary's effect.
 
     See Also
     --------
@@ -356,6 +359,13 @@ def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
             f"emission must have the image's shape and dtype {kinds[0]}, not {kinds[1]}"
         )
     return values
+
+
+def _with_alphas(framebuffers: dict[str, Array]) -> dict[str, Array]:
+    """Return the images with a fourth channel; a kernel has three."""
+    return {
+        name: part if name == "kernel" else _with_alpha(part) for name, part in framebuffers.items()
+    }
 
 
 def _with_alpha(image: Array) -> Array:

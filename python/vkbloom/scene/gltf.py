@@ -184,7 +184,7 @@ class _Loader:
         if value is None:
             return []
         if not isinstance(value, list):
-            self._file.fail(f"{what} is no list")
+            self._file.fail(f"{what} is not a list")
         last = len(self._file.items("nodes")) - 1
         indices = [self._file.integer(index, what, 0, last) for index in value]
         if len(set(indices)) != len(indices):
@@ -238,7 +238,7 @@ class _Loader:
         for mesh_index, world, user in self._placed_meshes():
             mesh = self._file.item("meshes", mesh_index, user)
             if not isinstance(mesh.primitives, list):
-                self._file.fail(f"meshes[{mesh_index}].primitives is no list")
+                self._file.fail(f"meshes[{mesh_index}].primitives is not a list")
             for number, primitive in enumerate(mesh.primitives):
                 what = f"meshes[{mesh_index}].primitives[{number}]"
                 key = (mesh_index, number)
@@ -313,7 +313,7 @@ class _Loader:
     def _geometry(self, primitive: Parsed, what: str) -> _Geometry | None:
         """Read a primitive; None if it has no triangles."""
         if not hasattr(primitive, "attributes"):
-            self._file.fail(f"{what} is no object")
+            self._file.fail(f"{what} is not an object")
         mode = self._file.integer(primitive.mode, f"{what}.mode", 0, _FAN)
         if mode in _LINE_MODES:
             self._file.leave_out(_LINE_MODES[mode])
@@ -382,7 +382,7 @@ class _Loader:
         count = len(corners)
         if count < 3 or (mode == _TRIANGLES and count % 3):
             self._file.fail(
-                f"damaged: {what} has {count} corners, which is no number of whole triangles"
+                f"damaged: {what} has {count} corners, which is not a number of complete triangles"
             )
         if mode == _TRIANGLES:
             return corners.reshape(-1, 3)
@@ -438,7 +438,7 @@ class _Loader:
         if isinstance(extensions, dict) and EMISSIVE_STRENGTH in extensions:
             extension = extensions[EMISSIVE_STRENGTH]
             if not isinstance(extension, dict):
-                self._file.fail(f"{what}.{EMISSIVE_STRENGTH} is no object")
+                self._file.fail(f"{what}.{EMISSIVE_STRENGTH} is not an object")
             strength = extension.get("emissiveStrength", 1.0)
             emission = emission * self._file.floats(
                 [strength], f"{what}.emissiveStrength", 1, low=0.0

@@ -89,7 +89,7 @@ class GltfFile:
     def _split_glb(self, data: bytes) -> tuple[bytes, bytes | None]:
         """Split a GLB (4.4) into its JSON and its binary chunk."""
         if len(data) < 20:
-            self.fail(f"truncated: {len(data)} bytes are no whole GLB header")
+            self.fail(f"truncated: {len(data)} bytes are not a complete GLB header")
         _, version, length = struct.unpack_from("<4sII", data)
         if version != 2:
             self.fail(f"GLB version {version}; 2 is needed")
@@ -120,7 +120,7 @@ class GltfFile:
         for field in ("extensionsRequired", "extensionsUsed"):
             names = getattr(self.root, field) or []
             if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-                self.fail(f"{field} is no list of names")
+                self.fail(f"{field} is not a list of names")
             unknown = [name for name in names if name not in _EXTENSIONS]
             if unknown and field == "extensionsRequired":
                 self.fail(f"needs extensions that are not supported: {', '.join(unknown)}")
@@ -139,7 +139,7 @@ class GltfFile:
         """Return one of the root's lists; an empty one if it is missing."""
         items = getattr(self.root, field) or []
         if not isinstance(items, list):
-            self.fail(f"{field} is no list")
+            self.fail(f"{field} is not a list")
         return items
 
     def item(self, field: str, index: object, user: str) -> Parsed:
@@ -149,14 +149,14 @@ class GltfFile:
             self.fail(f"{user}: index into {field} is {reprlib.repr(index)}; there are none")
         item = items[self.integer(index, f"{user}: index into {field}", 0, len(items) - 1)]
         if not isinstance(item, self._kinds[field]):
-            self.fail(f"{field}[{index}] is no object")
+            self.fail(f"{field}[{index}] is not an object")
         return item
 
     def integer(self, value: object, what: str, low: int, high: int) -> int:
         """Return `value` if it is an integer in low..high."""
         # In Python a bool is an int, in JSON it is not.
         if not isinstance(value, int) or isinstance(value, bool):
-            self.fail(f"{what} is {reprlib.repr(value)}; a whole number is needed")
+            self.fail(f"{what} is {reprlib.repr(value)}; an integer is needed")
         if not low <= value <= high:
             self.fail(f"{what} is {reprlib.repr(value)}; {low}..{high} is possible")
         return value
@@ -195,7 +195,7 @@ class GltfFile:
         vectors: Floats = values[:, :3].astype(np.float64)
         if values.dtype.kind == "u":
             if not self.item("accessors", index, what).normalized:
-                self.fail(f"{what}: whole numbers that are not normalized")
+                self.fail(f"{what}: integers that are not normalized")
             vectors /= np.iinfo(values.dtype).max
         if not np.isfinite(vectors).all():
             self.fail(f"damaged: {what} holds NaN or infinity")
@@ -305,7 +305,7 @@ class GltfFile:
                 self.fail(f"damaged: {what} has no URI, and there is no binary chunk for it")
             data = self._blob
         elif not isinstance(buffer.uri, str):
-            self.fail(f"{what}.uri is no string")
+            self.fail(f"{what}.uri is not a string")
         elif buffer.uri[:5].lower() == "data:":
             data = self._data_uri(buffer.uri, what)
         else:
@@ -362,7 +362,7 @@ class GltfFile:
             self.fail(f"{what}: URI {shown} leads out of the file's folder")
         try:
             if target.exists() and not target.is_file():
-                self.fail(f"{what}: URI {shown} is no file")
+                self.fail(f"{what}: URI {shown} is not a file")
             with target.open("rb") as file:
                 size = os.fstat(file.fileno()).st_size
                 if length is None and size > _MAX_IMAGE_BYTES:

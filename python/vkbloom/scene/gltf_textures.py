@@ -79,7 +79,7 @@ class TextureReader:
         if isinstance(extensions, dict) and TEXTURE_TRANSFORM in extensions:
             given = extensions[TEXTURE_TRANSFORM]
             if not isinstance(given, dict):
-                self._file.fail(f"{what}.{TEXTURE_TRANSFORM} is no object")
+                self._file.fail(f"{what}.{TEXTURE_TRANSFORM} is not an object")
             transform = self._transform(given, what)
             place = given.get("texCoord", place)
         place = self._file.integer(place, f"{what}.texCoord", 0, 2**31 - 1)

@@ -101,7 +101,18 @@ class Tolerances:
                 check_number(name, value, low, high)
 
     def of(self, dtype: np.dtype[Any]) -> tuple[float, float]:
-        """Return atol and rtol for images of a dtype."""
+        """Return atol and rtol for images of a dtype.
+
+        See Also
+        --------
+        FrameRegression.check : Uses them.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> testing.Tolerances(atol=0.01).of(np.dtype(np.float16))
+        (0.01, 0.0)
+        """
         if self.atol is None and self.rtol is None:
             return DEFAULTS[dtype.name]
         return self.atol or 0.0, self.rtol or 0.0

@@ -1,0 +1,268 @@
+// A convolution by Fourier transforms: the glow along its rows, then along its columns, times the
+// kernel's spectrum, and the way back along columns and rows. The kernel's spectrum is an image of
+// its own.
+//
+// Along an axis the glow has `extent` pixels, and of the kernel count the offsets from -before to
+// after: what reaches farther falls outside everywhere (zero), is added to the last offset (edge),
+// or to the one a period away (wrap). Transforms are periodic, so that the lines are padded by as
+// much as the kernel reaches: on both sides for an edge, whose pixels lie there; on the longer side
+// for zeros, which both sides share; not at all for a period that a transform can have.
+#include "methods/methods.h"
+#include "passes/fft.h"
+#include "passes/levels.h"
+
+#include <string.h>
+
+// Of the kernel along an axis: its pixels, and the offsets that count.
+struct reach {
+    uint32_t kernel, before, after;
+};
+
+// Both axes of a convolution.
+struct convolution {
+    const struct vkb_settings *settings;
+    const struct vkb_bloom_source *source;
+    struct vkb_graph *graph;
+    struct vkb_fft_axis x, y;
+    struct reach reach_x, reach_y;
+};
+
+static uint32_t least(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
+static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary boundary,
+                                     uint32_t extent, struct reach *reach)
+{
+    const uint32_t kernel = reach->kernel;
+    struct vkb_fft_axis axis = {.direction = direction, .boundary = boundary, .extent = extent};
+
+    reach->before = least(kernel / 2, extent - 1);
+    reach->after = least(kernel - 1 - kernel / 2, extent - 1);
+    uint32_t padding = reach->before + reach->after;
+    if (boundary == BOUNDARY_WRAP && kernel >= extent) {
+        reach->before = extent / 2;
+        reach->after = extent - 1 - extent / 2;
+        padding = extent - 1;
+    }
+    if (boundary == BOUNDARY_WRAP && vkb_fft_line(extent).length == extent)
+        padding = 0;
+    if (boundary == BOUNDARY_ZERO)
+        padding = reach->before > reach->after ? reach->before : reach->after;
+    axis.before = reach->before;
+    axis.line = vkb_fft_line(extent + padding);
+    return axis;
+}
+
+// The kernel as the host gives it.
+static bool add_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph *graph,
+                       uint32_t *image, struct vkb_error *error)
+{
+    const struct vkb_image_row row = {
+        .name = "kernel",
+        .format = VKB_FORMAT_RGBA32_FLOAT,
+        .width = kernel->width,
+        .height = kernel->height,
+        .channels = 3,
+        .framebuffer = true,
+        .pixels = kernel->pixels,
+        .serial = kernel->serial,
+    };
+
+    return vkb_graph_add_image(graph, &row, image, error);
+}
+
+// The pass that puts the kernel to its places in the padded lines.
+static bool add_placing(const struct convolution *convolution, uint32_t kernel, uint32_t spectrum,
+                        struct vkb_error *error)
+{
+    const struct vkb_fft_axis *x = &convolution->x, *y = &convolution->y;
+    struct vkb_pass_row row = vkb_fullscreen_row("kernel", VKB_SHADER_fft_kernel_comp, spectrum);
+    struct vkb_fft_kernel_params *params = &row.params.fft_kernel;
+
+    row.geometry = VKB_GEOMETRY_DISPATCH;
+    row.vertex = (enum vkb_shader)0;
+    row.variant = "dispatch";
+    row.block_width = row.block_height = PIXEL_INVOCATIONS;
+    row.reads[0] = kernel;
+    row.read_count = 1;
+    row.block = VKB_BLOCK_fft_kernel;
+    *params = (struct vkb_fft_kernel_params){
+        .padded_x = (int)x->line.length,
+        .boundary_x = x->boundary,
+        .extent_x = (int)convolution->reach_x.kernel,
+        .period_x = (int)x->extent,
+        .before_x = (int)convolution->reach_x.before,
+        .after_x = (int)convolution->reach_x.after,
+        .padded_y = (int)y->line.length,
+        .boundary_y = y->boundary,
+        .extent_y = (int)convolution->reach_y.kernel,
+        .period_y = (int)y->extent,
+        .before_y = (int)convolution->reach_y.before,
+        .after_y = (int)convolution->reach_y.after,
+        .grey = convolution->settings->kernel.grey,
+        // That of the way back.
+        .gain = (float)(1.0 / ((double)x->line.length * y->line.length)),
+    };
+    return vkb_graph_add_pass(convolution->graph, &row, error);
+}
+
+static bool add_stage(const struct convolution *convolution, const struct vkb_fft_stage *stage,
+                      struct vkb_error *error)
+{
+    const struct vkb_pass_row row = vkb_fft_row(convolution->graph, stage);
+
+    return vkb_graph_add_pass(convolution->graph, &row, error);
+}
+
+// The kernel's spectrum, in place.
+static bool add_kernel_spectrum(const struct convolution *convolution, uint32_t spectrum,
+                                struct vkb_error *error)
+{
+    const struct vkb_fft_axis *axes[] = {&convolution->x, &convolution->y};
+
+    for (int i = 0; i < 2; ++i) {
+        struct vkb_fft_stage stage = {
+            .name = "kernel",
+            .axis = axes[i],
+            .lines = axes[1 - i]->line.length,
+            .from = spectrum,
+            .to = spectrum,
+        };
+        for (; stage.number < axes[i]->line.stage_count; ++stage.number)
+            if (!add_stage(convolution, &stage, error))
+                return false;
+    }
+    return true;
+}
+
+// The glow's transform along its rows.
+static bool add_rows(const struct convolution *convolution, uint32_t rows, struct vkb_error *error)
+{
+    const float *prefilter = convolution->settings->kernel.prefilter;
+    struct vkb_fft_stage stage = {
+        .name = "spectrum",
+        .axis = &convolution->x,
+        .lines = convolution->y.extent,
+        .padded = convolution->x.line.length > convolution->x.extent,
+        .from = convolution->source->glow,
+        .to = rows,
+    };
+    struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
+
+    row.constants.stage = STAGE_FIRST;
+    row.params.fft.prefilter_min = prefilter[0];
+    row.params.fft.prefilter_max = prefilter[1];
+    row.params.fft.prefilter_factor = prefilter[2];
+    if (!vkb_graph_add_pass(convolution->graph, &row, error))
+        return false;
+    stage.padded = false;
+    stage.from = rows;
+    for (stage.number = 1; stage.number < stage.axis->line.stage_count; ++stage.number)
+        if (!add_stage(convolution, &stage, error))
+            return false;
+    return true;
+}
+
+// Along the columns forth and back, with the product between.
+static bool add_columns(const struct convolution *convolution, uint32_t rows, uint32_t spectrum,
+                        uint32_t columns, struct vkb_error *error)
+{
+    const uint32_t last = convolution->y.line.stage_count - 1;
+    struct vkb_fft_stage stage = {
+        .name = "bloom",
+        .axis = &convolution->y,
+        .lines = convolution->x.line.length,
+        .padded = convolution->y.line.length > convolution->y.extent,
+        .from = rows,
+        .to = columns,
+    };
+
+    for (; stage.number < last; ++stage.number) {
+        if (!add_stage(convolution, &stage, error))
+            return false;
+        stage.padded = false;
+        stage.from = columns;
+    }
+    struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
+    vkb_fft_multiply(&convolution->x, &convolution->y, spectrum, convolution->settings->kernel.grey,
+                     &row);
+    if (!vkb_graph_add_pass(convolution->graph, &row, error))
+        return false;
+    stage.inverse = true;
+    stage.padded = false;
+    stage.from = columns;
+    while (stage.number-- > 0) {
+        row = vkb_fft_row(convolution->graph, &stage);
+        // The rows back need no other.
+        if (stage.number == 0)
+            row.params.fft.kept = (int)convolution->y.extent;
+        if (!vkb_graph_add_pass(convolution->graph, &row, error))
+            return false;
+    }
+    return true;
+}
+
+static bool add_rows_back(const struct convolution *convolution, uint32_t columns, uint32_t target,
+                          struct vkb_error *error)
+{
+    struct vkb_fft_stage stage = {
+        .name = "bloom",
+        .axis = &convolution->x,
+        .lines = convolution->y.extent,
+        .inverse = true,
+        .from = columns,
+        .to = columns,
+    };
+
+    for (stage.number = stage.axis->line.stage_count - 1; stage.number > 0; --stage.number)
+        if (!add_stage(convolution, &stage, error))
+            return false;
+    stage.to = target;
+    struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
+    row.constants.stage = STAGE_LAST;
+    return vkb_graph_add_pass(convolution->graph, &row, error);
+}
+
+bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                         struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    const int boundary = settings->choices[VKB_CHOICE_boundary];
+    const bool wrap_x = boundary == BOUNDARY_WRAP_X;
+    const struct vkb_size size = source->buffers;
+    const bool same = size.width == source->final.width && size.height == source->final.height;
+    struct convolution convolution = {
+        .settings = settings,
+        .source = source,
+        .graph = graph,
+        .reach_x.kernel = settings->kernel.width,
+        .reach_y.kernel = settings->kernel.height,
+    };
+    const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const enum vkb_format single = VKB_FORMAT_RGBA32_FLOAT;
+    uint32_t kernel, spectrum, rows, columns, target;
+
+    convolution.x =
+        make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : (enum vkb_boundary)boundary,
+                  size.width, &convolution.reach_x);
+    convolution.y =
+        make_axis(DIRECTION_VERTICAL, wrap_x ? BOUNDARY_EDGE : (enum vkb_boundary)boundary,
+                  size.height, &convolution.reach_y);
+    const struct vkb_size padded = {convolution.x.line.length, convolution.y.line.length};
+    const struct vkb_size lines = {padded.width, size.height};
+    if (!add_kernel(&settings->kernel, graph, &kernel, error)
+        || !vkb_add_target(graph, "kernel_spectrum", single, padded, false, &spectrum, error)
+        || !vkb_add_target(graph, "rows_spectrum", single, lines, false, &rows, error)
+        || !vkb_add_target(graph, "spectrum", single, padded, false, &columns, error)
+        || !vkb_add_target(graph, same ? "bloom" : "convolved", same ? source->format : single,
+                           size, same, &target, error)
+        || !add_placing(&convolution, kernel, spectrum, error)
+        || !add_kernel_spectrum(&convolution, spectrum, error)
+        || !add_rows(&convolution, rows, error)
+        || !add_columns(&convolution, rows, spectrum, columns, error)
+        || !add_rows_back(&convolution, columns, target, error))
+        return false;
+    *bloom = target;
+    return same || vkb_levels_enlarge(&levels, target, 1.0, bloom, error);
+}

@@ -1,0 +1,160 @@
+#include "passes/fft.h"
+
+#include <string.h>
+
+// The radices of a stage as products of two.
+static const struct radix {
+    uint32_t a, b;
+} radices[] = {
+    {8, 8}, {5, 8}, {4, 8}, {5, 5}, {3, 8}, {4, 5}, {4, 4}, {3, 5}, {3, 4},
+    {2, 5}, {3, 3}, {8, 1}, {2, 3}, {5, 1}, {4, 1}, {3, 1}, {2, 1}, {1, 1},
+};
+
+enum { RADIX_COUNT = sizeof radices / sizeof radices[0] };
+
+static uint32_t radix_of(uint32_t i)
+{
+    return radices[i].a * radices[i].b;
+}
+
+static bool is_smooth(uint32_t length)
+{
+    for (uint32_t factor = 2; factor <= 5; ++factor)
+        while (length % factor == 0)
+            length /= factor;
+    return length == 1;
+}
+
+// The largest radix for a length. Compilers take long for large ones (lavapipe 0.8 seconds for 64,
+// 0.3 for 32), so that they are used where they save a stage of a long line. Short lines share the
+// pipelines of a few small radices.
+static uint32_t most_radix(uint32_t length)
+{
+    return length <= 64 ? 8 : length <= 1024 || length > 4096 ? 32 : FFT_MOST_RADIX;
+}
+
+// Splits the length into so many stages, the longest first, whose radices have the least sum:
+// registers for many elements are slow. `first` is the index of the largest radix.
+static bool split(uint32_t length, uint32_t first, uint32_t stages, uint32_t *found)
+{
+    uint32_t least = UINT32_MAX, rest[VKB_FFT_STAGES];
+
+    for (uint32_t i = first; i < RADIX_COUNT; ++i) {
+        uint32_t sum = radix_of(i);
+        if (length % sum != 0)
+            continue;
+        if (stages == 1 ? sum != length : !split(length / sum, i, stages - 1, rest))
+            continue;
+        for (uint32_t j = 0; stages > 1 && j < stages - 1; ++j)
+            sum += rest[j];
+        if (sum >= least)
+            continue;
+        least = sum;
+        found[0] = radix_of(i);
+        memcpy(found + 1, rest, (stages - 1) * sizeof *found);
+    }
+    return least != UINT32_MAX;
+}
+
+struct vkb_fft_line vkb_fft_line(uint32_t least)
+{
+    struct vkb_fft_line best = {0};
+    uint64_t best_cost = UINT64_MAX;
+
+    // A power of two is among these.
+    for (uint32_t length = least; length <= 2 * least; ++length) {
+        struct vkb_fft_line line = {.length = length, .radices = {1, 1, 1, 1}};
+        uint32_t first = 0;
+        bool found = false;
+        while (radix_of(first) > most_radix(length))
+            ++first;
+        while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES)
+            found = split(length, first, ++line.stage_count, line.radices);
+        // Each stage loads and stores all elements.
+        const uint64_t cost = (uint64_t)length * (line.stage_count + 1);
+        if (found && cost < best_cost) {
+            best = line;
+            best_cost = cost;
+        }
+    }
+    return best;
+}
+
+static const enum vkb_shader shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_comp);
+
+static uint32_t groups(uint32_t invocations, uint32_t side)
+{
+    return (invocations + side - 1) / side;
+}
+
+static void set_radix(uint32_t radix, struct vkb_pass_row *row)
+{
+    for (uint32_t i = 0; i < RADIX_COUNT; ++i)
+        if (radix_of(i) == radix) {
+            row->constants.radix_a = (int32_t)radices[i].a;
+            row->constants.radix_b = (int32_t)radices[i].b;
+        }
+}
+
+struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_fft_stage *stage)
+{
+    const struct vkb_fft_axis *axis = stage->axis;
+    const bool horizontal = axis->direction == DIRECTION_HORIZONTAL;
+    const uint32_t radix = axis->line.radices[stage->number];
+    const uint32_t count = axis->line.length / radix;
+    const struct vkb_image_row *target = &graph->images[stage->to];
+    struct vkb_pass_row row =
+        vkb_fullscreen_row(stage->name, shaders[graph->images[stage->from].format], stage->to);
+    struct vkb_fft_params *params = &row.params.fft;
+
+    row.geometry = VKB_GEOMETRY_DISPATCH;
+    row.vertex = (enum vkb_shader)0;
+    row.reading = VKB_READING_LOADED;
+    row.variant = "dispatch";
+    row.block_width = row.block_height = 1;
+    row.groups_width = groups(horizontal ? count : stage->lines, FFT_COLUMNS);
+    row.groups_height = groups(horizontal ? stage->lines : count, FFT_ROWS);
+    // Every binding of the shader must be filled, also one that this pass does not read.
+    row.reads[0] = row.reads[1] = stage->from;
+    row.read_count = 2;
+    row.constants.direction = axis->direction;
+    row.constants.inverse = stage->inverse;
+    row.constants.padded = stage->padded;
+    set_radix(radix, &row);
+    row.block = VKB_BLOCK_fft;
+    params->count = (int)count;
+    params->across = (int)stage->lines;
+    params->step = (int)axis->line.length;
+    for (uint32_t i = 0; i <= stage->number; ++i)
+        params->step /= (int)axis->line.radices[i];
+    row.constants.rotated = params->step > 1;
+    params->kept = (int)(horizontal ? target->width : target->height);
+    params->padded = (int)axis->line.length;
+    params->extent = (int)axis->extent;
+    params->turn = (int)(axis->extent + axis->before);
+    params->boundary = axis->boundary;
+    params->limit = vkb_formats[target->format].limit;
+    // No prefilter.
+    params->prefilter_min = 1.0f;
+    return row;
+}
+
+void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis *columns,
+                      uint32_t spectrum, bool grey, struct vkb_pass_row *row)
+{
+    const uint32_t *row_radices = rows->line.radices;
+    uint32_t blocks[VKB_FFT_STAGES];
+
+    memcpy(blocks, columns->line.radices, sizeof blocks);
+    blocks[columns->line.stage_count - 1] = 1;
+    row->reads[1] = spectrum;
+    row->constants.stage = grey ? STAGE_GREY : STAGE_COLOURS;
+    row->params.fft.row_length = (int)rows->line.length;
+    row->params.fft.row_a = (int)row_radices[0];
+    row->params.fft.row_b = (int)row_radices[1];
+    row->params.fft.row_c = (int)row_radices[2];
+    row->params.fft.row_d = (int)row_radices[3];
+    row->params.fft.block_a = (int)blocks[0];
+    row->params.fft.block_b = (int)blocks[1];
+    row->params.fft.block_c = (int)blocks[2];
+}

@@ -1,0 +1,166 @@
+"""``vkbloom fit``: find the settings that give a picture."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+import click
+from rich.console import Console
+
+import vkbloom
+from vkbloom.cli.axis_options import axis_bounds
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.image_files import input_colour_option, layer_option, read_picture
+from vkbloom.cli.program import as_wrong_use
+from vkbloom.cli.settings_options import METHODS, PRESET_OF_IMAGES
+from vkbloom.explorer.controls import as_code
+from vkbloom.fits.losses import LossName
+from vkbloom.interruptible import opened_renderer
+from vkbloom.io import safe_writing
+
+
+@click.command()
+@click.argument("image", metavar="IMAGE", type=click.Path())
+@click.argument("target", metavar="TARGET", type=click.Path())
+@click.option(
+    "--preset",
+    "presets",
+    multiple=True,
+    type=click.Choice(list(vkbloom.presets)),
+    help=f"Settings to start from; of several each is searched [default {PRESET_OF_IMAGES}]",
+)
+@click.option(
+    "--method",
+    "kinds",
+    multiple=True,
+    type=click.Choice(list(METHODS)),
+    help="A method whose defaults to start from; of several each is searched.",
+)
+@click.option(
+    "--vary",
+    metavar="NAME,...",
+    default="threshold,intensity",
+    show_default=True,
+    help="The settings to find: numbers, switches and choices.",
+)
+@click.option(
+    "--bounds",
+    metavar="NAME=LOW:HIGH",
+    multiple=True,
+    help="A narrower range of one of them.",
+)
+@click.option(
+    "--framebuffer",
+    metavar="NAME",
+    default="final",
+    show_default=True,
+    help="What TARGET is: final, the picture with its bloom, or bloom, the bloom alone.",
+)
+@click.option(
+    "--loss",
+    type=click.Choice(get_args(LossName)),
+    default="relative",
+    show_default=True,
+    help="The figure to make small: norm of the difference over that of TARGET; root mean square; "
+    "the same of logarithms; or mean FLIP.",
+)
+@click.option(
+    "--max-calls",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=1000,
+    show_default=True,
+    help="The most renders for each start.",
+)
+@click.option(
+    "-o",
+    "--out",
+    metavar="REPORT",
+    type=click.Path(),
+    help="Write the pictures, radial profiles and losses as an HTML file.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one list, the best first.")
+@input_colour_option
+@layer_option
+@device_options
+def command(
+    *,
+    image: str,
+    target: str,
+    presets: tuple[str, ...],
+    kinds: tuple[str, ...],
+    vary: str,
+    bounds: tuple[str, ...],
+    framebuffer: str,
+    loss: LossName,
+    max_calls: int,
+    out: str | None,
+    as_json: bool,
+    input_colour: Any,
+    layer: str | None,
+    adapter: str,
+    validation: bool,
+) -> None:
+    """Find the settings with which the bloom of IMAGE is TARGET.
+
+    Both are files of one size. Their colours are decoded to linear light, as by vkbloom apply. For
+    each preset and method the search starts from its settings; --vary names what may change. The
+    results are printed, the best first, as Python code.
+    """
+    names = [name.strip().replace("-", "_") for name in vary.split(",") if name.strip()]
+    begun = [*(vkbloom.presets[name] for name in presets), *(METHODS[kind]() for kind in kinds)]
+    begun = begun or [vkbloom.presets[PRESET_OF_IMAGES]]
+    pixels, wanted = (
+        read_picture(file, 0, input_colour, layer=layer).pixels for file in (image, target)
+    )
+    with opened_renderer(adapter, validation) as renderer, as_wrong_use():
+        found = vkbloom.fit(
+            pixels,
+            wanted,
+            begun,
+            names,
+            framebuffer=framebuffer,
+            loss=loss,
+            bounds=axis_bounds(bounds),
+            renderer=renderer,
+            max_calls=max_calls,
+            progress=Console(stderr=True).is_terminal,
+        )
+    if as_json:
+        click.echo(json.dumps([_object(one) for one in found], indent=2))
+    else:
+        for one in found:
+            click.echo(
+                f"{one.settings.method}: {one.loss_name} loss {one.loss:.4g}, from "
+                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s"
+            )
+            click.echo(f"  {as_code(one.settings)}")
+    if out is not None:
+        _write(found, Path(out))
+        click.echo(f"wrote {out}", err=as_json)
+
+
+def _object(found: vkbloom.FitResult) -> dict[str, Any]:
+    """Return the object of one result that --json prints."""
+    return {
+        "settings": found.settings.to_dict(),
+        "varied": {name: getattr(found.settings, name) for name in found.vary},
+        "loss": found.loss,
+        "start_loss": found.start_loss,
+        "loss_name": found.loss_name,
+        "calls": found.calls,
+        "seconds": found.seconds,
+    }
+
+
+def _write(found: Sequence[vkbloom.FitResult], path: Path) -> None:
+    """Write the reports of all results as one page."""
+    reports = "<hr>".join(one._repr_html_() for one in found)
+    page = (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom fit</title>'
+        f'<body style="font-family:sans-serif">{reports}</body></html>'
+    )
+    safe_writing.write_file(path, page.encode())

@@ -1,0 +1,142 @@
+"""What a window shows, as keys and the mouse change it; without a window of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import vkbloom
+from vkbloom.settings import Settings, field_range, methods
+
+__all__ = ["HELP", "Live"]
+
+HELP: Final = """\
+B              bloom on, off
+Up, Down       scale of the blur, 0.1 to 2
+Left, Right    strength
+1 ... 9        the framebuffer that is shown
+M              the next method
+P              the next preset
+Space          pauses the animation
+drag, wheel    turn the scene, zoom
+S              writes all framebuffers to files
+H              this help
+Q, Escape      close\
+"""
+
+# The first of these that the settings have.
+_SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "size")
+_STRENGTHS: Final = ("blur_strength", "intensity")
+_SCALE_RANGE: Final = (0.1, 2.0)
+_STEP: Final = 0.1
+_TURN_SECONDS: Final = 8.0
+_DEGREES: Final = 0.4  # for a pixel that the mouse is dragged
+_ZOOM: Final = 0.9  # the distance for a step of the wheel
+
+
+@dataclasses.dataclass
+class Live:
+    """The state of a window.
+
+    Attributes
+    ----------
+    settings : Settings
+    scene : Scene or None
+        None: an image.
+    framebuffer : str
+        What is shown.
+    time : float
+        Of the animation, in turns.
+    paused, closed : bool
+    wishes : set of str
+        What the window's owner is asked for: "screenshot", "help".
+    """
+
+    settings: Settings
+    scene: vkbloom.Scene | None
+    framebuffer: str = "final"
+    time: float = 0.0
+    paused: bool = False
+    closed: bool = False
+    wishes: set[str] = dataclasses.field(default_factory=set)
+
+    def press(self, key: str, names: list[str]) -> None:
+        """Do what a key stands for; `names` are the framebuffers that there are."""
+        if key == "b":
+            self.settings = self.settings.replace(bloom=not self.settings.bloom)
+        elif key in ("up", "down"):
+            self._step(_SCALES, _STEP if key == "up" else -_STEP, _SCALE_RANGE)
+        elif key in ("right", "left"):
+            self._step(_STRENGTHS, _STEP if key == "right" else -_STEP)
+        elif key in "123456789" and int(key) <= len(names):
+            self.framebuffer = names[int(key) - 1]
+        elif key == "m":
+            classes = list(methods().values())
+            at = classes.index(type(self.settings))
+            self.settings = self._displayed(classes[(at + 1) % len(classes)]())
+        elif key == "p":
+            presets = list(vkbloom.presets.values())
+            at = presets.index(self.settings) if self.settings in presets else -1
+            self.settings = presets[(at + 1) % len(presets)]
+        elif key == "space":
+            self.paused = not self.paused
+        elif key in ("s", "h"):
+            self.wishes.add("screenshot" if key == "s" else "help")
+        elif key in ("q", "escape"):
+            self.closed = True
+
+    def _displayed(self, settings: Settings) -> Settings:
+        """Return settings with the tone map and the encoding of those before."""
+        before = self.settings
+        return settings.replace(tonemap=before.tonemap, encoding=before.encoding)
+
+    def _step(
+        self, fields: tuple[str, ...], step: float, limits: tuple[float, float] | None = None
+    ) -> None:
+        for field in dataclasses.fields(self.settings):
+            if field.name == next((name for name in fields if hasattr(self.settings, name)), None):
+                low, high = field_range(field)
+                if limits:
+                    low, high = max(low, limits[0]), min(high, limits[1])
+                value = getattr(self.settings, field.name)
+                value = min(max(round(value + step, 4), low), high)
+                self.settings = self.settings.replace(**{field.name: value})
+
+    def drag(self, x: float, y: float) -> None:
+        """Turn the scene by pixels of the mouse."""
+        if self.scene is not None:
+            about_x, about_y, about_z = self.scene.camera.rotation
+            self._see(rotation=(about_x - y * _DEGREES, about_y + x * _DEGREES, about_z))
+
+    def scroll(self, steps: float) -> None:
+        """Move the camera to the scene, or away from it."""
+        if self.scene is not None:
+            x, y, z = self.scene.camera.position
+            self._see(position=(x, y, z * _ZOOM**steps))
+
+    def _see(self, **changes: Any) -> None:
+        assert self.scene is not None
+        camera = dataclasses.replace(self.scene.camera, **changes)
+        self.scene = dataclasses.replace(self.scene, camera=camera)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        if not self.paused:
+            self.time = (self.time + seconds / _TURN_SECONDS) % 1.0
+
+    def title(self, seconds: float) -> str:
+        """Return the line of values; `seconds`: of a frame."""
+        settings = self.settings
+        values = [
+            f"{name} {getattr(settings, name):g}"
+            for names in (_SCALES, _STRENGTHS)
+            for name in [one for one in names if hasattr(settings, one)][:1]
+        ]
+        parts = [
+            f"{self.framebuffer}: {settings.method}",
+            *(values if settings.bloom else ["no bloom"]),
+            *(["paused"] if self.paused else []),
+            *([f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s"] if seconds else []),
+            "H: help",
+        ]
+        return " | ".join(parts)

@@ -1,0 +1,222 @@
+"""``vkbloom view``: a window that shows the bloom of a scene or an image, controlled by keys."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import click
+
+import vkbloom
+from vkbloom.checks import import_extra
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import SIZE, Command
+from vkbloom.cli.glow_options import accompanying, glow_options
+from vkbloom.cli.image_files import layer_option, note, read_picture, subimage_option
+from vkbloom.cli.live import HELP, Live
+from vkbloom.cli.program import given
+from vkbloom.cli.scene_options import scene_options
+from vkbloom.cli.settings_options import settings_options
+from vkbloom.settings import SHADINGS, Shading
+
+_LARGEST: Final = (1600, 900)  # of the window that an image opens
+_TITLE_SECONDS: Final = 0.5  # between two lines of values
+_WAIT_SECONDS: Final = 0.1  # while nothing can be seen
+_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSHQ", *"123456789")
+
+
+@click.command(cls=Command, epilog=f"\b\n{HELP}")
+@click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
+@click.option(
+    "--size",
+    type=SIZE,
+    default="1280x720",
+    show_default="1280x720, or the image's size",
+    help="Size of the window.",
+)
+@click.option("--shading", type=click.Choice(SHADINGS), default="forward", show_default=True)
+@click.option(
+    "--mode",
+    type=click.Choice(("fifo", "mailbox", "immediate")),
+    default="fifo",
+    show_default=True,
+    help="fifo: a frame for each refresh of the screen; mailbox: the newest frame at each refresh; "
+    "immediate: each frame at once.",
+)
+@click.option(
+    "--frames",
+    "count",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Close after N frames and print how many there were in a second.",
+)
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    default="view",
+    show_default=True,
+    help="Folder of the screenshots.",
+)
+@subimage_option
+@layer_option
+@glow_options
+@device_options
+@scene_options
+@settings_options
+def command(
+    *,
+    source: str | None,
+    size: tuple[int, int],
+    shading: Shading,
+    mode: Literal["fifo", "mailbox", "immediate"],
+    count: int | None,
+    out: Path,
+    subimage: int,
+    layer: str | None,
+    mask: str | None,
+    emission: str | None,
+    adapter: str,
+    validation: bool,
+    scene: Callable[[], vkbloom.Scene],
+    settings: vkbloom.Settings,
+) -> None:
+    """Show the bloom of IMAGE, or of a scene, in a window with live controls."""
+    glfw = import_extra("glfw", "window", "view")
+    if source is not None and (given("base") or given("shading")):
+        raise click.UsageError(
+            "--scene and --shading are for a scene; leave them out with an IMAGE"
+        )
+    if source is None and (mask or emission):
+        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
+    shown: Any = None
+    accompanied: dict[str, Any] = {}
+    if source is not None:
+        shown = read_picture(source, subimage, None, layer=layer).pixels
+        accompanied = accompanying(mask, emission)(shown)
+        if not given("size"):
+            height, width = shown.shape[:2]
+            fit = min(1.0, _LARGEST[0] / width, _LARGEST[1] / height)
+            size = (max(1, int(width * fit)), max(1, int(height * fit)))
+    live = Live(settings, None if source is not None else scene())
+    with (
+        _opened(glfw, size) as window,
+        vkbloom.Renderer(adapter, validation=validation) as renderer,
+        vkbloom.Surface(renderer, window, mode=mode) as surface,
+    ):
+        image = None if shown is None else renderer.upload(shown, **accompanied)
+        view = _View(renderer, image, live, shading)
+        view.listen(glfw, window)
+        begin = time.perf_counter()
+        done = 0
+        for done in view.frames(glfw, window, surface, out):
+            if done == count:
+                break
+        if count is not None:
+            elapsed = time.perf_counter() - begin
+            click.echo(f"{done} frames in {elapsed:.2f} s: {done / elapsed:.1f} frames a second")
+
+
+@contextlib.contextmanager
+def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
+    """Open a window without an API of its own."""
+    reasons: list[str] = []
+    glfw.set_error_callback(lambda code, text: reasons.append(text.decode(errors="replace")))
+    window = None
+    try:
+        if glfw.init():
+            glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
+            window = glfw.create_window(*size, "vkbloom", None, None)
+        if not window:
+            raise vkbloom.Error(f"no window: {'; '.join(reasons) or 'glfw gives no reason'}")
+        yield window
+    finally:
+        glfw.terminate()
+
+
+class _View:
+    """What the renderer makes of the state, which keys and the mouse change."""
+
+    def __init__(
+        self,
+        renderer: vkbloom.Renderer,
+        image: vkbloom.Image | None,
+        live: Live,
+        shading: Shading,
+    ) -> None:
+        self._renderer, self._image, self._live, self._shading = renderer, image, live, shading
+
+    def _source(self) -> Any:
+        return self._live.scene if self._image is None else self._image
+
+    def _options(self) -> dict[str, Any]:
+        is_scene = self._image is None
+        return {"shading": self._shading, "time": self._live.time} if is_scene else {}
+
+    def _names(self) -> list[str]:
+        """Return the framebuffers that can be shown."""
+        shading: Shading = self._shading if self._image is None else "forward"
+        plan = self._renderer.plan(self._source(), self._live.settings, shading=shading)
+        return [name for name, (shape, _) in plan.outputs.items() if len(shape) == 3]
+
+    def _screenshot(self, folder: Path, size: tuple[int, int]) -> None:
+        settings = self._live.settings
+        if self._image is not None:
+            frames = self._renderer.apply(self._image, settings)
+        else:
+            frames = self._renderer.render(self._source(), settings, size, **self._options())
+        for path in frames.save(folder):
+            note(f"Wrote {path}")
+
+    def listen(self, glfw: Any, window: Any) -> None:
+        """Have keys and the mouse change the state."""
+        live = self._live
+        keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
+        last = [0.0, 0.0]
+
+        def on_key(_: Any, key: int, code: int, action: int, mods: int) -> None:
+            if action != glfw.RELEASE and key in keys:
+                live.press(keys[key], self._names())
+
+        def on_move(_: Any, x: float, y: float) -> None:
+            if glfw.get_mouse_button(window, glfw.MOUSE_BUTTON_LEFT) == glfw.PRESS:
+                live.drag(x - last[0], y - last[1])
+            last[:] = x, y
+
+        glfw.set_key_callback(window, on_key)
+        glfw.set_cursor_pos_callback(window, on_move)
+        glfw.set_scroll_callback(window, lambda _, x, y: live.scroll(y))
+
+    def frames(self, glfw: Any, window: Any, surface: vkbloom.Surface, out: Path) -> Iterator[int]:
+        """Show frames until the window is closed; yield how many there were."""
+        live = self._live
+        numbers = itertools.count(1)
+        since = before = time.perf_counter()
+        shown = counted = 0
+        glfw.set_window_title(window, live.title(0.0))
+        while not (live.closed or glfw.window_should_close(window)):
+            if live.framebuffer not in self._names():
+                live.framebuffer = "final"
+            if surface.present(
+                self._source(), live.settings, attachment=live.framebuffer, **self._options()
+            ):
+                shown += 1
+                yield shown
+            else:
+                glfw.wait_events_timeout(_WAIT_SECONDS)
+            glfw.poll_events()
+            now = time.perf_counter()
+            live.advance(now - before)
+            before = now
+            if now - since >= _TITLE_SECONDS and shown > counted:
+                glfw.set_window_title(window, live.title((now - since) / (shown - counted)))
+                since, counted = now, shown
+            if "screenshot" in live.wishes:
+                self._screenshot(out / f"{next(numbers):04}", surface.size)
+            if "help" in live.wishes:
+                click.echo(HELP)
+            live.wishes.clear()

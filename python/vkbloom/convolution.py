@@ -1,0 +1,229 @@
+"""Bloom by convolution with a point-spread function."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vkbloom.checks import check_size
+from vkbloom.psf.base import PSF, check_above
+from vkbloom.psf.eye import spencer
+from vkbloom.psf.resampling import box_resample
+from vkbloom.psf.sampled import samples
+from vkbloom.settings import Settings, choice_field
+
+__all__ = ["Boundary", "Convolution", "PSFLike"]
+
+Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
+#: What a kernel can be given as: a function, what its `to_dict` gave, or an array.
+PSFLike = PSF | Mapping[str, Any] | ArrayLike
+
+
+class CoreKernel(NamedTuple):
+    """What the core reads of a kernel.
+
+    Attributes
+    ----------
+    pixels : ndarray of float32, shape (h, w, 4)
+        Linear RGB, and the mean of its channels for alpha.
+    serial : int
+        A number that no other kernel of this process has.
+    is_grey : bool
+        Whether all channels are equal.
+    prefilter : (float, float, float)
+        min, max and mult of Unreal Engine's; min above max: none.
+    """
+
+    pixels: NDArray[np.float32]
+    serial: int
+    is_grey: bool
+    prefilter: tuple[float, float, float]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Convolution(Settings):
+    """A convolution with any point-spread function, by Fourier transforms.
+
+    Parameters
+    ----------
+    psf : PSF, or array-like, shape (h, w) or (h, w, 3)
+        What a point becomes; by default `vkbloom.psf.spencer`. An array is copied, as float32,
+        and is a `vkbloom.psf.samples`; its point is at [h // 2, w // 2].
+    normalize : bool
+        Whether each channel of the kernel is divided by its sum.
+    boundary : {"zero", "edge", "wrap", "wrap_x"}
+        What lies outside of the bloom buffers: nothing; their edge; themselves again; the edge
+        above and below, and themselves again at the sides, as in panoramas.
+    pixels_per_degree : float or None
+        Scale of functions of the angle. None: the frame's longer side spans 50 degrees. Functions
+        that are defined in pixels do not use it.
+    kernel_size : (int, int) or None
+        Width and height of the kernel in pixels of ``final``. None: of an array its own, of
+        others twice the frame's less one, so that every pixel reaches every other one.
+    **settings
+        The fields of `Settings`.
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range. When it is used: a channel of the kernel has no sum above 0
+        that it could be divided by.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    vkbloom.psf : The point-spread functions.
+    Pyramid : A blur for wide spreads that takes less time.
+
+    Notes
+    -----
+    bloom[y, x] = sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)]. ``kernel`` is
+    K in pixels of the bloom buffers: where these have another size than the frame, each of their
+    pixels gets what its area covers. All is computed in single floats, whatever the format of the
+    bloom buffers; a value beyond 1e28 counts as that.
+
+    Examples
+    --------
+    >>> image = np.zeros((9, 9, 3), np.float32)
+    >>> image[4, 4] = 1
+    >>> cross = [[0, 1, 0], [1, 4, 1], [0, 1, 0]]
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Convolution(cross))
+    >>> list(frames)
+    ['glow', 'kernel', 'bloom', 'final']
+    >>> frames["bloom"][4, 3:6, 0].round(3)
+    array([0.125, 0.5  , 0.125], dtype=float32)
+    """
+
+    method: ClassVar[str] = "convolution"
+
+    psf: PSFLike = dataclasses.field(default=spencer(), kw_only=False)
+    normalize: bool = True
+    boundary: Boundary = choice_field("boundary")
+    pixels_per_degree: float | None = None
+    kernel_size: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        psf: Any = self.psf
+        if isinstance(psf, Mapping):
+            psf = PSF.from_dict(psf)
+        elif not isinstance(psf, PSF):
+            try:
+                psf = samples(psf)
+            except (TypeError, ValueError) as error:
+                raise type(error)(str(error).replace("values:", "psf:", 1)) from None
+        object.__setattr__(self, "psf", psf)
+        if self.normalize not in (True, False):
+            raise ValueError(f"normalize: {self.normalize!r} is not True or False")
+        object.__setattr__(self, "normalize", bool(self.normalize))
+        if self.pixels_per_degree is not None:
+            scale = check_above("pixels_per_degree", self.pixels_per_degree)
+            object.__setattr__(self, "pixels_per_degree", scale)
+        if self.kernel_size is not None:
+            object.__setattr__(self, "kernel_size", check_size("kernel_size", self.kernel_size))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields by name, ``method``, and the psf by its name and parameters.
+
+        Returns
+        -------
+        dict
+            Plain values that JSON can hold.
+        """
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return {"method": self.method, **values, "psf": cast("PSF", self.psf).to_dict()}
+
+    @property
+    def prefilter(self) -> tuple[float, float, float]:
+        """What the glow is filtered by before the convolution: of `vkbloom.psf.unreal`.
+
+        min, max and mult: a luminance L above min becomes min(mult (L - min) + min, max). Nothing
+        is changed where min is above max.
+        """
+        none = (1.0, 0.0, 1.0)
+        return cast("tuple[float, float, float]", getattr(self.psf, "prefilter", none))
+
+    def kernel(
+        self, frame: tuple[int, int], buffers: tuple[int, int] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the kernel that a frame's glow is convolved with.
+
+        Parameters
+        ----------
+        frame : (int, int)
+            Width and height of ``final``.
+        buffers : (int, int), optional
+            Width and height of the bloom buffers. Default: the frame's.
+
+        Returns
+        -------
+        ndarray of float64, shape (h, w, 3)
+            In pixels of the bloom buffers. Do not change it: it is kept.
+
+        Raises
+        ------
+        ValueError
+            A channel's sum is not above 0, and `normalize` is True.
+        """
+        return _kernel(self._shape, frame, buffers or frame)
+
+    def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
+        """Return the same for the core."""
+        pixels, serial, is_grey = _core_kernel(self._shape, frame, buffers)
+        return CoreKernel(pixels, serial, is_grey, self.prefilter)
+
+    @property
+    def _shape(self) -> Convolution:
+        """The settings with the defaults of all that the kernel does not depend on."""
+        return Convolution(
+            self.psf,
+            normalize=self.normalize,
+            pixels_per_degree=self.pixels_per_degree,
+            kernel_size=self.kernel_size,
+        )
+
+
+# Kernels may be as large as four frames.
+@functools.lru_cache(maxsize=2)
+def _kernel(
+    settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
+) -> NDArray[np.float64]:
+    kernel = cast("PSF", settings.psf).kernel(
+        frame, settings.kernel_size, settings.pixels_per_degree
+    )
+    if buffers != frame:
+        scale = buffers[1] / frame[1], buffers[0] / frame[0]
+        kernel = box_resample(kernel, (kernel.shape[0] // 2, kernel.shape[1] // 2), scale)
+    if settings.normalize:
+        sums = kernel.sum(axis=(0, 1))
+        for name, total in zip(("red", "green", "blue"), sums, strict=True):
+            if not total > 0:
+                raise ValueError(
+                    f"psf: the sum of its {name} is {total:g}, not above 0; use normalize=False"
+                )
+        kernel = kernel / sums
+    kernel.flags.writeable = False
+    return kernel
+
+
+_serials = itertools.count(1)
+
+
+@functools.lru_cache(maxsize=8)
+def _core_kernel(
+    settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
+) -> tuple[NDArray[np.float32], int, bool]:
+    kernel = _kernel(settings, frame, buffers)
+    pixels = np.empty((*kernel.shape[:2], 4), np.float32)
+    pixels[..., :3] = kernel
+    pixels[..., 3] = kernel.mean(axis=2)
+    first = pixels[..., :1]
+    return pixels, next(_serials), bool((pixels == first).all())

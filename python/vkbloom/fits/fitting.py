@@ -1,0 +1,343 @@
+"""Settings that give a picture."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Final, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom.checks import check_image, check_index, import_extra
+from vkbloom.fits.losses import Loss, Measure, light, loss_named, reduced
+from vkbloom.fits.result import FitResult, loss_text
+from vkbloom.fits.search import Search
+from vkbloom.fits.space import Bounds, Space, space_of
+from vkbloom.grid.plan import UNFUSED
+from vkbloom.image import Image
+from vkbloom.renderer import Renderer
+from vkbloom.settings import Settings, check_settings
+from vkbloom.sources import image_source
+
+__all__ = ["fit"]
+
+# Longer side of the image of the first search in pixels, and its share of the calls.
+_COARSE_SIDE: Final = 384
+_COARSE_CALLS: Final = 0.6
+
+
+@overload
+def fit(
+    image: NDArray[Any] | Image,
+    target: NDArray[Any],
+    settings: Settings,
+    vary: Sequence[str],
+    *,
+    framebuffer: str = ...,
+    loss: Loss = ...,
+    bounds: Bounds | None = ...,
+    renderer: Renderer | None = ...,
+    max_calls: int = ...,
+    progress: bool = ...,
+) -> FitResult: ...
+@overload
+def fit(
+    image: NDArray[Any] | Image,
+    target: NDArray[Any],
+    settings: Sequence[Settings],
+    vary: Sequence[str],
+    *,
+    framebuffer: str = ...,
+    loss: Loss = ...,
+    bounds: Bounds | None = ...,
+    renderer: Renderer | None = ...,
+    max_calls: int = ...,
+    progress: bool = ...,
+) -> list[FitResult]: ...
+def fit(
+    image: NDArray[Any] | Image,
+    target: NDArray[Any],
+    settings: Settings | Sequence[Settings],
+    vary: Sequence[str],
+    *,
+    framebuffer: str = "bloom",
+    loss: Loss = "relative",
+    bounds: Bounds | None = None,
+    renderer: Renderer | None = None,
+    max_calls: int = 1000,
+    progress: bool = False,
+) -> FitResult | list[FitResult]:
+    """Find the settings that make a given picture of an image.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
+        As for `Renderer.apply`. A handle of `Renderer.upload` needs its `renderer`.
+    target : ndarray, shape (H, W, 3) or (H, W, 4)
+        The picture that the framebuffer should be, of the same size; uint8 is scaled to 0..1.
+        Alpha is not compared.
+    settings : Settings or sequence of Settings
+        Where the search starts, and the fields that stay as they are. Of several, such as presets
+        of several engines, each is searched by itself.
+    vary : sequence of str
+        The fields to find: numbers, integers, flags and choices.
+    framebuffer : str
+        The framebuffer to compare. ``bloom`` is the bloom before `intensity`; for a picture with
+        its bloom take ``final``.
+    loss : {"relative", "l2", "log", "flip"} or callable
+        "relative": norm(a - b) / norm(b). "l2": the root mean square of a - b. "log": the same of
+        log10 of values from 1e-4 of the target's largest on, which weighs the faint parts of a
+        bloom like the bright ones. "flip": mean FLIP, as `compare` has it. Or a callable of
+        framebuffer and target, both (H, W, 3) of float64, that returns a number.
+    bounds : mapping of str to (float, float), optional
+        Narrower ranges of varied fields; of a choice, the values to try. Default: the ranges that
+        the settings declare; a threshold ends at the brightest value of the image.
+    renderer : Renderer, optional
+        Default: a new one.
+    max_calls : int
+        The most renders of a candidate.
+    progress : bool
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    FitResult or list of FitResult
+        Of a sequence of settings a list, the smallest loss first.
+
+    Raises
+    ------
+    ValueError
+        A candidate lacks a varied field, or the framebuffer; a field has no effect on it; the
+        target has another size or is black; an argument is out of range.
+    TypeError
+        An argument has the wrong type.
+    ModuleNotFoundError
+        SciPy is missing: ``pip install vkbloom[fit]``.
+    OutOfMemoryError, DeviceLostError, ValidationError, Error
+        The device failed.
+
+    See Also
+    --------
+    Renderer.grid : All combinations of some values.
+
+    Notes
+    -----
+    Images of more than 384 pixels are reduced first, by boxes. There, points that fill the space
+    are tried, and ``scipy.optimize.least_squares`` starts from the best of them; "flip" and
+    callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex.
+    Integers and choices are changed one at a time, while the numbers follow. The result is refined
+    at the image's own size. Fields that put few passes out of date are changed first. The same
+    arguments give the same result.
+
+    A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
+    a product of two factors. Then the loss is small, and the parameters are some of those that
+    have it.
+
+    Examples
+    --------
+    >>> image = np.random.default_rng(0).random((48, 64, 3), np.float32) ** 8 * 10
+    >>> target = vkbloom.reference.apply(image, vkbloom.Pyramid(threshold=1.3, levels=3))["bloom"]
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     found = vkbloom.fit(
+    ...         image,
+    ...         target,
+    ...         vkbloom.Pyramid(threshold=0.5),
+    ...         ["threshold", "levels"],
+    ...         renderer=renderer,
+    ...     )
+    >>> round(found.settings.threshold, 2), found.settings.levels
+    (1.3, 3)
+    """
+    candidates = [settings] if isinstance(settings, Settings) else list(settings)
+    if not candidates:
+        raise ValueError("settings: empty; give at least one Settings")
+    names = _checked_names(vary)
+    measured = loss_named(loss)
+    check_index("max_calls", max_calls, 1, 10_000_000)
+    for name in bounds or {}:
+        if name not in names:
+            raise ValueError(f"bounds: {name!r} is not among the varied fields {', '.join(names)}")
+    if renderer is None and isinstance(image, Image):
+        raise ValueError("renderer: an uploaded image needs the renderer that has it")
+    wanted = light(check_image(target, "target"))
+    pixels = None if isinstance(image, Image) else check_image(image)
+    brightest = math.inf if pixels is None else float(light(pixels).max())
+    spaces = [space_of(check_settings(one), names, bounds or {}, brightest) for one in candidates]
+    opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
+    with opened as used:
+        stages = _stages(used, image, pixels, wanted, measured)
+        # All of them before the first is searched: the most likely failures come at once.
+        costs = [_costs(used, stages[-1], space, framebuffer) for space in spaces]
+        found = []
+        for space, cost in zip(spaces, costs, strict=True):
+            with _bar(progress, space.start.method, max_calls) as told:
+                one = _fitted(
+                    used, stages, space, cost, framebuffer, max_calls=max_calls, told=told
+                )
+                found.append(one)
+    found.sort(key=lambda one: one.loss)
+    return found[0] if isinstance(settings, Settings) else found
+
+
+@dataclasses.dataclass(frozen=True)
+class _Stage:
+    """One size of the image, on the device, and its target."""
+
+    image: Image
+    measure: Measure
+    factor: int
+
+
+def _checked_names(vary: Sequence[str]) -> tuple[str, ...]:
+    names = (vary,) if isinstance(vary, str) else tuple(vary)
+    if not names:
+        raise ValueError("vary: empty; name at least one field")
+    if len(set(names)) < len(names):
+        raise ValueError(f"vary: {', '.join(names)} has a field twice")
+    return names
+
+
+def _stages(
+    renderer: Renderer,
+    image: NDArray[Any] | Image,
+    pixels: NDArray[Any] | None,
+    target: NDArray[np.float64],
+    loss: Loss,
+) -> list[_Stage]:
+    """Return the image at its own size, and before it a smaller one where it is large."""
+    handle = image if isinstance(image, Image) else renderer.upload(image)
+    if handle.shape[:2] != target.shape[:2]:
+        raise ValueError(
+            f"target: {target.shape[1]} x {target.shape[0]} is not the image's size, "
+            f"{handle.shape[1]} x {handle.shape[0]}"
+        )
+    stages = [_Stage(handle, Measure(target, loss), 1)]
+    factor = 2 ** max(0, math.ceil(math.log2(max(target.shape) / _COARSE_SIDE)))
+    if pixels is not None and factor > 1 and min(target.shape[:2]) >= 16 * factor:
+        small = renderer.upload(reduced(pixels, factor))
+        stages.insert(0, _Stage(small, Measure(reduced(target, factor), loss), factor))
+    return stages
+
+
+def _costs(renderer: Renderer, stage: _Stage, space: Space, framebuffer: str) -> NDArray[np.int_]:
+    """Return how many passes run after a change of each varied field alone."""
+    plan = renderer.plan(stage.image, space.start, attachments=[framebuffer])
+    shape = plan.outputs[framebuffer][0]
+    if len(shape) != 3 or shape[:2] != stage.image.shape[:2]:
+        raise ValueError(
+            f"framebuffer: {framebuffer} of the method {space.start.method} has the shape {shape}, "
+            f"not the size of the target; it can be bloom or final"
+        )
+    source = image_source(stage.image)
+    costs = []
+    for index, axis in enumerate(space.axes):
+        steps = []
+        # From several places: at one of them a field may be without effect.
+        for place in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
+            point = space.origin.copy()
+            point[index] = place
+            one = space.settings(point)
+            steps.append((source, _core.plan(source, one, (framebuffer,), UNFUSED)))
+        costs.append(max(map(len, _core.dry_run(tuple(steps))[1:])))
+        if not costs[-1]:
+            raise ValueError(
+                f"vary: {axis.name} has no effect on {framebuffer}"
+                + ("; give framebuffer='final'" if framebuffer != "final" else "")
+            )
+    return np.array(costs)
+
+
+def _fitted(
+    renderer: Renderer,
+    stages: list[_Stage],
+    space: Space,
+    costs: NDArray[np.int_],
+    framebuffer: str,
+    *,
+    max_calls: int,
+    told: Callable[[float], None],
+) -> FitResult:
+    """Return what is found from one start."""
+    began = time.perf_counter()
+    history: list[float] = []
+    points = [space.origin]
+    searches = []
+    for number, stage in enumerate(stages):
+        is_last = number == len(stages) - 1
+
+        def render(settings: Settings, stage: _Stage = stage) -> NDArray[np.float64]:
+            frames = renderer.apply(
+                stage.image, _smaller(settings, stage.factor), attachments=[framebuffer]
+            )
+            return light(frames[framebuffer])
+
+        search = Search(
+            space,
+            stage.measure,
+            render,
+            max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
+            costs=costs,
+            told=told,
+        )
+        if number:
+            search.refine(points)
+        else:
+            search.run(points)
+        history += search.history
+        points.append(search.best)
+        searches.append(search)
+    last = searches[-1]
+    settings = space.settings(last.best)
+    seconds = time.perf_counter() - began
+    frames = renderer.apply(stages[-1].image, settings)
+    target = stages[-1].measure.target
+    return FitResult(
+        settings=settings,
+        loss=last.loss,
+        start_loss=last.history[0],
+        calls=len(history),
+        history=np.array(history),
+        seconds=seconds,
+        framebuffer=framebuffer,
+        loss_name=loss_text(stages[-1].measure.loss),
+        vary=tuple(axis.name for axis in space.axes),
+        frames=frames,
+        target=target,
+        residual=light(frames[framebuffer]) - target,
+    )
+
+
+def _smaller(settings: Settings, factor: int) -> Settings:
+    """Return settings that blur a reduced image as far as a share of its size."""
+    if factor == 1:
+        return settings
+    changes: dict[str, Any] = {}
+    if hasattr(settings, "blur_scale"):
+        changes["blur_scale"] = settings.blur_scale / factor
+    if settings.bloom_size is not None:
+        changes["bloom_size"] = tuple(max(1, side // factor) for side in settings.bloom_size)
+    return settings.replace(**changes)
+
+
+@contextlib.contextmanager
+def _bar(progress: bool, method: str, total: int) -> Iterator[Callable[[float], None]]:
+    """Give the function that is told each loss, and shows it where asked for."""
+    if not progress:
+        yield lambda loss: None
+        return
+    tqdm = import_extra("tqdm.auto", "cli", "A progress bar").tqdm
+    best = math.inf
+    with tqdm(total=total, desc=method, unit="call", leave=False) as bar:
+
+        def tell(loss: float) -> None:
+            nonlocal best
+            best = min(best, loss)
+            bar.set_postfix_str(f"loss {best:.3g}", refresh=False)
+            bar.update()
+
+        yield tell

@@ -1,0 +1,274 @@
+"""The search for settings: samples, then least squares or a simplex, then single integers.
+
+SciPy does the optimizing. What is here chooses where it starts, and the order of the renders, so
+that few passes run from one to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import import_extra
+from vkbloom.fits.losses import Measure
+from vkbloom.fits.space import Point, Space
+
+__all__ = ["Search"]
+
+# Of the coordinates, 0 to 1: differences for derivatives, first large against rounding to half
+# floats, then small; and how far samples are from the start, where an axis is logarithmic.
+_STEPS: Final = (1e-2, 1e-3)
+_REACH: Final = 0.25
+# Samples for each varied field.
+_SAMPLES: Final = 6
+# The best of them that least squares start from, with the start itself.
+_STARTS: Final = 5
+# A loss that is good enough: what half floats round by; and one that is near.
+_ENOUGH: Final = 2e-5
+_CLOSE: Final = 5e-4
+# Of other integers and choices, the best that numbers follow before they are given up.
+_FOLLOWED: Final = 3
+# A logarithmic axis that is this many times as wide as its scale is sampled near the start.
+_ENDLESS: Final = 100.0
+
+
+class _Spent(Exception):
+    """All calls are made."""
+
+
+class Search:
+    """A search in one space, at one size of the image.
+
+    Parameters
+    ----------
+    space : Space
+    measure : Measure
+    render : callable
+        Takes settings, returns the framebuffer as float64 (H, W, 3).
+    max_calls : int
+        How often it may be called.
+    costs : sequence of int
+        Passes that run after a change of each varied field alone.
+    told : callable
+        Is called with the loss of each call.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        measure: Measure,
+        render: Callable[[Any], NDArray[np.float64]],
+        *,
+        max_calls: int,
+        costs: NDArray[np.int_],
+        told: Callable[[float], None],
+    ) -> None:
+        self._space = space
+        self._measure = measure
+        self._render = render
+        self._left = max_calls
+        self._costs = costs
+        self._told = told
+        self.best = space.origin
+        self.loss = np.inf
+        self.history: list[float] = []
+
+    def run(self, points: list[Point]) -> None:
+        """Search from some points, the first of which is the start."""
+        try:
+            losses = [self._loss(point) for point in points]
+            if self.loss <= _ENOUGH:
+                return
+            starts = [*points, *self._samples()]
+            losses += [self._loss(point) for point in starts[len(points) :]]
+            self._halve(starts, losses)
+            self._polish()
+        except _Spent:
+            return
+
+    def _halve(self, starts: list[Point], losses: list[float]) -> None:
+        """Go a few steps from the best starts, and to the end from the best of these."""
+        order = [0, *np.argsort(losses, kind="stable")]
+        # Of one combination of integers and choices, only the best start.
+        discrete = {tuple(starts[number][~self._space.is_number]): number for number in order[::-1]}
+        chosen = [number for number in order if number in discrete.values()]
+        reached = []
+        for number in list(dict.fromkeys([0, *chosen, *order]))[:_STARTS]:
+            reached.append(self._descend(starts[number], _STEPS[0], most=5))
+            if self.loss <= _ENOUGH:
+                return
+        for _, point in sorted(reached, key=lambda one: one[0])[:2]:
+            self._descend(point, _STEPS[0])
+            if self.loss <= _ENOUGH:
+                return
+
+    def refine(self, points: list[Point]) -> None:
+        """Search near the best of some points."""
+        try:
+            losses = [self._loss(point) for point in points]
+            self._descend(points[int(np.argmin(losses))], _STEPS[0])
+            self._polish()
+        except _Spent:
+            return
+
+    def _polish(self) -> None:
+        """Walk over integers and choices, and along single fields, while that helps."""
+        before = np.inf
+        while _ENOUGH < self.loss < 0.99 * before:
+            before = self.loss
+            self._walk()
+            self._descend(self.best, _STEPS[1])
+            if self.loss > _CLOSE:
+                # Least squares stand still where pixels cross a hard threshold one by one.
+                self._along_lines()
+                self._descend(self.best, _STEPS[0])
+
+    def _values(self, point: Point) -> NDArray[np.float64]:
+        """Render, and keep count."""
+        if self._left < 1:
+            raise _Spent
+        self._left -= 1
+        array = self._render(self._space.settings(point))
+        loss = self._measure(array)
+        self.history.append(loss)
+        self._told(loss)
+        if loss < self.loss:
+            self.best, self.loss = point.copy(), loss
+        return array
+
+    def _loss(self, point: Point) -> float:
+        self._values(point)
+        return self.history[-1]
+
+    def _samples(self) -> list[Point]:
+        """Return points that fill the space, with neighbours that differ in cheap fields."""
+        qmc = import_extra("scipy.stats", "fit", "Fitting").qmc
+        count = len(self._space.axes)
+        units = qmc.Halton(count, scramble=False).random(_SAMPLES * count + 1)[1:]
+        dear = self._costs > self._costs.min()
+        # Each value of the dear fields with two of the cheap ones.
+        if dear.any() and not dear.all():
+            units[:, dear] = np.repeat(units[: -(-len(units) // 2), dear], 2, axis=0)[: len(units)]
+        wide = np.array(
+            [
+                axis.scale is not None and axis.high > _ENDLESS * axis.scale
+                for axis in self._space.axes
+            ]
+        )
+        low = np.where(wide, np.maximum(self._space.origin - _REACH, 0), 0.0)
+        high = np.where(wide, np.minimum(self._space.origin + _REACH, 1), 1.0)
+        return list(low + (high - low) * units)
+
+    def _descend(self, point: Point, step: float, most: int = 30) -> tuple[float, Point]:
+        """Find the minimum of the continuous fields near a point, in `most` steps."""
+        free = np.flatnonzero(self._space.is_number)
+        if not free.size:
+            return np.inf, point
+        optimize = import_extra("scipy.optimize", "fit", "Fitting")
+        if not self._measure.is_sum:
+            return self._simplex(optimize, point, free, step, most)
+        # Cheap fields first: the next one's render puts the field before it back.
+        order = free[np.argsort(self._costs[free], kind="stable")]
+
+        def at(part: Point) -> Point:
+            whole = point.copy()
+            whole[order] = part
+            return whole
+
+        def residual(part: Point) -> NDArray[np.float64]:
+            return self._measure.residual(self._values(at(part)))
+
+        def jacobian(part: Point) -> NDArray[np.float64]:
+            columns = []
+            base = known.get(part.tobytes())
+            base = residual(part) if base is None else base
+            for index in range(len(part)):
+                moved = part.copy()
+                moved[index] += step if part[index] <= 0.5 else -step
+                columns.append((residual(moved) - base) / (moved[index] - part[index]))
+            return np.stack(columns, axis=1)
+
+        known: dict[bytes, NDArray[np.float64]] = {}
+
+        def remembered(part: Point) -> NDArray[np.float64]:
+            known.clear()
+            known[part.tobytes()] = residual(part)
+            return known[part.tobytes()]
+
+        found = optimize.least_squares(
+            remembered,
+            np.clip(point[order], 1e-9, 1 - 1e-9),
+            jacobian,
+            bounds=(0.0, 1.0),
+            x_scale="jac",
+            ftol=1e-4,
+            xtol=1e-5,
+            gtol=1e-12,
+            max_nfev=most,
+        )
+        return float(found.cost), at(found.x)
+
+    def _simplex(
+        self, optimize: Any, point: Point, free: NDArray[np.int_], step: float, most: int
+    ) -> tuple[float, Point]:
+        begun = point[free]
+        simplex = np.repeat(begun[np.newaxis], len(free) + 1, axis=0)
+        for index in range(len(free)):
+            simplex[index + 1, index] += 10 * step * (1 if begun[index] <= 0.5 else -1)
+
+        def loss(part: Point) -> float:
+            whole = point.copy()
+            whole[free] = part
+            return self._loss(whole)
+
+        found = optimize.minimize(
+            loss,
+            begun,
+            method="Nelder-Mead",
+            bounds=[(0.0, 1.0)] * len(free),
+            options={
+                "initial_simplex": simplex,
+                "xatol": step / 10,
+                "fatol": 1e-6,
+                "maxiter": 10 * most,
+            },
+        )
+        whole = point.copy()
+        whole[free] = found.x
+        return float(found.fun), whole
+
+    def _along_lines(self) -> None:
+        """Minimize along one continuous field after the other."""
+        optimize = import_extra("scipy.optimize", "fit", "Fitting")
+        for index in np.flatnonzero(self._space.is_number):
+            held = self.best.copy()
+
+            def loss(place: float, held: Point = held, index: int = int(index)) -> float:
+                point = held.copy()
+                point[index] = place
+                return self._loss(point)
+
+            for reach in (0.2, 0.02):
+                ends = np.clip(self.best[index] + np.array([-reach, reach]), 0.0, 1.0)
+                optimize.minimize_scalar(
+                    loss, bounds=ends, method="bounded", options={"maxiter": 10}
+                )
+
+    def _walk(self) -> None:
+        """Try other integers and choices, and let the numbers follow."""
+        for index, axis in enumerate(self._space.axes):
+            is_moving = axis.kind != "number"
+            while is_moving:
+                held = self.loss
+                tried = []
+                for value in axis.others(axis.value(float(self.best[index]))):
+                    point = self.best.copy()
+                    point[index] = axis.coordinate(value)
+                    tried.append((self._loss(point), point))
+                if self.loss >= held:
+                    for _, point in sorted(tried, key=lambda one: one[0])[:_FOLLOWED]:
+                        self._descend(point, _STEPS[0], most=6)
+                is_moving = self.loss < held

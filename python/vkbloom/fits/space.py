@@ -1,0 +1,231 @@
+"""The varied fields of settings as coordinates from 0 to 1."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom.checks import check_number
+from vkbloom.settings import Settings, field_range
+
+__all__ = ["Axis", "Bounds", "Point", "Space", "space_of"]
+
+#: Coordinates, 0 to 1, one for each axis.
+Point = NDArray[np.float64]
+
+#: Bounds by field: (low, high) of a number, the values of a choice.
+Bounds = Mapping[str, Sequence[Any]]
+
+# A range this many times as wide as its scale is searched on a logarithmic scale.
+_WIDE: Final = 4.0
+# Of at most this many integers, all are tried.
+_FEW: Final = 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """One varied field.
+
+    Parameters
+    ----------
+    name : str
+    kind : {"number", "integer", "choice"}
+    low, high : float
+        Of a number.
+    scale : float or None
+        A number x is at log(1 + (x - low) / scale), so that steps are relative to x above the
+        scale; None: at x.
+    choices : tuple
+        Of a choice or a flag.
+    """
+
+    name: str
+    kind: Literal["number", "integer", "choice"]
+    low: float = 0.0
+    high: float = 1.0
+    scale: float | None = None
+    choices: tuple[Any, ...] = ()
+
+    def value(self, coordinate: float) -> Any:
+        """Return the field's value at a coordinate."""
+        if self.kind == "choice":
+            return self.choices[min(int(coordinate * len(self.choices)), len(self.choices) - 1)]
+        number = self.low + self._unwarped(min(max(coordinate, 0.0), 1.0) * self._length)
+        number = min(max(number, self.low), self.high)
+        return round(number) if self.kind == "integer" else number
+
+    def coordinate(self, value: Any) -> float:
+        """Return the coordinate of a value, the nearest where it is out of bounds."""
+        if self.kind == "choice":
+            return (self.choices.index(value) + 0.5) / len(self.choices)
+        if self._length == 0:
+            return 0.0
+        number = min(max(float(value), self.low), self.high)
+        return self._warped(number - self.low) / self._length
+
+    def others(self, value: Any) -> list[Any]:
+        """Return what to try in place of an integer or a choice: all of a few, else near ones."""
+        if self.kind == "choice":
+            return [choice for choice in self.choices if choice != value]
+        low, high = round(self.low), round(self.high)
+        if high - low <= _FEW:
+            return [number for number in range(low, high + 1) if number != value]
+        steps = [sign * 2**power for power in range(0, _FEW, 2) for sign in (1, -1)]
+        return [value + step for step in steps if low <= value + step <= high]
+
+    @property
+    def _length(self) -> float:
+        return self._warped(self.high - self.low)
+
+    def _warped(self, distance: float) -> float:
+        return distance if self.scale is None else math.log1p(distance / self.scale)
+
+    def _unwarped(self, place: float) -> float:
+        return place if self.scale is None else self.scale * math.expm1(place)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Space:
+    """The varied fields of one candidate.
+
+    Parameters
+    ----------
+    start : Settings
+        Its other fields stay as they are.
+    axes : tuple of Axis
+    """
+
+    start: Settings
+    axes: tuple[Axis, ...]
+
+    @property
+    def origin(self) -> Point:
+        """The coordinates of the start."""
+        return np.array([axis.coordinate(_begun(self.start, axis.name)) for axis in self.axes])
+
+    @property
+    def is_number(self) -> NDArray[np.bool_]:
+        """Which axes are continuous."""
+        return np.array([axis.kind == "number" for axis in self.axes], np.bool_)
+
+    def settings(self, point: Point) -> Settings:
+        """Return the settings at some coordinates."""
+        values = {
+            axis.name: axis.value(float(place))
+            for axis, place in zip(self.axes, point, strict=True)
+        }
+        return self.start.replace(**values)
+
+
+def space_of(settings: Settings, vary: Sequence[str], bounds: Bounds, brightest: float) -> Space:
+    """Return the space of the varied fields of some settings.
+
+    Parameters
+    ----------
+    settings : Settings
+    vary : sequence of str
+    bounds : mapping of str to sequence
+        Narrower bounds of some of them; the others have their declared ranges.
+    brightest : float
+        Thresholds above it let nothing through and are left out.
+
+    Raises
+    ------
+    ValueError
+        The method has no such field, it cannot vary, or a bound is out of its range.
+    TypeError
+        A bound is not a pair of numbers.
+    """
+    fields = {field.name: field for field in dataclasses.fields(settings)}
+    axes = []
+    for name in vary:
+        if name not in fields:
+            known = ", ".join(one for one in fields if _kind(settings, one))
+            raise ValueError(
+                f"vary: the method {settings.method} has no field {name!r}; it can vary {known}"
+            )
+        kind = _kind(settings, name)
+        if kind is None:
+            raise ValueError(f"vary: {name!r} is not a number, a flag or a choice; set it")
+        if kind == "choice":
+            axes.append(_choice(settings, name, bounds))
+        else:
+            axes.append(_number(settings, fields[name], kind, bounds, brightest))
+    space = Space(start=settings, axes=tuple(axes))
+    try:
+        for end in (0.0, 1.0):
+            for index in range(len(axes)):
+                point = space.origin
+                point[index] = end
+                space.settings(point)
+    except ValueError as error:
+        raise ValueError(f"vary: {error}") from None
+    return space
+
+
+def _begun(settings: Settings, name: str) -> Any:
+    """Return the value that the search starts from: no threshold is one of 0."""
+    value = getattr(settings, name)
+    return 0.0 if value is None and name == "threshold" else value
+
+
+def _kind(settings: Settings, name: str) -> Literal["number", "integer", "choice"] | None:
+    """Return how a field varies; None if it cannot."""
+    if name in _core.CHOICES:
+        return "choice"
+    if name not in _core.VALUES:
+        return None
+    hint = typing.get_type_hints(type(settings))[name]
+    if hint is bool:
+        return "choice"
+    return "integer" if hint is int else "number"
+
+
+def _choice(settings: Settings, name: str, bounds: Bounds) -> Axis:
+    declared: tuple[Any, ...] = _core.CHOICES.get(name, (False, True))
+    if name == "composite":
+        declared = settings.composites
+    choices = tuple(bounds.get(name, declared))
+    if unknown := [choice for choice in choices if choice not in declared]:
+        raise ValueError(
+            f"bounds: {name}: {unknown[0]!r} is not one of {', '.join(map(str, declared))}"
+        )
+    if getattr(settings, name) not in choices:
+        choices = (getattr(settings, name), *choices)
+    return Axis(name=name, kind="choice", choices=choices)
+
+
+def _number(
+    settings: Settings,
+    field: dataclasses.Field[Any],
+    kind: Literal["number", "integer"],
+    bounds: Bounds,
+    brightest: float,
+) -> Axis:
+    low, high = field_range(field)
+    if field.name in bounds:
+        given = bounds[field.name]
+        if isinstance(given, str) or len(given) != 2:
+            raise TypeError(f"bounds: {field.name}: {given!r} is not a pair (low, high)")
+        low, high = (check_number(f"bounds: {field.name}", end, low, high) for end in given)
+        if not low < high:
+            raise ValueError(f"bounds: {field.name}: {low:g} is not under {high:g}")
+    elif field.name == "threshold":
+        high = min(high, max(brightest, 1e-3))
+    value = _begun(settings, field.name)
+    if value is None:
+        raise ValueError(
+            f"vary: {field.name}: None is not a number to start from; replace it by one"
+        )
+    default = getattr(type(settings)(), field.name)
+    usual = max(abs(float(default or 0.0)), abs(float(value))) or 1.0
+    is_wide = low >= 0 and high - low > _WIDE * usual
+    return Axis(name=field.name, kind=kind, low=low, high=high, scale=usual if is_wide else None)

@@ -1,0 +1,36 @@
+"""Files of masks and emissions, as `vkbloom.Renderer.apply` takes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["alike", "grey_mask"]
+
+
+def grey_mask(pixels: NDArray[Any], file: str) -> NDArray[Any]:
+    """Return the values of a mask.
+
+    Raises
+    ------
+    ValueError
+        It has colours; the error names the file.
+    """
+    if (pixels[..., :3] != pixels[..., :1]).any():
+        raise ValueError(f"{file}: a mask is grey, and this image has colours")
+    return pixels[..., 0]
+
+
+def alike(emission: NDArray[Any], image: NDArray[Any]) -> NDArray[Any]:
+    """Return an emission with the channels and the dtype of an image; files may differ in both."""
+    channels = image.shape[2]
+    if emission.shape[2] < channels:
+        one = 255 if emission.dtype == np.uint8 else 1
+        alpha = np.full((*emission.shape[:2], 1), one, emission.dtype)
+        emission = np.concatenate([emission, alpha], axis=2)
+    if (emission.dtype == np.uint8) != (image.dtype == np.uint8):
+        # --raw of one and floats of the other: as they come.
+        return emission[..., :channels]
+    return emission[..., :channels].astype(image.dtype, copy=False)

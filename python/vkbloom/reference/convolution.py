@@ -1,0 +1,105 @@
+"""Convolution with a kernel, by numpy.fft."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from .image import Storage
+from .sampling import Array, sample
+from .threshold import luminance
+
+__all__ = ["convolve", "gain", "passes", "prefiltered"]
+
+
+class ConvolutionSettings(Protocol):
+    """What this method reads of its settings."""
+
+    @property
+    def boundary(self) -> str: ...
+    @property
+    def prefilter(self) -> tuple[float, float, float]: ...
+    def kernel(self, frame: tuple[int, int], buffers: tuple[int, int] | None = None) -> Array: ...
+
+
+def passes(
+    glow: Array, settings: ConvolutionSettings, size: tuple[int, int], store: Storage
+) -> dict[str, Array]:
+    """Return "kernel" and "bloom".
+
+    Parameters
+    ----------
+    glow : ndarray of float64, shape (H, W, C)
+        A fourth channel, and each where there are not three or four, is convolved with the mean
+        of the kernel's.
+    settings : Convolution
+    size : (int, int)
+        Width and height of the final image.
+    store : Storage
+    """
+    height, width, channels = glow.shape
+    kernel = settings.kernel(size, (width, height))
+    mean = kernel.mean(axis=2, keepdims=True)
+    colours = kernel if channels in (3, 4) else mean
+    used = np.concatenate([colours, *[mean] * (channels - colours.shape[2])], axis=2)
+    spread = convolve(prefiltered(glow, settings.prefilter), used, settings.boundary)
+    return {"kernel": kernel, "bloom": store(sample(spread, size))}
+
+
+def gain(settings: ConvolutionSettings, size: tuple[int, int]) -> Array:
+    """Return what a flat image of 1 becomes far from a boundary of zeros: the kernel's sums."""
+    one = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
+    sums: Array = one * settings.kernel(size).sum(axis=(0, 1))
+    return sums
+
+
+def prefiltered(glow: Array, prefilter: tuple[float, float, float]) -> Array:
+    """Return the glow past Unreal Engine's filter of bright colours.
+
+    A colour whose luminance L is above min gets the luminance min(mult (L - min) + min, max).
+    """
+    low, high, factor = prefilter
+    if high < low or glow.shape[2] not in (3, 4):
+        return glow
+    found = luminance(glow[..., :3])
+    wanted = np.minimum(factor * (found - low) + low, high)
+    scale = np.where(found > low, wanted / np.maximum(found, 1e-30), 1.0)
+    return np.concatenate([glow[..., :3] * scale, glow[..., 3:]], axis=2)
+
+
+def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
+    """Return sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)].
+
+    The glow is extended by as much as the kernel reaches, so that the Fourier transform's own
+    wrapping falls outside.
+
+    Parameters
+    ----------
+    glow : ndarray of float64, shape (H, W, C)
+    kernel : ndarray of float64, shape (h, w, C)
+    boundary : {"zero", "edge", "wrap", "wrap_x"}
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, C)
+    """
+    (height, width), (rows, columns) = glow.shape[:2], kernel.shape[:2]
+    modes: dict[str, tuple[Any, Any]] = {
+        "zero": ("constant", "constant"),
+        "edge": ("edge", "edge"),
+        "wrap": ("wrap", "wrap"),
+        "wrap_x": ("edge", "wrap"),
+    }
+    down, across = modes[boundary]
+    # A pixel takes from the right what the kernel has left of its point, and the other way round.
+    extended = np.pad(glow, ((rows - 1 - rows // 2, rows // 2), (0, 0), (0, 0)), down)
+    extended = np.pad(
+        extended, ((0, 0), (columns - 1 - columns // 2, columns // 2), (0, 0)), across
+    )
+    shape = extended.shape[:2]
+    spectrum = np.fft.rfft2(extended, axes=(0, 1)) * np.fft.rfft2(kernel, shape, axes=(0, 1))
+    spread = np.fft.irfft2(spectrum, shape, axes=(0, 1))
+    # From the first pixel on whose sum is complete.
+    whole = spread[rows - 1 : rows - 1 + height, columns - 1 : columns - 1 + width]
+    return np.ascontiguousarray(whole)

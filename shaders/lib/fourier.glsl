@@ -1,0 +1,159 @@
+// Discrete Fourier transforms of up to FFT_MOST_RADIX elements in named registers: of `held`, whose
+// elements are two complex numbers each. All loops are unrolled, so that no index is known only at run
+// time.
+
+vec2 conjugate(vec2 value)
+{
+    return vec2(value.x, -value.y);
+}
+
+vec2 product(vec2 a, vec2 b)
+{
+    return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x);
+}
+
+vec4 rotated(vec4 value, vec2 angle)
+{
+    return vec4(product(value.xy, angle), product(value.zw, angle));
+}
+
+// exp(-2 pi i k / n) for 0 <= k < n: by octants, of which polynomials are exact to the last bits of a
+// float. A device's own sine may be good to 11 bits.
+vec2 turn(int k, int n)
+{
+    int octant = 8 * k / n;
+    float part = float(8 * k - octant * n) / float(n);
+    float x = 0.78539816339744831 * ((octant & 1) == 1 ? 1.0 - part : part), x2 = x * x;
+    float sine = x + x * x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 / 362880.0)));
+    float cosine =
+        1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40320.0))));
+    // Octants 1, 2, 5 and 6 are near the axis of the sine.
+    bool swapped = octant == 1 || octant == 2 || octant == 5 || octant == 6;
+    float c = swapped ? sine : cosine, s = swapped ? cosine : sine;
+    return vec2(octant >= 2 && octant <= 5 ? -c : c, octant >= 4 ? s : -s);
+}
+
+// -i times both numbers, or i times them on the way back.
+vec4 quarter(vec4 value, bool inverse)
+{
+    return inverse ? vec4(-value.y, value.x, -value.w, value.z)
+                   : vec4(value.y, -value.x, value.w, -value.z);
+}
+
+void transform_2(inout vec4 a, inout vec4 b)
+{
+    vec4 sum = a + b;
+    b = a - b;
+    a = sum;
+}
+
+void transform_3(inout vec4 v[8], bool inverse)
+{
+    vec4 sum = v[1] + v[2], turned = 0.86602540378443865 * quarter(v[1] - v[2], inverse);
+    vec4 middle = v[0] - 0.5 * sum;
+    v[0] += sum;
+    v[1] = middle + turned;
+    v[2] = middle - turned;
+}
+
+void transform_4(inout vec4 p, inout vec4 q, inout vec4 r, inout vec4 s, bool inverse)
+{
+    vec4 a = p + r, b = p - r;
+    vec4 c = q + s, d = quarter(q - s, inverse);
+    p = a + c;
+    q = b + d;
+    r = a - c;
+    s = b - d;
+}
+
+void transform_5(inout vec4 v[8], bool inverse)
+{
+    // Cosines and sines of 2 pi / 5 and 4 pi / 5.
+    const float C1 = 0.30901699437494742, C2 = -0.80901699437494742;
+    const float S1 = 0.95105651629515357, S2 = 0.58778525229247313;
+    vec4 a = v[1] + v[4], b = v[2] + v[3];
+    vec4 c = quarter(v[1] - v[4], inverse), d = quarter(v[2] - v[3], inverse);
+    vec4 first = v[0] + C1 * a + C2 * b, second = v[0] + C2 * a + C1 * b;
+    vec4 third = S1 * c + S2 * d, fourth = S2 * c - S1 * d;
+    v[0] += a + b;
+    v[1] = first + third;
+    v[2] = second + fourth;
+    v[3] = second - fourth;
+    v[4] = first - third;
+}
+
+void transform_8(inout vec4 v[8], bool inverse)
+{
+    const float HALF_ROOT = 0.70710678118654752;
+    vec4 even[4] = {v[0], v[2], v[4], v[6]}, odd[4] = {v[1], v[3], v[5], v[7]};
+    transform_4(even[0], even[1], even[2], even[3], inverse);
+    transform_4(odd[0], odd[1], odd[2], odd[3], inverse);
+    vec4 turned = quarter(odd[1], inverse), last = quarter(odd[3], inverse);
+    odd[1] = HALF_ROOT * (odd[1] + turned);
+    odd[2] = quarter(odd[2], inverse);
+    odd[3] = HALF_ROOT * (last - odd[3]);
+    [[unroll]] for (int i = 0; i < 4; ++i) {
+        v[i] = even[i] + odd[i];
+        v[i + 4] = even[i] - odd[i];
+    }
+}
+
+vec4 held[FFT_MOST_RADIX];
+
+// Of `count` elements, `step` apart.
+void transform_few(int count, int first, int step, bool inverse)
+{
+    vec4 v[8];
+    [[unroll]] for (int i = 0; i < 8; ++i)
+        if (i < count)
+            v[i] = held[first + i * step];
+    if (count == 2)
+        transform_2(v[0], v[1]);
+    else if (count == 3)
+        transform_3(v, inverse);
+    else if (count == 4)
+        transform_4(v[0], v[1], v[2], v[3], inverse);
+    else if (count == 5)
+        transform_5(v, inverse);
+    else if (count == 8)
+        transform_8(v, inverse);
+    [[unroll]] for (int i = 0; i < 8; ++i)
+        if (i < count)
+            held[first + i * step] = v[i];
+}
+
+// Of the first RADIX_A * RADIX_B elements; the result's element q is held[place_of(q)].
+const int RADIX = RADIX_A * RADIX_B;
+
+int place_of(int q)
+{
+    return RADIX_B * (q % RADIX_A) + q / RADIX_A;
+}
+
+void transform_held(bool inverse)
+{
+    [[unroll]] for (int j = 0; j < RADIX_B; ++j)
+        transform_few(RADIX_A, j, RADIX_B, inverse);
+    [[unroll]] for (int q = 1; q < RADIX_A; ++q) {
+        [[unroll]] for (int j = 1; j < RADIX_B; ++j) {
+            // Of constants: compilers compute it.
+            float angle = 6.2831853071795865 * float(q * j) / float(RADIX);
+            vec2 turned = vec2(cos(angle), inverse ? sin(angle) : -sin(angle));
+            held[RADIX_B * q + j] = rotated(held[RADIX_B * q + j], turned);
+        }
+    }
+    [[unroll]] for (int q = 0; q < RADIX_A; ++q)
+        transform_few(RADIX_B, RADIX_B * q, 1, inverse);
+}
+
+// exp(-2 pi i k q / n), or its inverse, for q of 0 to RADIX - 1.
+vec2 turns[FFT_MOST_RADIX];
+
+void compute_turns(int k, int n, bool inverse)
+{
+    vec2 one = turn(k, n);
+    turns[0] = vec2(1.0, 0.0);
+    turns[1] = inverse ? conjugate(one) : one;
+    [[unroll]] for (int q = 2; q < RADIX; ++q)
+        turns[q] = product(turns[q / 2], turns[q - q / 2]);
+}

@@ -1,0 +1,265 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// One stage of a Fourier transform along one axis: a butterfly of RADIX_A * RADIX_B elements, `step`
+// apart, for each invocation. A texel is two complex numbers: red and green, blue and alpha. The way
+// forth decimates in frequency: results stay where their elements were, so that frequencies end with
+// their digits reversed. The way back does the stages the other way round, and needs no reordering.
+//
+// STAGE_FIRST reads the glow, STAGE_LAST stores to an image of the bloom's format. STAGE_GREY and
+// STAGE_COLOURS are the last stage forth along columns, the product with the kernel's spectrum and the
+// first stage back. PADDED reads what lies beyond the source's edges by the boundary.
+#include "lib/block.glsl"
+#include "lib/finite.glsl"
+
+UNIFORM_BLOCK(FFT_BLOCK);
+#include "lib/storage.glsl"
+#ifndef TARGET_BYTES
+#define TARGET_BYTES 4
+#endif
+#include "variants/pixels.glsl"
+#include "lib/fourier.glsl"
+
+layout(local_size_x = FFT_COLUMNS, local_size_y = FFT_ROWS) in;
+READ_IMAGE(1, source);
+READ_IMAGE(2, factor);
+#ifndef WORDS
+layout(set = 0, binding = 3) uniform writeonly image2D target;
+#elif TARGET_BYTES == 4
+layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec4 texels[]; } target;
+#elif TARGET_BYTES == 2
+layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec2 texels[]; } target;
+#else
+layout(set = 0, binding = 3, std430) writeonly buffer Target { uint texels[]; } target;
+#endif
+
+ivec2 texel_at(int along, int across)
+{
+    return DIRECTION == DIRECTION_HORIZONTAL ? ivec2(along, across) : ivec2(across, along);
+}
+
+vec4 load_source(ivec2 at)
+{
+#ifdef WORDS
+    uvec4 word = texelFetch(source, at.y * words.reads[0].z + at.x * CHANNEL_BYTES / 4);
+#if CHANNEL_BYTES == 1
+    uvec2 half_word = (at.x & 2) == 0 ? word.xy : word.zw;
+    return value_of(uvec4((at.x & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0));
+#elif CHANNEL_BYTES == 2
+    return value_of(uvec4((at.x & 1) == 0 ? word.xy : word.zw, 0, 0));
+#else
+    return uintBitsToFloat(word);
+#endif
+#else
+    return imageLoad(source, at);
+#endif
+}
+
+vec4 load_factor(ivec2 at)
+{
+#ifdef WORDS
+    return uintBitsToFloat(texelFetch(factor, at.y * words.reads[1].z + at.x));
+#else
+    return imageLoad(factor, at);
+#endif
+}
+
+void store(ivec2 at, vec4 value)
+{
+#ifndef WORDS
+    imageStore(target, at, value);
+#elif TARGET_BYTES == 4
+    // (Without the maximum LLVM packs lane by lane.)
+    target.texels[at.y * words.target.z + at.x] = max(floatBitsToUint(value), uvec4(words.zero));
+#elif TARGET_BYTES == 2
+    uvec2 bits = uvec2(packHalf2x16(value.rg), packHalf2x16(value.ba));
+    target.texels[2 * at.y * words.target.z + at.x] = max(bits, uvec2(words.zero));
+#else
+    // A sum with 2^23 is rounded to an integer, which its last bits are.
+    uvec4 level = floatBitsToUint(value * 255.0 + 8388608.0) & 255u;
+    target.texels[4 * at.y * words.target.z + at.x] =
+        level.r | level.g << 8 | level.b << 16 | level.a << 24;
+#endif
+}
+
+// Unreal Engine's filter of bright colours.
+vec3 prefiltered(vec3 colour)
+{
+    float luminance = dot(colour, vec3(0.2126, 0.7152, 0.0722));
+    float wanted = min(params.prefilter_factor * (luminance - params.prefilter_min)
+                           + params.prefilter_min,
+                       params.prefilter_max);
+    bool filters =
+        params.prefilter_max >= params.prefilter_min && luminance > params.prefilter_min;
+    return filters ? colour * (wanted / luminance) : colour;
+}
+
+vec4 glow_of(vec4 texel)
+{
+    vec4 kept = clamp(finite_or_zero(texel), -FFT_LIMIT, FFT_LIMIT);
+    return vec4(prefiltered(kept.rgb), ALPHA == ALPHA_BLUR ? kept.a : 0.0);
+}
+
+// What the transform has at a place of the padded line. Where that lies before the source's first texel
+// it is from `turn` on.
+vec4 load_padded(int along, int across)
+{
+    bool inside = along < params.extent, behind = along < params.turn;
+    int place = along;
+    if (params.boundary == BOUNDARY_WRAP)
+        place = behind ? along - params.extent : along - params.padded + params.extent;
+    else
+        place = behind ? params.extent - 1 : 0;
+    place = inside ? along : clamp(place, 0, params.extent - 1);
+    vec4 texel = load_source(texel_at(place, across));
+    return inside || params.boundary != BOUNDARY_ZERO ? texel : vec4(0.0);
+}
+
+vec4 load(int along, int across)
+{
+    vec4 texel = PADDED != 0 ? load_padded(along, across) : load_source(texel_at(along, across));
+    return STAGE == STAGE_FIRST ? glow_of(texel) : texel;
+}
+
+void load_line(int first, int across)
+{
+    [[unroll]] for (int i = 0; i < RADIX; ++i)
+        held[i] = load(first + i * params.step, across);
+}
+
+void store_line(int first, int across)
+{
+    [[unroll]] for (int i = 0; i < RADIX; ++i) {
+        int along = first + i * params.step;
+        vec4 value = held[place_of(i)];
+        if (along < params.kept)
+            store(texel_at(along, across), STAGE == STAGE_LAST ? stored(value) : value);
+    }
+}
+
+void multiply_grey(int first, int across)
+{
+    vec4 values[FFT_MOST_RADIX];
+    [[unroll]] for (int i = 0; i < RADIX; ++i)
+        values[i] = rotated(held[place_of(i)], load_factor(texel_at(first + i, across)).xy);
+    [[unroll]] for (int i = 0; i < RADIX; ++i)
+        held[i] = values[i];
+}
+
+// The frequency at a place, and the place of a frequency: digits of the radices a to d.
+int frequency_at(int place, ivec4 radices)
+{
+    int frequency = place % radices.w;
+    place /= radices.w;
+    frequency = frequency * radices.z + place % radices.z;
+    place /= radices.z;
+    frequency = frequency * radices.y + place % radices.y;
+    return frequency * radices.x + place / radices.y;
+}
+
+int place_at(int frequency, ivec4 radices)
+{
+    return frequency_at(frequency, radices.wzyx);
+}
+
+// The place of the frequency of the other sign.
+int mirrored(int place, ivec4 radices, int length)
+{
+    int frequency = frequency_at(place, radices);
+    return frequency == 0 ? 0 : place_at(length - frequency, radices);
+}
+
+// Of two real channels, in one complex number: their product with two real kernels.
+vec2 channels(vec2 value, vec2 mirror, vec2 kernel, vec2 kernel_mirror)
+{
+    vec2 a = conjugate(mirror), b = conjugate(kernel_mirror);
+    vec2 first = product(0.5 * (value + a), 0.5 * (kernel + b));
+    // Both are i times the second channel's: i x i y = i (i x y).
+    vec2 second = product(0.5 * (value - a), 0.5 * (kernel - b));
+    return first + vec2(second.y, -second.x);
+}
+
+vec4 channels(vec4 value, vec4 mirror, vec4 kernel, vec4 kernel_mirror)
+{
+    return vec4(channels(value.xy, mirror.xy, kernel.xy, kernel_mirror.xy),
+                channels(value.zw, mirror.zw, kernel.zw, kernel_mirror.zw));
+}
+
+// By a kernel with colours. The product at a frequency needs the spectra at the frequency of the other
+// sign, so that an invocation has the lines of both. The other invocation, which has the same two lines,
+// does nothing.
+void multiply_colours(int number, int across)
+{
+    ivec4 rows = ivec4(params.row_a, params.row_b, params.row_c, params.row_d);
+    // The blocks before this last stage are places, too, in lines of their own length.
+    ivec4 blocks =
+        ivec4(params.block_a, params.block_b, params.block_c, 1);
+    int other_across = mirrored(across, rows, params.row_length);
+    int other_number = mirrored(number, blocks, params.count);
+    bool own = number == 0;
+    vec4 values[FFT_MOST_RADIX], others[FFT_MOST_RADIX];
+
+    if (across > other_across || (across == other_across && number > other_number))
+        return;
+    load_line(number * RADIX, across);
+    transform_held(false);
+    [[unroll]] for (int i = 0; i < RADIX; ++i)
+        values[i] = held[place_of(i)];
+    load_line(other_number * RADIX, other_across);
+    transform_held(false);
+    [[unroll]] for (int i = 0; i < RADIX; ++i)
+        others[i] = held[place_of(i)];
+    // In the block of frequency 0 the sign turns within it.
+    [[unroll]] for (int i = 0; i < RADIX; ++i) {
+        int j = RADIX - 1 - i, own_j = (RADIX - i) % RADIX;
+        vec4 kernel = load_factor(texel_at(number * RADIX + i, across));
+        vec4 kernel_mirror =
+            load_factor(texel_at(other_number * RADIX + (own ? own_j : j), other_across));
+        held[i] = channels(values[i], own ? others[own_j] : others[j], kernel, kernel_mirror);
+    }
+    transform_held(true);
+    store_line(number * RADIX, across);
+    [[unroll]] for (int i = 0; i < RADIX; ++i) {
+        int j = RADIX - 1 - i, own_j = (RADIX - i) % RADIX;
+        vec4 kernel = load_factor(texel_at(other_number * RADIX + i, other_across));
+        vec4 kernel_mirror = load_factor(texel_at(number * RADIX + (own ? own_j : j), across));
+        held[i] = channels(others[i], own ? values[own_j] : values[j], kernel, kernel_mirror);
+    }
+    transform_held(true);
+    store_line(other_number * RADIX, other_across);
+}
+
+void rotate(int x, bool inverse)
+{
+    compute_turns(x, params.step * RADIX, inverse);
+    [[unroll]] for (int i = 1; i < RADIX; ++i) {
+        int at = inverse ? i : place_of(i);
+        held[at] = rotated(held[at], turns[i]);
+    }
+}
+
+void main()
+{
+    ivec2 id = ivec2(gl_GlobalInvocationID.xy);
+    bool horizontal = DIRECTION == DIRECTION_HORIZONTAL;
+    int number = horizontal ? id.x : id.y, across = horizontal ? id.y : id.x;
+    if (number >= params.count || across >= params.across)
+        return;
+    if (STAGE == STAGE_COLOURS) {
+        multiply_colours(number, across);
+        return;
+    }
+    int block = number / params.step, x = number - block * params.step;
+    int first = block * params.step * RADIX + x;
+    load_line(first, across);
+    if (INVERSE != 0 && ROTATED != 0)
+        rotate(x, true);
+    transform_held(INVERSE != 0);
+    if (INVERSE == 0 && ROTATED != 0)
+        rotate(x, false);
+    if (STAGE == STAGE_GREY) {
+        multiply_grey(first, across);
+        transform_held(true);
+    }
+    store_line(first, across);
+}

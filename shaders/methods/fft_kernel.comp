@@ -1,0 +1,46 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The kernel of a convolution at the places of the padded lines: its point at 0, what lies before it at
+// the end. Values whose light comes from the same place are added: beyond an edge all of them, with a
+// period those that are whole periods apart.
+#include "lib/block.glsl"
+
+UNIFORM_BLOCK(FFT_KERNEL_BLOCK);
+
+layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
+layout(set = 0, binding = 1) uniform sampler2D kernel;
+layout(set = 0, binding = 2) uniform writeonly image2D target;
+
+// First, last and step of the kernel's places along one axis.
+ivec3 places(int along, int padded, int boundary, int extent, int period, int before, int after)
+{
+    int offset = along <= after ? along : along - padded, centre = extent / 2;
+    ivec3 found = ivec3(centre + offset, centre + offset, 1);
+    if (offset < -before)
+        return ivec3(0, -1, 1);
+    if (boundary == BOUNDARY_EDGE) {
+        found.x = offset == -before ? 0 : found.x;
+        found.y = offset == after ? extent - 1 : found.y;
+    } else if (boundary == BOUNDARY_WRAP) {
+        found = ivec3(((found.x % period) + period) % period, extent - 1, period);
+    }
+    return found;
+}
+
+void main()
+{
+    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(at, imageSize(target))))
+        return;
+    ivec3 x = places(at.x, params.padded_x, params.boundary_x, params.extent_x, params.period_x,
+                     params.before_x, params.after_x);
+    ivec3 y = places(at.y, params.padded_y, params.boundary_y, params.extent_y, params.period_y,
+                     params.before_y, params.after_y);
+    vec4 sum = vec4(0.0);
+    for (int j = y.x; j <= y.y; j += y.z)
+        for (int i = x.x; i <= x.y; i += x.z)
+            sum += texelFetch(kernel, ivec2(i, j), 0);
+    // A grey kernel is one complex number.
+    sum = params.grey != 0 ? vec4(sum.r, 0.0, 0.0, 0.0) : sum;
+    imageStore(target, at, params.gain * sum);
+}

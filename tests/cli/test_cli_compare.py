@@ -1,0 +1,239 @@
+"""``vkbloom compare``: comparisons of image files on the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+
+from tests.images import changed, noise_image
+from vkbloom import Frames, Separable
+from vkbloom.cli.program import program
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
+from vkbloom.views.comparison import Comparison
+
+oiio = pytest.importorskip("OpenImageIO")
+metrics = pytest.importorskip("skimage.metrics")
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    """Return files by name: two that differ by one level, and some that are no match."""
+    a = noise_image(16, 24, 3, dtype="uint8")
+    b = changed(a, (3, 7, 2), int(a[3, 7, 2]) ^ 1)
+    arrays: dict[str, NDArray[Any]] = {
+        "a.png": a,
+        "b.png": b,
+        "small.png": a[:6],
+        "alpha.png": np.dstack([a, np.full((16, 24, 1), 255, np.uint8)]),
+        "float.exr": noise_image(16, 24, 3),
+        "nan.exr": changed(noise_image(16, 24, 3), (1, 2, 0), math.nan),
+    }
+    for name, array in arrays.items():
+        numbers = "uint8" if array.dtype == np.uint8 else "float"
+        save(Picture.of_values(array, numbers), tmp_path / name)
+    return {name: tmp_path / name for name in arrays}
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(program, ["compare", *(str(argument) for argument in arguments)])
+
+
+class TestCommand:
+    def test_identical_files(self, files: dict[str, Path]) -> None:
+        result = run(files["a.png"], files["a.png"])
+        assert (result.exit_code, result.stderr) == (0, "")
+        assert result.stdout.endswith("\nidentical\n")
+        assert "PSNR       inf dB\n" in result.stdout
+
+    def test_any_difference_fails_without_limits(self, files: dict[str, Path]) -> None:
+        result = run(files["a.png"], files["b.png"])
+        assert (result.exit_code, result.stderr) == (1, "")
+        assert "\nFAILED: 0.2604 % of the pixels differ; largest difference 0.003" in result.stdout
+        assert re.search(r"max error  0\.00392157 at x 7, y 3, channel B: ", result.stdout)
+        assert "pixels     0.260417 % differ\n" in result.stdout
+        assert all(re.search(rf"^  {name} +\d", result.stdout, re.M) for name in ("SSIM", "FLIP"))
+
+    @pytest.mark.parametrize(
+        ("limits", "status"),
+        [
+            ("--max-error 0.004", 0),
+            ("--max-error 0.0039", 1),
+            ("--min-ssim 0.99", 0),
+            ("--min-ssim 1", 1),
+            ("--min-psnr 60", 0),
+            ("--min-psnr 90", 1),
+            ("--max-flip 0.001", 0),
+            ("--max-flip 0", 1),
+            ("--fail-percent 0.3", 0),
+            ("--fail-percent 0.2", 1),
+            ("--fail-percent 0 --max-error 0.004", 0),
+            ("--fail-percent 0 --max-error 0.0039", 1),
+            ("--max-error 0.004 --min-psnr 90", 1),
+            ("--max-error none", 1),
+        ],
+    )
+    def test_limits(self, files: dict[str, Path], limits: str, status: int) -> None:
+        result = run(files["a.png"], files["b.png"], *limits.split())
+        assert result.exit_code == status
+        assert ("\nFAILED: " in result.stdout) is bool(status)
+        assert result.stdout.endswith("\npassed\n") is not bool(status)
+
+    @pytest.mark.parametrize(
+        ("a", "b", "reason"),
+        [
+            ("a.png", "small.png", "the sizes differ, 24 x 16 against 24 x 6"),
+            ("a.png", "alpha.png", "the numbers of channels differ, 3 against 4"),
+            ("a.png", "float.exr", "integers against floats, uint8 against float32"),
+            ("float.exr", "nan.exr", "NaN or infinity in one image only, 1 values, the first at"),
+            ("nan.exr", "float.exr", "NaN or infinity in one image only, 1 values, the first at"),
+            ("nan.exr", "nan.exr", "NaN or infinity in both images, 1 values, the first at x 2,"),
+        ],
+    )
+    def test_no_match_is_a_failure(
+        self, files: dict[str, Path], a: str, b: str, reason: str
+    ) -> None:
+        for limits in ((), ("--max-error", "1e9", "--min-ssim", "-1", "--min-psnr", "-inf")):
+            result = run(files[a], files[b], *limits)
+            assert result.exit_code == 1
+            assert f"\nFAILED: {reason}" in result.stdout
+
+    def test_nan_can_be_allowed(self, files: dict[str, Path]) -> None:
+        assert run(files["nan.exr"], files["nan.exr"], "--allow-nan").exit_code == 0
+        assert run(files["nan.exr"], files["float.exr"], "--allow-nan").exit_code == 1
+
+    def test_windows_differ(self, files: dict[str, Path], tmp_path: Path) -> None:
+        moved = tmp_path / "moved.exr"
+        spec = oiio.ImageSpec(24, 16, 3, "float")
+        spec.x, spec.full_x = 5, 5
+        writer = oiio.ImageOutput.create(str(moved))
+        assert writer.open(str(moved), spec)
+        assert writer.write_image(noise_image(16, 24, 3))
+        assert writer.close()
+        result = run(files["float.exr"], moved)
+        assert result.exit_code == 1
+        assert (
+            "FAILED: the windows differ, data at 0,0 and display 24 x 16 at 0,0 against data at "
+            "5,0 and display 24 x 16 at 5,0\n"
+        ) in result.stdout
+        assert run(moved, moved).exit_code == 0
+
+    def test_ssim_of_small_images(self, files: dict[str, Path]) -> None:
+        small = files["small.png"]
+        result = run(small, small)
+        assert result.exit_code == 0
+        assert "SSIM       not computed: a side is under the window's 7 pixels\n" in result.stdout
+        assert run(small, small, "--min-ssim", "0").exit_code == 1
+
+    def test_one_of_several_parts_is_named(self, tmp_path: Path) -> None:
+        """Files whose first parts are equal are not thereby equal."""
+        values = np.random.default_rng(0).random((8, 9, 3)).astype(np.float32)
+        for name, final in (("a.exr", values), ("b.exr", values / 2)):
+            arrays = {"glow": values, "final": final}
+            frames = Frames(arrays, timings={}, settings=Separable(), info={})
+            frames.save(tmp_path / name)
+        paths = (tmp_path / "a.exr", tmp_path / "b.exr")
+        result = run(*paths)
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert "choose one with --subimage: parts 0 glow, 1 final" in result.stderr
+        assert run(*paths, "--subimage", "0").exit_code == 0
+        assert run(*paths, "--subimage", "1").exit_code == 1
+
+    def test_json(self, files: dict[str, Path]) -> None:
+        result = run(files["a.png"], files["b.png"], "--json", "--max-error", "0.001")
+        found = json.loads(result.stdout, parse_constant=pytest.fail)
+        assert (result.exit_code, result.stderr) == (1, "")
+        assert (found["a"], found["b"]) == (str(files["a.png"]), str(files["b.png"]))
+        assert (found["passed"], found["identical"]) == (False, False)
+        (reason,) = found["failures"]
+        assert reason.startswith("largest difference 0.00392157 at x 7, y 3, channel 2: ")
+        assert reason.endswith(", over 0.001, the most allowed")
+        assert found["max_error"] == 1 / 255
+        assert found["max_error_at"] == [7, 3, 2]
+        assert len(found["max_error_values"]) == 2
+        fields = set(Comparison.__dataclass_fields__)
+        assert found.keys() == fields | {"a", "b", "passed", "failures", "identical", "diff_scale"}
+
+    def test_json_has_no_infinity(self, files: dict[str, Path]) -> None:
+        found = json.loads(
+            run(files["a.png"], files["a.png"], "--json").stdout, parse_constant=pytest.fail
+        )
+        assert (found["psnr"], found["identical"], found["passed"]) == (None, True, True)
+
+    @pytest.mark.parametrize("name", ["d.png", "d.exr"])
+    def test_difference_picture(self, files: dict[str, Path], tmp_path: Path, name: str) -> None:
+        out = tmp_path / name
+        result = run(files["a.png"], files["b.png"], "--diff", out)
+        assert result.exit_code == 1
+        assert result.stdout.endswith(f"\nwrote {out}, differences times 255\n")
+        pixels = oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT)
+        assert pixels.shape == (16, 24, 3)
+        assert np.count_nonzero(pixels) == 1
+        assert pixels[3, 7, 2] == 1
+        run(files["a.png"], files["b.png"], "--diff", out, "--diff-scale", "51")
+        assert oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT)[3, 7, 2] == pytest.approx(0.2)
+
+    def test_no_difference_picture(self, files: dict[str, Path], tmp_path: Path) -> None:
+        out = tmp_path / "d.png"
+        result = run(files["a.png"], files["small.png"], "--diff", out)
+        assert result.exit_code == 1
+        assert result.stderr == (
+            f"vkbloom: note: {out} is not written: the images have no values to compare\n"
+        )
+        assert not out.exists()
+
+    @pytest.mark.parametrize(
+        ("arguments", "status", "message"),
+        [
+            ("no.png a.png", 1, "no.png: No such file or directory"),
+            ("a.png bad.png", 1, "bad.png: is not a readable image"),
+            ("a.png b.png --subimage 1", 1, "a.png: subimage 1 is not in 0..0"),
+            ("a.png b.png --subimage -1", 2, "--subimage"),
+            ("a.png", 2, "Missing argument 'B'"),
+            ("a.png b.png --min-ssim 2", 2, "ssim: 2.0 is out of range, -1 to 1"),
+            ("a.png b.png --max-error nan", 2, "max_error: nan is out of range"),
+            ("a.png b.png --min-ssim high", 2, "'--min-ssim': 'high'"),
+            ("a.png b.png --data-range 0", 2, "data_range: 0.0 is out of range"),
+            ("a.png b.png --diff d.unknown", 2, "'.unknown' is not the extension of a writable"),
+            ("a.png b.png --diff d.png --diff-scale 0", 2, "scale: 0.0 is out of range"),
+            ("a.png b.png --diff-scale 2", 2, "--diff-scale needs --diff"),
+            ("a.png b.png --diff none/d.png", 1, "none/d.png: No such file or directory"),
+        ],
+    )
+    def test_what_cannot_be_done_is_one_line(
+        self,
+        files: dict[str, Path],
+        monkeypatch: pytest.MonkeyPatch,
+        arguments: str,
+        status: int,
+        message: str,
+    ) -> None:
+        folder = files["a.png"].parent
+        monkeypatch.chdir(folder)
+        Path("bad.png").write_bytes(b"not a PNG")
+        result = run(*arguments.split())
+        assert result.exit_code == status
+        assert result.stdout == ""
+        assert result.stderr.startswith("vkbloom: ")
+        assert result.stderr.count("\n") == 1
+        assert message in result.stderr
+        assert {path.name for path in folder.iterdir()} == {*files, "bad.png"}
+
+    def test_the_originals_frames(self, shared_data: Path) -> None:
+        frames = shared_data / "seed_frames"
+        assert run(frames / "glow.png", frames / "glow.png").exit_code == 0
+        result = run(frames / "glow.png", frames / "blur_vertical.png", "--json")
+        found = json.loads(result.stdout)
+        assert result.exit_code == 1
+        assert found["max_error"] > 0.5
+        assert 0.3 < found["ssim"] < 1
+        assert 0 < found["flip"] < 0.5
+        assert 10 < found["psnr"] < 30

@@ -1,0 +1,64 @@
+"""``vkbloom fit``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import vkbloom
+from vkbloom.cli.program import program
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[str, str]:
+    """Return an image, and itself with a bloom."""
+    image = (np.random.default_rng(0).random((32, 40, 3)) ** 8 * 10).astype(np.float32)
+    truth = vkbloom.Separable(threshold=1.3, knee=0.5, intensity=0.4)
+    names = [str(tmp_path / name) for name in ("image.exr", "target.exr")]
+    vkbloom.write(names[0], image)
+    target = vkbloom.reference.apply(image, truth)["final"]
+    vkbloom.write(names[1], target.astype(np.float32))
+    return names[0], names[1]
+
+
+def test_best_first(files: tuple[str, str], tmp_path: Path) -> None:
+    report = tmp_path / "report.html"
+    words = ["--method", "dual_kawase", "--method", "separable", "--vary", "threshold,intensity"]
+    # Without a knee, as in the defaults, the fit is near and not exact.
+    options = ["--max-calls", "60", "--bounds", "threshold=0.5:3", "-o", str(report)]
+    done = CliRunner().invoke(program, ["fit", *files, *words, *options])
+    assert done.exit_code == 0, done.output
+    lines = done.output.splitlines()
+    assert lines[0].startswith("separable: relative loss 0.")
+    assert lines[1].startswith("  vkbloom.Separable(threshold=")
+    assert lines[2].startswith("dual_kawase: ")
+    assert lines[-1] == f"wrote {report}"
+    assert report.read_text().count("radial profile") == 4
+
+
+def test_json(files: tuple[str, str]) -> None:
+    words = ["--preset", "tutorial", "--vary", "intensity", "--max-calls", "9", "--json"]
+    done = CliRunner().invoke(program, ["fit", *files, *words])
+    (found,) = json.loads(done.stdout)
+    assert found["calls"] == 9
+    assert found["varied"] == {"intensity": found["settings"]["intensity"]}
+    assert found["loss"] <= found["start_loss"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--vary", "scatter"], "vary: the method bevy has no field 'scatter'"),
+        (["--bounds", "threshold"], "--bounds: 'threshold' is not NAME=LOW:HIGH"),
+        (["--bounds", "threshold=1:x"], "--bounds: 'threshold=1:x' is not NAME=LOW:HIGH"),
+        (["--loss", "ssim"], "'ssim' is not one of 'relative'"),
+    ],
+)
+def test_wrong_use(files: tuple[str, str], words: list[str], message: str) -> None:
+    done = CliRunner().invoke(program, ["fit", *files, *words])
+    assert done.exit_code == 2
+    assert message in done.stderr

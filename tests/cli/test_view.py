@@ -1,0 +1,133 @@
+"""``vkbloom view``: what keys and the mouse do, and the command in a window."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import vkbloom
+from tests.core.builds import ROOT
+from vkbloom import Camera, Pyramid, Scene, Separable
+from vkbloom.cli.live import HELP, Live
+from vkbloom.settings import methods
+
+NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
+
+
+def pressed(live: Live, *keys: str) -> Live:
+    for key in keys:
+        live.press(key, NAMES)
+    return live
+
+
+def test_keys_change_settings() -> None:
+    live = pressed(Live(Separable(), None), "b", "up", "right", "right")
+    assert live.settings == Separable(bloom=False, blur_scale=1.1, blur_strength=1.7)
+    assert pressed(live, "b", "down", "left").settings == Separable(blur_strength=1.6)
+
+
+@pytest.mark.parametrize("method", methods().values())
+def test_scale_and_strength_stay_in_their_ranges(method: type[vkbloom.Settings]) -> None:
+    live = Live(method(), None)
+    for key in ("up", "down", "right", "left"):
+        pressed(live, *[key] * 40)
+        assert live.title(0.02).startswith(f"final: {live.settings.method} | ")
+    # The last key of each went to the lower end.
+    assert live.settings.intensity >= 0
+
+
+def test_scale_goes_from_a_tenth_to_two() -> None:
+    live = Live(Separable(), None)
+    assert pressed(live, *["up"] * 30).settings == Separable(blur_scale=2.0)
+    assert pressed(live, *["down"] * 30).settings == Separable(blur_scale=0.1)
+
+
+def test_keys_go_through_methods_and_presets() -> None:
+    live = Live(Separable(tonemap="aces", encoding="srgb"), None)
+    found = [pressed(live, "m").settings for _ in methods()]
+    assert [type(one) for one in found] == [*list(methods().values())[1:], Separable]
+    assert all((one.tonemap, one.encoding) == ("aces", "srgb") for one in found)
+    found = [pressed(live, "p").settings for _ in vkbloom.presets]
+    assert found == list(vkbloom.presets.values())
+
+
+def test_keys_choose_framebuffers_and_wishes() -> None:
+    live = pressed(Live(Pyramid(), None), "3")
+    assert live.framebuffer == "bloom"
+    assert pressed(live, "9").framebuffer == "bloom"
+    assert pressed(live, "s", "h").wishes == {"screenshot", "help"}
+    assert not live.closed
+    assert pressed(live, "escape").closed
+    assert pressed(Live(Pyramid(), None), "q").closed
+
+
+def test_time_passes_unless_it_is_paused() -> None:
+    live = Live(Separable(), None)
+    live.advance(2.0)
+    assert live.time == 0.25
+    pressed(live, "space").advance(2.0)
+    assert live.time == 0.25
+    assert "paused" in live.title(0.0)
+    pressed(live, "space").advance(7.0)
+    assert live.time == 0.125
+
+
+def test_the_mouse_moves_the_camera_of_a_scene(scene: Scene) -> None:
+    live = Live(Separable(), scene)
+    live.drag(10, 5)
+    live.scroll(1)
+    assert live.scene is not None
+    assert live.scene.camera == Camera(position=(0, 0, -9.225), rotation=(5.5, -339.0, 0.0))
+    for still in (Live(Separable(), None),):
+        still.drag(10, 5)
+        still.scroll(1)
+        assert still.scene is None
+
+
+def test_the_title_has_the_values() -> None:
+    assert Live(Separable(), None).title(0.02) == (
+        "final: separable | blur_scale 1 | blur_strength 1.5 | 20.0 ms, 50 frames/s | H: help"
+    )
+    assert "no bloom" in Live(Separable(bloom=False), None).title(0.0)
+
+
+def view(*arguments: str, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", *arguments]
+    return subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
+
+
+def test_a_window_is_controlled_by_keys(display: dict[str, str], tmp_path: Path) -> None:
+    pytest.importorskip("OpenImageIO")
+    # (The fourth framebuffer is gone without bloom.)
+    keys = "B,B,4,B,UP,1,M,P,SPACE,S,H,Q"
+    out = str(tmp_path / "out")
+    options = ("--size", "64x36", "--validation", "-o", out)
+    done = view("tests.cli.keys", keys, *options, env=display)
+    assert done.returncode == 0, done.stderr
+    assert HELP in done.stdout
+    names = sorted(path.name for path in (tmp_path / "out" / "0001").iterdir())
+    assert {"final.png", "scene.png", "depth.exr"} <= set(names)
+    picture = str(tmp_path / "out" / "0001" / "final.png")
+    done = view("vkbloom.cli", "view", picture, "--frames", "3", env=display)
+    assert done.returncode == 0, done.stderr
+    assert "3 frames in" in done.stdout
+
+
+def test_without_a_display_it_says_so() -> None:
+    pytest.importorskip("glfw")
+    names = ("DISPLAY", "WAYLAND_DISPLAY")
+    env = {name: value for name, value in os.environ.items() if name not in names}
+    done = view("vkbloom.cli", "view", env=env)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "no window: " in done.stderr
+
+
+def test_a_scene_s_options_are_refused_with_an_image() -> None:
+    pytest.importorskip("glfw")
+    done = view("vkbloom.cli", "view", "x.png", "--shading", "forward", env=dict(os.environ))
+    assert done.returncode == 2
+    assert "leave them out with an IMAGE" in done.stderr

@@ -1,0 +1,297 @@
+"""Fits: what is found, what it costs, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom import (
+    DualKawase,
+    FitResult,
+    HdrpBloom,
+    KinoBloom,
+    Pyramid,
+    Renderer,
+    Separable,
+    Settings,
+    UrpBloom,
+    reference,
+)
+from vkbloom.fits.losses import Measure, light, reduced
+from vkbloom.fits.space import space_of
+
+Image = NDArray[Any]
+
+
+def lamps(width: int = 64, height: int = 48) -> Image:
+    """A picture with light of all brightnesses, and some lamps."""
+    generator = np.random.default_rng(3)
+    image = generator.random((height, width, 3)) ** 8 * 4
+    for _ in range(8):
+        y, x = generator.integers(0, height - 4), generator.integers(0, width - 4)
+        image[y : y + 3, x : x + 3] += generator.random(3) * 8
+    return image.astype(np.float32)
+
+
+IMAGE = lamps()
+
+
+def target_of(settings: Settings, framebuffer: str = "bloom", image: Image = IMAGE) -> Image:
+    return reference.apply(image, settings)[framebuffer]
+
+
+def refused(settings: Settings) -> str:
+    """Return what the settings say of a knee, "" where they have one."""
+    try:
+        settings.replace(knee=0.5)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+class TestFound:
+    @pytest.mark.parametrize(
+        ("start", "changes", "framebuffer"),
+        [
+            (Separable(), {"blur_scale": 2.2, "blur_strength": 0.7}, "bloom"),
+            (Pyramid(levels=4), {"threshold": 1.3, "knee": 0.4, "radius": 1.2}, "bloom"),
+            (KinoBloom(), {"threshold": 1.1, "intensity": 0.3, "radius": 3.2}, "final"),
+        ],
+    )
+    def test_numbers(
+        self, renderer: Renderer, start: Settings, changes: dict[str, float], framebuffer: str
+    ) -> None:
+        target = target_of(start.replace(**changes), framebuffer)
+        found = vkbloom.fit(
+            IMAGE, target, start, list(changes), framebuffer=framebuffer, renderer=renderer
+        )
+        for name, value in changes.items():
+            assert getattr(found.settings, name) == pytest.approx(value, rel=0.01), found
+        # Half floats of the engines' buffers.
+        assert found.loss < 1e-3
+        assert found.start_loss > 0.05
+        assert found.settings.replace(**{name: getattr(start, name) for name in changes}) == start
+
+    def test_integers_flags_and_choices(self, renderer: Renderer) -> None:
+        truth = Pyramid(levels=3, firefly_filter=True, composite="screen", intensity=0.5)
+        found = vkbloom.fit(
+            IMAGE,
+            target_of(truth, "final"),
+            Pyramid(),
+            ("levels", "firefly_filter", "composite", "intensity"),
+            framebuffer="final",
+            renderer=renderer,
+        )
+        assert found.settings.replace(intensity=0.5) == truth
+        assert found.settings.intensity == pytest.approx(0.5, rel=1e-3)
+
+    def test_candidates_side_by_side(self, renderer: Renderer) -> None:
+        found = vkbloom.fit(
+            IMAGE,
+            target_of(DualKawase(levels=3, threshold=0.8, knee=0.5)),
+            [Separable(knee=0.5), DualKawase(levels=3, knee=0.5)],
+            ["threshold"],
+            renderer=renderer,
+            max_calls=30,
+        )
+        assert [one.settings.method for one in found] == ["dual_kawase", "separable"]
+        assert found[0].loss < 0.01 < found[1].loss
+        assert found[0].settings.threshold == pytest.approx(0.8, rel=0.01)
+        assert all(one.calls <= 30 for one in found)
+
+    @pytest.mark.parametrize(
+        "loss", ["l2", "log", "flip", lambda a, b: float(np.abs(a - b).mean())]
+    )
+    def test_losses(self, renderer: Renderer, loss: Any) -> None:
+        found = vkbloom.fit(
+            IMAGE[:32, :32],
+            target_of(Separable(blur_scale=1.7), image=IMAGE[:32, :32]),
+            Separable(),
+            "blur_scale",
+            loss=loss,
+            renderer=renderer,
+            max_calls=60,
+        )
+        assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.7, rel=0.01)
+        assert found.loss < 1e-3 < found.start_loss
+        assert found.loss_name == (loss if isinstance(loss, str) else "<lambda>")
+
+    def test_coarse_to_fine(self, renderer: Renderer) -> None:
+        image = lamps(800, 96)
+        sizes = []
+        truth = Separable(blur_scale=2.4, threshold=1.2, knee=0.5)
+
+        class Watched:
+            """A renderer that keeps the widths of what it is given."""
+
+            def __getattr__(self, name: str) -> Any:
+                return getattr(renderer, name)
+
+            def apply(self, image: vkbloom.Image, *arguments: Any, **options: Any) -> Any:
+                sizes.append(image.shape[1])
+                return renderer.apply(image, *arguments, **options)
+
+        found = vkbloom.fit(
+            image,
+            target_of(truth, image=image),
+            Separable(threshold=0.5, knee=0.5),
+            ["blur_scale", "threshold"],
+            renderer=cast("Renderer", Watched()),
+        )
+        assert found.settings.to_dict()["blur_scale"] == pytest.approx(2.4, rel=0.01)
+        assert found.settings.threshold == pytest.approx(1.2, rel=0.01)
+        # Reduced four times, then as it is, and the frames of the result.
+        assert sizes == sorted(sizes)
+        assert set(sizes) == {200, 800}
+        assert len(sizes) == found.calls + 1
+
+    def test_same_result_again(self, renderer: Renderer) -> None:
+        target = target_of(Pyramid(threshold=1.2, levels=4))
+        first, second = (
+            vkbloom.fit(IMAGE, target, Pyramid(), ["threshold"], renderer=renderer, max_calls=20)
+            for _ in range(2)
+        )
+        assert first.settings == second.settings
+        np.testing.assert_array_equal(first.history, second.history)
+
+    def test_uint8(self, renderer: Renderer) -> None:
+        image = np.rint(np.clip(IMAGE, 0, 1) * 255).astype(np.uint8)
+        truth = Pyramid(levels=3, threshold=0.6, knee=0.5, intensity=2.0)
+        target = np.rint(np.clip(target_of(truth, "final", image), 0, 255)).astype(np.uint8)
+        found = vkbloom.fit(
+            image,
+            renderer.apply(image, truth)["final"],
+            Pyramid(levels=3, knee=0.5),
+            ["threshold", "intensity"],
+            framebuffer="final",
+            renderer=renderer,
+        )
+        assert target.shape == found.target.shape
+        assert found.settings.threshold == pytest.approx(0.6, rel=0.05)
+        assert found.loss < 0.01
+
+
+@pytest.fixture(scope="module")
+def found(renderer: Renderer) -> FitResult:
+    target = target_of(Pyramid(levels=3, radius=1.4))
+    image = renderer.upload(IMAGE)
+    return vkbloom.fit(image, target, Pyramid(levels=3), ["radius"], renderer=renderer)
+
+
+class TestResult:
+    def test_figures(self, found: FitResult, renderer: Renderer) -> None:
+        assert len(found.history) == found.calls
+        assert found.history[0] == found.start_loss
+        assert found.history.min() == found.loss
+        np.testing.assert_array_equal(
+            found.frames["bloom"], renderer.apply(IMAGE, found.settings)["bloom"]
+        )
+        np.testing.assert_allclose(found.residual, light(found.frames["bloom"]) - found.target)
+        assert np.linalg.norm(found.residual) / np.linalg.norm(found.target) == pytest.approx(
+            found.loss
+        )
+        assert repr(found).startswith("<vkbloom.FitResult of pyramid: radius=1.4; loss ")
+
+    def test_report(self, found: FitResult) -> None:
+        page = found._repr_html_()
+        assert page.count("data:image/png;base64,") == 3
+        assert page.count("<polyline") == 3
+        for text in ("target", "difference", "radial profile", "best so far", "radius=1.4"):
+            assert text in page
+        assert "nan" not in page.partition("<code")[0].replace("nance", "")
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("start", "vary", "options", "message"),
+        [
+            (Pyramid(), ["scatter"], {}, "vary: the method pyramid has no field 'scatter'"),
+            ([Pyramid(), UrpBloom()], ["levels"], {}, "vary: the method urp has no field 'levels'"),
+            (Pyramid(), ["level_weights"], {}, "vary: 'level_weights' is not a number"),
+            (Pyramid(), [], {}, "vary: empty"),
+            (Pyramid(), ["knee", "knee"], {}, "vary: knee, knee has a field twice"),
+            (Pyramid(), ["intensity"], {}, "vary: intensity has no effect on bloom; give frame"),
+            (HdrpBloom(), ["threshold"], {}, "vary: threshold: 0.0 is not None"),
+            (vkbloom.BlenderGlare(), ["maximum"], {}, "vary: maximum: None is not a number"),
+            ([], ["levels"], {}, "settings: empty"),
+            (Pyramid(), ["radius"], {"loss": "psnr"}, "loss: 'psnr' is not one of relative, l2"),
+            (Pyramid(), ["radius"], {"max_calls": 0}, "max_calls: 0 is outside 1 to"),
+            (Pyramid(), ["radius"], {"bounds": {"levels": (1, 3)}}, "bounds: 'levels' is not amo"),
+            (Pyramid(), ["radius"], {"bounds": {"radius": (1, 17)}}, "bounds: radius: 17 is out"),
+            (Pyramid(), ["radius"], {"bounds": {"radius": (2, 1)}}, "bounds: radius: 2 is not un"),
+            (
+                Pyramid(),
+                ["composite"],
+                {"bounds": {"composite": ["burn"]}, "framebuffer": "final"},
+                "bounds: composite: 'burn' is not one of add, mix, screen",
+            ),
+            (Pyramid(), ["radius"], {"framebuffer": "down_0"}, "framebuffer: down_0 of the method"),
+            (Pyramid(), ["radius"], {"framebuffer": "blur"}, "blur"),
+        ],
+    )
+    def test_arguments(
+        self, renderer: Renderer, start: Any, vary: list[str], options: Any, message: str
+    ) -> None:
+        with pytest.raises(ValueError, match=message):
+            vkbloom.fit(IMAGE, IMAGE, start, vary, renderer=renderer, **options)
+
+    def test_targets(self, renderer: Renderer) -> None:
+        def fitted(target: Any, **options: Any) -> FitResult:
+            return vkbloom.fit(IMAGE, target, Separable(), "loops", renderer=renderer, **options)
+
+        with pytest.raises(ValueError, match="target: 63 x 48 is not the image's size, 64 x 48"):
+            fitted(IMAGE[:, 1:])
+        with pytest.raises(ValueError, match=r'target: it is black.*; use "l2"'):
+            fitted(np.zeros_like(IMAGE))
+        with pytest.raises(ValueError, match=r"target: shape \(48, 64\) is not"):
+            fitted(IMAGE[..., 0])
+        with pytest.raises(ValueError, match="renderer: an uploaded image needs the renderer"):
+            vkbloom.fit(renderer.upload(IMAGE), IMAGE, Separable(), "loops")
+        assert fitted(np.zeros_like(IMAGE), loss="l2", max_calls=1).calls == 1
+
+
+class TestParts:
+    @pytest.mark.parametrize("name", list(vkbloom.presets))
+    def test_every_field_of_a_preset_has_a_place(self, name: str) -> None:
+        settings = vkbloom.presets[name]
+        with pytest.raises(ValueError, match="it can vary") as caught:
+            space_of(settings, ["-"], {}, 9.0)
+        names = str(caught.value).partition("it can vary ")[2].split(", ")
+        assert "intensity" in names
+        for one in names:
+            value = getattr(settings, one)
+            if value is None or (one == "knee" and "no knee" in refused(settings)):
+                continue
+            (axis,) = space_of(settings, [one], {}, 9.0).axes
+            assert axis.value(axis.coordinate(value)) == pytest.approx(value)
+            # The ends are what the settings accept.
+            ends = {settings.replace(**{one: axis.value(end)}) for end in (0.0, 1.0)}
+            assert len(ends) == 2 or len(axis.choices) == 1
+
+    def test_bounds_narrow_an_axis(self) -> None:
+        (axis,) = space_of(Pyramid(), ["radius"], {"radius": (2, 3)}, 1.0).axes
+        assert (axis.value(0.0), axis.value(1.0)) == (2.0, 3.0)
+        # The start is outside, and moves to the bound.
+        assert axis.value(axis.coordinate(1.0)) == 2.0
+
+    def test_residuals_have_the_loss_as_their_norm(self) -> None:
+        generator = np.random.default_rng(0)
+        a, b = generator.random((2, 20, 30, 3))
+        for loss in ("relative", "l2", "log"):
+            measure = Measure(b, cast("Any", loss))
+            assert np.linalg.norm(measure.residual(a)) == pytest.approx(measure(a))
+        assert Measure(b, "relative")(1.1 * b) == pytest.approx(0.1)
+        assert Measure(b, "l2")(b + 0.3) == pytest.approx(0.3)
+        assert Measure(b + 1, "log")(10 * (b + 1)) == pytest.approx(1.0)
+        assert Measure(b, "l2")(np.full_like(b, 1e300)) == np.finfo(np.float64).max
+
+    def test_reduction(self) -> None:
+        image = np.arange(2 * 5 * 3, dtype=np.uint8).reshape(2, 5, 3)
+        small = reduced(image, 2)
+        assert small.dtype == np.uint8
+        np.testing.assert_array_equal(small, [[[9, 10, 11], [15, 16, 17]]])
+        assert reduced(image, 1) is image

@@ -1,0 +1,249 @@
+"""Convolution on the device against the reference, and that against a plain sum."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vkbloom import Convolution, OutOfMemoryError, Renderer, Scene, Settings, psf, reference
+from vkbloom.reference.convolution import convolve, prefiltered
+
+BOUNDARIES = ("zero", "edge", "wrap", "wrap_x")
+
+
+def kernel_of(width: int, height: int, channels: int = 3) -> NDArray[np.float32]:
+    """Return a kernel without any symmetry."""
+    shape = (height, width, 3) if channels == 3 else (height, width)
+    return (np.random.default_rng(width * 100 + height).random(shape) ** 4).astype(np.float32)
+
+
+def image_of(width: int, height: int, channels: int = 3, dtype: str = "float32") -> NDArray[Any]:
+    pixels = np.random.default_rng(height).random((height, width, channels)) ** 8 * 10
+    if dtype == "uint8":
+        pixels = np.minimum(pixels, 1) * 255
+    return pixels.astype(dtype)
+
+
+def assert_close(renderer: Renderer, image: NDArray[Any], settings: Settings) -> None:
+    """Compare all framebuffers with the reference: within 1e-5 of the maximum in single floats."""
+    steps = {"float32": 1e-5, "float16": 2**-10, "uint8": 1.01 / 255}
+    frames, expected = renderer.apply(image, settings), reference.apply(image, settings)
+    assert list(frames) == list(expected)
+    for name, array in frames.items():
+        real = array / 255 if array.dtype == np.uint8 else array.astype(np.float64)
+        most = 1.0 if array.dtype == np.uint8 else np.abs(expected[name]).max()
+        error = np.abs(real - expected[name]).max()
+        assert error <= steps[array.dtype.name] * max(most, 1e-6), (name, error, most)
+
+
+def sum_of(glow: NDArray[Any], kernel: NDArray[Any], boundary: str) -> NDArray[Any]:
+    """Return the convolution term by term."""
+    height, width = glow.shape[:2]
+    modes: dict[str, Any] = {"zero": "wrap", "edge": "clip", "wrap": "wrap"}
+    down, across = ("edge", "wrap") if boundary == "wrap_x" else (boundary, boundary)
+    result = np.zeros_like(glow)
+    for j, i in itertools.product(*map(range, kernel.shape[:2])):
+        rows = np.arange(height) - (j - kernel.shape[0] // 2)
+        columns = np.arange(width) - (i - kernel.shape[1] // 2)
+        inside = np.ones((height, width), bool)
+        if boundary == "zero":
+            inside &= ((rows >= 0) & (rows < height))[:, None]
+            inside &= (columns >= 0) & (columns < width)
+        moved = glow.take(rows, axis=0, mode=modes[down])
+        moved = moved.take(columns, axis=1, mode=modes[across])
+        result += kernel[j, i] * moved * inside[..., None]
+    return result
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize(("size", "kernel"), [((5, 4), (3, 2)), ((3, 4), (8, 9)), ((1, 1), (4, 3))])
+def test_the_reference_is_a_sum(
+    boundary: str, size: tuple[int, int], kernel: tuple[int, int]
+) -> None:
+    glow, spread = image_of(*size).astype(float), kernel_of(*kernel).astype(float)
+    np.testing.assert_allclose(
+        convolve(glow, spread, boundary), sum_of(glow, spread, boundary), rtol=1e-9, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize(
+    ("size", "kernel", "channels"),
+    [
+        ((33, 21), (7, 4), 3),
+        ((33, 21), (90, 55), 1),
+        ((1, 1), (5, 5), 3),
+        ((16, 9), (16, 9), 3),
+    ],
+    ids=str,
+)
+def test_convolution(
+    renderer: Renderer,
+    boundary: Any,
+    size: tuple[int, int],
+    kernel: tuple[int, int],
+    channels: int,
+) -> None:
+    """Odd sizes, kernels larger than the image, colour and grey."""
+    settings = Convolution(kernel_of(*kernel, channels), boundary=boundary)
+    assert_close(renderer, image_of(*size), settings)
+
+
+@pytest.mark.parametrize("dtype", ["float16", "uint8"])
+def test_formats(renderer: Renderer, dtype: str) -> None:
+    settings = Convolution(kernel_of(9, 5), threshold=0.2, knee=0.5, composite="mix", intensity=0.5)
+    assert_close(renderer, image_of(40, 23, 4, dtype), settings)
+
+
+def test_long_lines(renderer: Renderer) -> None:
+    """Lines of more than 1024 elements have larger radices, of more than 4096 three stages."""
+    assert_close(renderer, image_of(4201, 3), Convolution(kernel_of(101, 2), boundary="edge"))
+    # In colour: the frequencies of the other sign lie elsewhere.
+    assert_close(renderer, image_of(4, 1100), Convolution(kernel_of(3, 99)))
+
+
+def test_other_sizes(renderer: Renderer) -> None:
+    """The kernel is resampled to the bloom buffers, and the bloom enlarged."""
+    image = image_of(61, 34)
+    for scale in (0.5, 2.0):
+        assert_close(renderer, image, Convolution(kernel_of(9, 8), bloom_scale=scale))
+    assert_close(renderer, image, Convolution(psf.spencer(), bloom_size=(20, 31)))
+
+
+def test_alpha_and_mask(renderer: Renderer) -> None:
+    image = np.clip(image_of(31, 22, 4), 0, 1)
+    mask = np.random.default_rng(3).random((22, 31), np.float32)
+    settings = Convolution(kernel_of(5, 7), alpha="blur")
+    frames = renderer.apply(image, settings, mask=mask)
+    expected = reference.apply(image, settings, mask=mask)
+    for name in ("bloom", "final"):
+        np.testing.assert_allclose(frames[name], expected[name], atol=1e-5)
+
+
+def test_prefilter(renderer: Renderer) -> None:
+    """Of Unreal Engine: luminances above 7 become 15 (L - 7) + 7."""
+    image = np.full((8, 8, 3), 8.0, np.float32)
+    filtered = prefiltered(image[:1, :1].astype(float), (7, 15000, 15))
+    np.testing.assert_allclose(filtered, 22)
+    np.testing.assert_allclose(prefiltered(image[:1, :1] / 2, (7, 15000, 15)), 4)
+    kernel = np.pad(np.ones((3, 3), np.float32), 3)
+    kernel[4, 4] = 9
+    for prefilter in ((7, 15000, 15), (7, 1, 15)):
+        spread = psf.unreal(kernel, prefilter=prefilter)
+        assert_close(renderer, image, Convolution(spread, normalize=False, boundary="wrap"))
+
+
+def test_kernels_are_made_once(renderer: Renderer) -> None:
+    """A kernel's spectrum runs again only when the kernel or a size changes."""
+    settings, image = Convolution(kernel_of(5, 5)), image_of(32, 18)
+    with Renderer("software", validation=True) as own:
+        assert list(own.apply(image, settings).timings) == [
+            "glow",
+            "kernel",
+            "spectrum",
+            "bloom",
+            "final",
+        ]
+        assert list(own.apply(image, settings.replace(intensity=0.5)).timings) == ["final"]
+        assert list(own.apply(image * 2, settings).timings) == [
+            "glow",
+            "spectrum",
+            "bloom",
+            "final",
+        ]
+        other = own.apply(image, settings.replace(psf=kernel_of(5, 5) + 1))
+        assert "kernel" in other.timings
+        again = own.apply(image, settings)
+        kernel = reference.apply(image, settings)["kernel"]
+        np.testing.assert_array_equal(again["kernel"], kernel.astype(np.float32))
+
+
+def test_batches(renderer: Renderer) -> None:
+    """Each request has its own kernel."""
+    image = image_of(24, 17)
+    sequence = [Convolution(psf.gaussian(sigma), kernel_size=(9, 9)) for sigma in (0.5, 1, 2)]
+    for frames, settings in zip(renderer.apply_many(image, sequence), sequence, strict=True):
+        expected = reference.apply(image, settings)
+        np.testing.assert_allclose(frames["bloom"], expected["bloom"], atol=1e-5 * 10)
+        np.testing.assert_allclose(frames["kernel"], expected["kernel"], atol=1e-7)
+
+
+def test_settings() -> None:
+    array = kernel_of(3, 4)
+    settings = Convolution(array)
+    assert settings.psf == psf.samples(array)
+    array[:] = 0
+    assert np.asarray(settings.psf).max() > 0
+    assert settings == Convolution(kernel_of(3, 4))
+    assert hash(settings) == hash(Convolution(kernel_of(3, 4)))
+    for one in (settings, Convolution(psf.aperture(psf.iris(size=16)), boundary="wrap_x")):
+        again: Settings = Settings.from_json(one.to_json())
+        assert again == one
+        assert hash(again) == hash(one)
+    assert Convolution() == Convolution(psf.spencer())
+
+
+def test_kernels() -> None:
+    frame = (40, 20)
+    assert Convolution(psf.spencer()).kernel(frame).shape == (39, 79, 3)
+    assert Convolution(psf.spencer(), kernel_size=(9, 7)).kernel(frame).shape == (7, 9, 3)
+    assert Convolution(kernel_of(5, 6)).kernel(frame).shape == (6, 5, 3)
+    np.testing.assert_allclose(Convolution(kernel_of(5, 6)).kernel(frame).sum(axis=(0, 1)), 1)
+    raw = Convolution(kernel_of(5, 6), normalize=False)
+    np.testing.assert_array_equal(raw.kernel(frame), kernel_of(5, 6))
+    half = Convolution(psf.gaussian(2), kernel_size=(21, 21)).kernel(frame, (20, 5))
+    assert half.shape == (7, 11, 3)
+    # 40 pixels in 50 degrees, or as many as are given.
+    assert (
+        Convolution(psf.spencer(), kernel_size=(5, 5), pixels_per_degree=0.8).kernel(frame)
+        == Convolution(psf.spencer(), kernel_size=(5, 5)).kernel(frame)
+    ).all()
+
+
+def test_gain() -> None:
+    gains = reference.gain(Convolution([[[1, 2, 3]]], normalize=False))
+    np.testing.assert_allclose(gains, [1, 2, 3])
+    np.testing.assert_allclose(reference.gain(Convolution(kernel_of(3, 3))), 1)
+
+
+def test_a_flat_image(renderer: Renderer) -> None:
+    """Keeps its value where the boundary is an edge."""
+    image = np.full((9, 14, 3), 0.5, np.float32)
+    bloom = renderer.apply(image, Convolution(kernel_of(20, 9), boundary="edge"))["bloom"]
+    np.testing.assert_allclose(bloom[..., :3], 0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Convolution(np.ones((2, 2, 4))), r"psf: shape \(2, 2, 4\) is not \(h, w\)"),
+        (lambda: Convolution([[np.nan]]), "psf: some numbers are not finite"),
+        (lambda: Convolution({"psf": "lens"}), "psf: 'lens' is not one of"),
+        (lambda: Convolution(boundary=cast("Any", "mirror")), "boundary: 'mirror' is not one of"),
+        (lambda: Convolution(normalize=cast("Any", 2)), "normalize: 2 is not True or False"),
+        (lambda: Convolution(pixels_per_degree=0), "pixels_per_degree: 0 is out of range"),
+        (lambda: Convolution(kernel_size=(0, 3)), "kernel_size: .* out of range"),
+    ],
+)
+def test_wrong_settings(make: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_a_kernel_without_a_sum(renderer: Renderer) -> None:
+    settings = Convolution([[1, -1]])
+    with pytest.raises(ValueError, match="psf: the sum of its red is 0, not above 0; use norm"):
+        renderer.apply(image_of(4, 4), settings)
+    assert_close(renderer, image_of(4, 4), settings.replace(normalize=False))
+
+
+def test_too_large(renderer: Renderer, scene: Scene) -> None:
+    """An error of the plan, with the memory that is needed, before any work."""
+    size = (8000, 8000)
+    # Three images of 8192 x 8192 or less, 16 bytes a texel.
+    with pytest.raises(OutOfMemoryError, match=r"[34]\d{3} MiB of images are needed"):
+        renderer.plan(scene, Convolution(kernel_of(3, 3), bloom_size=size), size)
