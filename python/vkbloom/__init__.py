@@ -44,7 +44,7 @@ from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from vkbloom import psf, reference
-    from vkbloom.fits import FitResult, fit
+    from vkbloom.fits import FitResult, fit, fit_pyramid, translate
     from vkbloom.grid import reductions
     from vkbloom.grid.checking import GridReport, check_grid
     from vkbloom.grid.curves import response_curves
@@ -71,9 +71,11 @@ _LATE = {
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
     "fit": "vkbloom.fits",
+    "fit_pyramid": "vkbloom.fits",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
     "read": "vkbloom.io.array_files",
     "response_curves": "vkbloom.grid.curves",
+    "translate": "vkbloom.fits",
     "write": "vkbloom.io.array_files",
 }
 
@@ -115,6 +117,7 @@ __all__ = [
     "contact_sheet",
     "explore",
     "fit",
+    "fit_pyramid",
     "gaussian_weights",
     "grid_to_zarr",
     "presets",
@@ -123,6 +126,7 @@ __all__ = [
     "reductions",
     "reference",
     "response_curves",
+    "translate",
     "write",
 ]
 

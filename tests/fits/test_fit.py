@@ -259,21 +259,21 @@ class TestParts:
     def test_every_field_of_a_preset_has_a_place(self, name: str) -> None:
         settings = vkbloom.presets[name]
         with pytest.raises(ValueError, match="it can vary") as caught:
-            space_of(settings, ["-"], {}, 9.0)
+            space_of(settings, ["-"], {}, 9.0, 512)
         names = str(caught.value).partition("it can vary ")[2].split(", ")
         assert "intensity" in names
         for one in names:
             value = getattr(settings, one)
             if value is None or (one == "knee" and "no knee" in refused(settings)):
                 continue
-            (axis,) = space_of(settings, [one], {}, 9.0).axes
+            (axis,) = space_of(settings, [one], {}, 9.0, 512).axes
             assert axis.value(axis.coordinate(value)) == pytest.approx(value)
             # The ends are what the settings accept.
             ends = {settings.replace(**{one: axis.value(end)}) for end in (0.0, 1.0)}
             assert len(ends) == 2 or len(axis.choices) == 1
 
     def test_bounds_narrow_an_axis(self) -> None:
-        (axis,) = space_of(Pyramid(), ["radius"], {"radius": (2, 3)}, 1.0).axes
+        (axis,) = space_of(Pyramid(), ["radius"], {"radius": (2, 3)}, 1.0, 48).axes
         assert (axis.value(0.0), axis.value(1.0)) == (2.0, 3.0)
         # The start is outside, and moves to the bound.
         assert axis.value(axis.coordinate(1.0)) == 2.0

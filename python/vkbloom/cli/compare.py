@@ -17,7 +17,13 @@ from vkbloom.cli.image_files import check_part_is_given, note, read, subimage_op
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.io import image_writing
 from vkbloom.io.images import Picture, StoredImage
-from vkbloom.views.comparison import Comparison, compare, difference
+from vkbloom.views.comparison import (
+    ALL_METRICS,
+    USUAL_METRICS,
+    Comparison,
+    compare,
+    difference,
+)
 from vkbloom.views.tolerances import Tolerances, failures
 
 
@@ -86,6 +92,19 @@ def tolerances_of(
     help="Data range for SSIM and PSNR [default 1 for integers; for floats the range of the "
     "values, 0 and 1]",
 )
+@click.option(
+    "--pixels-per-degree",
+    metavar="X",
+    type=click.FLOAT,
+    help="Pixels that one degree of the observer's view spans, for FLIP [default 67]",
+)
+@click.option(
+    "--nits-per-unit",
+    metavar="X",
+    type=click.FLOAT,
+    help="Luminance of a linear value of 1 in cd/m2; with --pixels-per-degree, ColorVideoVDP is "
+    "computed, where its package is installed.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @subimage_option
 @_limit("max_error", "Largest allowed difference of a value; integers are scaled to 0..1")
@@ -104,6 +123,8 @@ def command(
     diff_scale: float | None,
     allow_nan: bool,
     data_range: float | None,
+    pixels_per_degree: float | None,
+    nits_per_unit: float | None,
     as_json: bool,
     subimage: int,
     **limits: float | None,
@@ -139,6 +160,9 @@ def command(
             threshold=tolerances.atol or 0.0,
             allow_nan=allow_nan,
             data_range=data_range,
+            metrics=USUAL_METRICS if nits_per_unit is None else ALL_METRICS,
+            nits_per_unit=nits_per_unit,
+            pixels_per_degree=pixels_per_degree,
         )
     found = _with_windows(found, a, b)
     failed = tuple(reason for _, reason in failures(found, tolerances, tolerances.metrics))
@@ -237,6 +261,8 @@ def _figures(found: Comparison, channels: tuple[str, ...]) -> list[str]:
         "SSIM": _shown(found.ssim),
         "FLIP": _shown(found.flip),
     }
+    if found.cvvdp is not None:
+        rows["CVVDP"] = f"{_shown(found.cvvdp)} JOD"
     for name, reason in found.not_computed.items():
         rows[name.upper()] = f"not computed: {reason}"
     return [f"  {label:<11}{text}" for label, text in rows.items()]

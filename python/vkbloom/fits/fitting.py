@@ -96,7 +96,8 @@ def fit(
         framebuffer and target, both (H, W, 3) of float64, that returns a number.
     bounds : mapping of str to (float, float), optional
         Narrower ranges of varied fields; of a choice, the values to try. Default: the ranges that
-        the settings declare; a threshold ends at the brightest value of the image.
+        the settings declare; a threshold ends at the brightest value of the image, and a size of
+        buffers at the image's height.
     renderer : Renderer, optional
         Default: a new one.
     max_calls : int
@@ -123,6 +124,8 @@ def fit(
 
     See Also
     --------
+    translate : Settings of another method, without a picture.
+    fit_pyramid : The weights of a pyramid for a point-spread function.
     Renderer.grid : All combinations of some values.
 
     Notes
@@ -167,7 +170,10 @@ def fit(
     wanted = light(check_image(target, "target"))
     pixels = None if isinstance(image, Image) else check_image(image)
     brightest = math.inf if pixels is None else float(light(pixels).max())
-    spaces = [space_of(check_settings(one), names, bounds or {}, brightest) for one in candidates]
+    spaces = [
+        space_of(check_settings(one), names, bounds or {}, brightest, len(wanted))
+        for one in candidates
+    ]
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
     with opened as used:
         stages = _stages(used, image, pixels, wanted, measured)

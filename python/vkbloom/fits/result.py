@@ -54,7 +54,7 @@ class FitResult:
     See Also
     --------
     vkbloom.fit : Returns it.
-    vkbloom.Renderer.grid : All combinations of some values.
+    vkbloom.translate, vkbloom.fit_pyramid : Return it, too.
 
     Examples
     --------

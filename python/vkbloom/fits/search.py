@@ -31,6 +31,7 @@ _ENOUGH: Final = 2e-5
 _CLOSE: Final = 5e-4
 # Of other integers and choices, the best that numbers follow before they are given up.
 _FOLLOWED: Final = 3
+_LEAPS: Final = 8
 # A logarithmic axis that is this many times as wide as its scale is sampled near the start.
 _ENDLESS: Final = 100.0
 
@@ -125,6 +126,8 @@ class Search:
                 # Least squares stand still where pixels cross a hard threshold one by one.
                 self._along_lines()
                 self._descend(self.best, _STEPS[0])
+            if self.loss > _CLOSE:
+                self._leap()
 
     def _values(self, point: Point) -> NDArray[np.float64]:
         """Render, and keep count."""
@@ -143,6 +146,18 @@ class Search:
         self._values(point)
         return self.history[-1]
 
+    @property
+    def _ends(self) -> tuple[Point, Point]:
+        """The coordinates between which all of the space is searched."""
+        wide = np.array(
+            [
+                axis.scale is not None and axis.high > _ENDLESS * axis.scale
+                for axis in self._space.axes
+            ]
+        )
+        low = np.where(wide, np.maximum(self._space.origin - _REACH, 0), 0.0)
+        return low, np.where(wide, np.minimum(self._space.origin + _REACH, 1), 1.0)
+
     def _samples(self) -> list[Point]:
         """Return points that fill the space, with neighbours that differ in cheap fields."""
         qmc = import_extra("scipy.stats", "fit", "Fitting").qmc
@@ -152,14 +167,7 @@ class Search:
         # Each value of the dear fields with two of the cheap ones.
         if dear.any() and not dear.all():
             units[:, dear] = np.repeat(units[: -(-len(units) // 2), dear], 2, axis=0)[: len(units)]
-        wide = np.array(
-            [
-                axis.scale is not None and axis.high > _ENDLESS * axis.scale
-                for axis in self._space.axes
-            ]
-        )
-        low = np.where(wide, np.maximum(self._space.origin - _REACH, 0), 0.0)
-        high = np.where(wide, np.minimum(self._space.origin + _REACH, 1), 1.0)
+        low, high = self._ends
         return list(low + (high - low) * units)
 
     def _descend(self, point: Point, step: float, most: int = 30) -> tuple[float, Point]:
@@ -256,6 +264,21 @@ class Search:
                 optimize.minimize_scalar(
                     loss, bounds=ends, method="bounded", options={"maxiter": 10}
                 )
+
+    def _leap(self) -> None:
+        """Try distant values of single numbers: some have a valley for each number of levels."""
+        places = (np.arange(_LEAPS) + 0.5) / _LEAPS
+        for index in np.flatnonzero(self._space.is_number):
+            low, high = self._ends[0][index], self._ends[1][index]
+            tried = []
+            for place in low + (high - low) * places:
+                point = self.best.copy()
+                point[index] = place
+                tried.append((self._loss(point), point))
+            for _, point in sorted(tried, key=lambda one: one[0])[:_FOLLOWED]:
+                self._descend(point, _STEPS[0], most=6)
+                if self.loss <= _CLOSE:
+                    return
 
     def _walk(self) -> None:
         """Try other integers and choices, and let the numbers follow."""

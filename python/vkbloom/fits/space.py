@@ -125,7 +125,9 @@ class Space:
         return self.start.replace(**values)
 
 
-def space_of(settings: Settings, vary: Sequence[str], bounds: Bounds, brightest: float) -> Space:
+def space_of(
+    settings: Settings, vary: Sequence[str], bounds: Bounds, brightest: float, height: int
+) -> Space:
     """Return the space of the varied fields of some settings.
 
     Parameters
@@ -136,6 +138,8 @@ def space_of(settings: Settings, vary: Sequence[str], bounds: Bounds, brightest:
         Narrower bounds of some of them; the others have their declared ranges.
     brightest : float
         Thresholds above it let nothing through and are left out.
+    height : int
+        Of the image in pixels. Buffers with more rows take long, and add nothing.
 
     Raises
     ------
@@ -154,11 +158,14 @@ def space_of(settings: Settings, vary: Sequence[str], bounds: Bounds, brightest:
             )
         kind = _kind(settings, name)
         if kind is None:
-            raise ValueError(f"vary: {name!r} is not a number, a flag or a choice; set it")
+            raise ValueError(
+                f"vary: {name!r} is not a number, a flag or a choice; set it, or fit weights by "
+                "vkbloom.fit_pyramid"
+            )
         if kind == "choice":
             axes.append(_choice(settings, name, bounds))
         else:
-            axes.append(_number(settings, fields[name], kind, bounds, brightest))
+            axes.append(_number(settings, fields[name], kind, bounds, (brightest, height)))
     space = Space(start=settings, axes=tuple(axes))
     try:
         for end in (0.0, 1.0):
@@ -208,7 +215,7 @@ def _number(
     field: dataclasses.Field[Any],
     kind: Literal["number", "integer"],
     bounds: Bounds,
-    brightest: float,
+    limits: tuple[float, int],
 ) -> Axis:
     low, high = field_range(field)
     if field.name in bounds:
@@ -219,13 +226,15 @@ def _number(
         if not low < high:
             raise ValueError(f"bounds: {field.name}: {low:g} is not under {high:g}")
     elif field.name == "threshold":
-        high = min(high, max(brightest, 1e-3))
+        high = min(high, max(limits[0], 1e-3))
+    elif field.metadata.get("unit") == "pixel":
+        high = min(high, max(limits[1], low + 1))
     value = _begun(settings, field.name)
     if value is None:
         raise ValueError(
             f"vary: {field.name}: None is not a number to start from; replace it by one"
         )
-    default = getattr(type(settings)(), field.name)
-    usual = max(abs(float(default or 0.0)), abs(float(value))) or 1.0
+    default = field.default if isinstance(field.default, int | float) else 0.0
+    usual = max(abs(float(default)), abs(float(value))) or 1.0
     is_wide = low >= 0 and high - low > _WIDE * usual
     return Axis(name=field.name, kind=kind, low=low, high=high, scale=usual if is_wide else None)

@@ -8,8 +8,10 @@ callable of `Frames` that returns a number or a small array. If it has an attrib
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from vkbloom.frames import Frames
 from vkbloom.views.comparison import Metric, compare
 
-__all__ = ["FLIP", "PSNR", "SSIM", "EncircledEnergy", "Max", "Mean", "Reduction"]
+__all__ = ["FLIP", "PSNR", "SSIM", "ColorVideoVDP", "EncircledEnergy", "Max", "Mean", "Reduction"]
 
 # Luminance of linear colours with the primaries of Rec. ITU-R BT.709.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -256,14 +258,20 @@ class Comparing(Reduction):
     data_range : float, optional
         Data range of the metric. Default: 1 for integers; for floats the range of the values, 0
         and 1.
+    nits_per_unit : float, optional
+        Luminance of a linear value of 1 in cd/m2, as for `vkbloom.views.comparison.compare`.
+    pixels_per_degree : float, optional
+        Pixels for each degree of the observer's view; FLIP's default is 67.02.
 
     See Also
     --------
-    SSIM, PSNR, FLIP
+    SSIM, PSNR, FLIP, ColorVideoVDP
     """
 
     against: NDArray[Any] | Mapping[str, Any]
     data_range: float | None = None
+    nits_per_unit: float | None = None
+    pixels_per_degree: float | None = None
 
     metric: ClassVar[Metric]
 
@@ -284,6 +292,8 @@ class Comparing(Reduction):
             allow_nan=True,
             data_range=self.data_range,
             metrics=[self.metric],
+            nits_per_unit=self.nits_per_unit,
+            pixels_per_degree=self.pixels_per_degree,
         )
         if found.percent_over is None:
             raise ValueError(f"against: {'; '.join(found.mismatches)}")
@@ -386,3 +396,54 @@ class FLIP(Comparing):
     """
 
     metric: ClassVar[Metric] = "flip"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColorVideoVDP(Comparing):
+    """Visible differences to a reference by ColorVideoVDP, in just-objectionable differences.
+
+    10 where no difference is visible, less by one for each step that an observer objects to. The
+    figure is of a display that shows `nits_per_unit` for a linear value of 1, seen with
+    `pixels_per_degree`; without these it means nothing, and both are needed. Where the package is
+    missing (``pip install vkbloom[cvvdp]``, which brings PyTorch), the figure is NaN, with a
+    warning.
+
+    Parameters
+    ----------
+    against, attachment, data_range, nits_per_unit, pixels_per_degree
+        As for `Comparing`.
+
+    Raises
+    ------
+    ValueError
+        `nits_per_unit` or `pixels_per_degree` is missing.
+
+    See Also
+    --------
+    FLIP
+
+    Examples
+    --------
+    >>> from vkbloom.grid.reductions import ColorVideoVDP
+    >>> final = np.full((64, 64, 3), 0.5, np.float32)
+    >>> ColorVideoVDP(against=final, pixels_per_degree=60)
+    Traceback (most recent call last):
+        ...
+    ValueError: nits_per_unit: None is no number; ColorVideoVDP needs it
+    >>> ColorVideoVDP.units
+    'JOD'
+    """
+
+    metric: ClassVar[Metric] = "cvvdp"
+    units: ClassVar[str] = "JOD"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("nits_per_unit", "pixels_per_degree"):
+            if getattr(self, name) is None:
+                raise ValueError(f"{name}: None is no number; ColorVideoVDP needs it")
+        if find_spec("pycvvdp") is None:
+            warnings.warn(
+                "ColorVideoVDP is left out: it needs pycvvdp, pip install vkbloom[cvvdp]",
+                stacklevel=3,
+            )

@@ -10,17 +10,28 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import check_number, import_extra
+from vkbloom.checks import as_float, check_number, import_extra
 from vkbloom.io.srgb import decode_srgb
 
-__all__ = ["Comparison", "Metric", "compare", "difference", "flip_map"]
+__all__ = [
+    "ALL_METRICS",
+    "USUAL_METRICS",
+    "Comparison",
+    "Metric",
+    "compare",
+    "difference",
+    "flip_map",
+]
 
-Metric = Literal["ssim", "psnr", "flip"]
+Metric = Literal["ssim", "psnr", "flip", "cvvdp"]
 
 _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
 # Side of scikit-image's default window in pixels.
 _SSIM_WINDOW: Final = 7
-_METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
+#: Names of the metrics.
+ALL_METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
+#: Those that are computed where none are named: ColorVideoVDP needs luminances, and PyTorch.
+USUAL_METRICS: Final[tuple[Metric, ...]] = ("ssim", "psnr", "flip")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +61,10 @@ class Comparison:
     ssim, psnr, flip : float or None
         Structural similarity, peak signal-to-noise ratio in dB (inf if nothing differs) and mean
         FLIP.
+    cvvdp : float or None
+        ColorVideoVDP in just-objectionable differences: 10 where no difference is visible.
     not_computed : mapping of str to str
-        Why one of these three is None, by its name; also "not asked for".
+        Why one of these is None, by its name; also "not asked for".
     """
 
     mismatches: tuple[str, ...]
@@ -66,6 +79,7 @@ class Comparison:
     ssim: float | None = None
     psnr: float | None = None
     flip: float | None = None
+    cvvdp: float | None = None
     not_computed: Mapping[str, str]
 
     @property
@@ -97,7 +111,9 @@ def compare(
     relative: float = 0.0,
     allow_nan: bool = False,
     data_range: float | None = None,
-    metrics: Collection[Metric] = _METRICS,
+    metrics: Collection[Metric] = USUAL_METRICS,
+    nits_per_unit: float | None = None,
+    pixels_per_degree: float | None = None,
 ) -> Comparison:
     """Compare two images.
 
@@ -115,8 +131,16 @@ def compare(
     data_range : float, optional
         Data range for SSIM and PSNR. Default: 1 for integers; for floats the range of the values,
         0 and 1, which is 1 for images within 0..1.
-    metrics : collection of {"ssim", "psnr", "flip"}
+    metrics : collection of {"ssim", "psnr", "flip", "cvvdp"}
         The metrics to compute; the others are None. They are far slower than the other figures.
+        Default: all but "cvvdp", which is left out with a reason in `not_computed` where its
+        package is missing: ``pip install vkbloom[cvvdp]``.
+    nits_per_unit : float, optional
+        Luminance of a linear value of 1 on the display in cd/m2, above 0; "cvvdp" needs it.
+        Integers are decoded from sRGB first: it is the display's white.
+    pixels_per_degree : float, optional
+        Pixels of the image that one degree of the observer's view spans, above 0. "flip" has
+        67.02 where it is None (a 4K monitor of 0.69 m width at 0.7 m), "cvvdp" needs it.
 
     Returns
     -------
@@ -138,8 +162,16 @@ def compare(
     """
     check_number("threshold", threshold, 0.0, math.inf)
     check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
-    if unknown := [name for name in metrics if name not in _METRICS]:
-        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(_METRICS)}")
+    if unknown := [name for name in metrics if name not in ALL_METRICS]:
+        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(ALL_METRICS)}")
+    for name, number in (
+        ("nits_per_unit", nits_per_unit),
+        ("pixels_per_degree", pixels_per_degree),
+    ):
+        if number is not None and not 0 < as_float(name, number) < math.inf:
+            raise ValueError(f"{name}: {number!r} is out of range, finite and above 0")
+        if number is None and "cvvdp" in metrics:
+            raise ValueError(f"{name}: None is no number; the metric cvvdp needs it")
     if data_range is not None and not 0 < data_range < math.inf:
         raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
     a, b = _checked("a", a), _checked("b", b)
@@ -149,7 +181,7 @@ def compare(
             mismatches=mismatches,
             threshold=threshold,
             relative=relative,
-            not_computed=dict.fromkeys(("ssim", "psnr", "flip"), "the images are no match"),
+            not_computed=dict.fromkeys(ALL_METRICS, "the images are no match"),
         )
     pair = _pair(a, b)
     unequal, common = pair.unequal, ~pair.valid & ~pair.unequal
@@ -159,7 +191,9 @@ def compare(
         mismatches += (f"NaN or infinity in both images, {_places(common)}",)
     if data_range is None:
         data_range = 1.0 if pair.is_integer else _span(pair)
-    computed, not_computed = _metrics(pair, data_range, metrics)
+    computed, not_computed = _metrics(
+        pair, metrics, data_range=data_range, nits=nits_per_unit, degree=pixels_per_degree
+    )
     over = _over(pair, threshold, relative)
     place, values = _largest(pair)
     is_any = bool(pair.valid.any())
@@ -302,11 +336,16 @@ def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, flo
 
 
 def _metrics(
-    pair: _Pair, data_range: float, wanted: Collection[Metric]
+    pair: _Pair,
+    wanted: Collection[Metric],
+    *,
+    data_range: float,
+    nits: float | None,
+    degree: float | None,
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Return the computed metrics, and the reasons for the others, by name."""
     computed: dict[str, float] = {}
-    reasons: dict[str, str] = {name: "not asked for" for name in _METRICS if name not in wanted}
+    reasons: dict[str, str] = dict.fromkeys(set(USUAL_METRICS) - set(wanted), "not asked for")
     # Extreme floats give figures that are not finite, which are checked below.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if "ssim" in wanted:
@@ -315,9 +354,11 @@ def _metrics(
             _add_psnr(pair, data_range, computed, reasons)
     if "flip" in wanted:
         if hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
-            computed["flip"] = float(_flip(pair).mean(dtype=np.float64))
+            computed["flip"] = float(_flip(pair, degree).mean(dtype=np.float64))
         else:
             reasons["flip"] = "OpenImageIO 3.2 is needed"
+    if "cvvdp" in wanted and nits is not None and degree is not None:
+        _add_cvvdp(pair, nits, degree, computed, reasons)
     for name, value in list(computed.items()):
         if math.isnan(value) or value == -math.inf:
             reasons[name] = "the values are too large"
@@ -355,13 +396,45 @@ def _add_psnr(
         )
 
 
-def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
+def _add_cvvdp(
+    pair: _Pair, nits: float, degree: float, computed: dict[str, float], reasons: dict[str, str]
+) -> None:
+    """Add ColorVideoVDP of two still images.
+
+    Source: Mantiuk et al., "ColorVideoVDP: A Visual Difference Predictor for Image, Video and
+    Display Distortions", SIGGRAPH 2024.
+    """
+    try:
+        package = import_extra("pycvvdp", "cvvdp", "ColorVideoVDP")
+    except ModuleNotFoundError as error:
+        reasons["cvvdp"] = str(error)
+        return
+    images = [np.float32(nits) * image for image in _linear(pair)]
+    height, width = images[0].shape[:2]
+    # A display that shows all luminances of both images, and adds no light of its own.
+    peak = max(float(image.max()) for image in images)
+    metric = package.cvvdp(
+        display_photometry=package.vvdp_display_photo_eotf(
+            Y_peak=max(peak, nits), contrast=1e6, source_colorspace="BT.709-linear", E_ambient=0
+        ),
+        display_geometry=package.vvdp_display_geometry((width, height), ppd=degree),
+        quiet=True,
+    )
+    score, _ = metric.predict(images[1], images[0], dim_order="HWC")
+    computed["cvvdp"] = float(score)
+
+
+def flip_map(
+    a: NDArray[Any], b: NDArray[Any], *, pixels_per_degree: float | None = None
+) -> NDArray[np.float32]:
     """Return FLIP of every pixel; its mean is the figure of `compare`.
 
     Parameters
     ----------
     a, b : ndarray
         As for `compare`, of one shape, both integers or both floats.
+    pixels_per_degree : float, optional
+        As for `compare`.
 
     Returns
     -------
@@ -381,28 +454,37 @@ def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
         raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
     if not hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
         raise ModuleNotFoundError("FLIP needs OpenImageIO 3.2: pip install vkbloom[images]")
-    return _flip(_pair(a, b))
+    return _flip(_pair(a, b), pixels_per_degree)
 
 
 def _oiio() -> Any:
     return import_extra("OpenImageIO", "images", "Comparing images")
 
 
-def _flip(pair: _Pair) -> NDArray[np.float32]:
+def _linear(pair: _Pair) -> list[NDArray[np.float32]]:
+    """Return both images as linear (H, W, 3) of float32."""
+    colours = 3 if pair.a.shape[2] >= 3 else 1
+    largest = np.finfo(np.float32).max
+    found = []
+    for image in (pair.a, pair.b):
+        linear = image[:, :, :colours]
+        if pair.is_integer:
+            linear = decode_srgb(linear)
+        limited = np.clip(linear, -largest, largest).astype(np.float32)
+        found.append(np.repeat(limited, 3 // colours, axis=2))
+    return found
+
+
+def _flip(pair: _Pair, degree: float | None) -> NDArray[np.float32]:
     """Return OpenImageIO's FLIP of every pixel.
 
     Sources: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020;
     "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021.
     """
     oiio = _oiio()
-    colours = 3 if pair.a.shape[2] >= 3 else 1
-    largest = np.finfo(np.float32).max
-    buffers = []
-    for image in (pair.a, pair.b):
-        linear = image[:, :, :colours]
-        if pair.is_integer:
-            linear = decode_srgb(linear)
-        limited = np.clip(linear, -largest, largest).astype(np.float32)
-        buffers.append(oiio.ImageBuf(np.repeat(limited, 3 // colours, axis=2)))
-    errors = oiio.ImageBufAlgo.FLIP_diff(*buffers, hdr=0 if pair.is_integer else 1)
+    buffers = [oiio.ImageBuf(image) for image in _linear(pair)]
+    # OpenImageIO takes 0 as its default, which is FLIP's own.
+    errors = oiio.ImageBufAlgo.FLIP_diff(
+        *buffers, hdr=0 if pair.is_integer else 1, ppd=degree or 0.0
+    )
     return np.asarray(errors.get_pixels(), np.float32)[:, :, 0]

@@ -1,0 +1,115 @@
+"""Translations of one method into another, and pyramids for point-spread functions."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import vkbloom
+from vkbloom import DualKawase, Pyramid, Renderer, Separable, UrpBloom, psf, reference
+from vkbloom.fits.translating import lights
+
+SIZE = (96, 64)
+
+
+class TestTranslate:
+    def test_a_method_into_itself(self, renderer: Renderer) -> None:
+        truth = Separable(blur_scale=1.8, blur_strength=1.2, intensity=0.4, tonemap="aces")
+        found = vkbloom.translate(
+            truth, Separable(encoding="srgb"), size=SIZE, renderer=renderer, max_calls=120
+        )
+        assert found.vary == ("blur_scale", "blur_strength", "intensity")
+        assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.8, rel=0.01)
+        assert found.loss < 0.01
+        # The look of `to` stays, and is not compared.
+        assert (found.settings.tonemap, found.settings.encoding) == ("none", "srgb")
+        assert found.frames.settings.encoding == "none"
+
+    def test_another_method(self, renderer: Renderer) -> None:
+        found = vkbloom.translate(
+            DualKawase(levels=2, intensity=0.5),
+            Pyramid,
+            size=SIZE,
+            renderer=renderer,
+            max_calls=150,
+        )
+        assert isinstance(found.settings, Pyramid)
+        assert found.settings.levels <= 4
+        assert found.loss < 0.5 * found.start_loss
+
+    def test_thresholds_count(self, renderer: Renderer) -> None:
+        found = vkbloom.translate(
+            UrpBloom(threshold=2.5, scatter=0.5),
+            UrpBloom(),
+            size=SIZE,
+            renderer=renderer,
+            vary=["threshold", "scatter"],
+            max_calls=150,
+        )
+        assert found.settings.threshold == pytest.approx(2.5, rel=0.01)
+
+    def test_picture(self) -> None:
+        image = lights((320, 180))
+        assert sorted(set(image.ravel().tolist())) == [0, 0.5, 1.5, 6, 40]
+        assert [int((image[..., 0] == value).sum()) for value in (0.5, 40)] == [36, 36]
+        assert int((lights((1920, 1080))[..., 0] == 6).sum()) == 36**2
+
+    def test_refused(self, renderer: Renderer) -> None:
+        with pytest.raises(TypeError, match="to: 'kino' is not a Settings, or a class of them"):
+            vkbloom.translate(Pyramid(), cast("Any", "kino"), renderer=renderer)
+        with pytest.raises(ValueError, match="vary: the method urp has no field 'levels'"):
+            vkbloom.translate(Pyramid(), UrpBloom, size=SIZE, vary=["levels"], renderer=renderer)
+
+
+class TestPyramid:
+    @pytest.mark.parametrize("loss", ["relative", "log"])
+    def test_weights_are_found_again(self, renderer: Renderer, loss: Any) -> None:
+        truth = Pyramid(levels=4, level_weights=(0.5, 0.0, 0.3, 0.1), format="rgba32float")
+        spread = psf.measured(truth, size=(96, 96))
+        found = vkbloom.fit_pyramid(spread, 4, size=(96, 96), loss=loss, renderer=renderer)
+        np.testing.assert_allclose(
+            found.settings.to_dict()["level_weights"], (0.5, 0, 0.3, 0.1), atol=1e-4
+        )
+        assert found.loss < 1e-3 < found.start_loss
+        assert (found.calls, found.framebuffer) == (6, "bloom")
+        assert "level_weights=" in repr(found)
+        assert found._repr_html_().count("data:image/png") == 3
+
+    def test_a_share_that_stays(self, renderer: Renderer) -> None:
+        """The picture with its bloom is the convolution, of any image."""
+        found = vkbloom.fit_pyramid(
+            psf.spencer(),
+            5,
+            size=(96, 96),
+            direct=True,
+            loss="log",
+            pixels_per_degree=20,
+            renderer=renderer,
+        )
+        settings = found.settings
+        assert settings.composite == "mix"
+        assert 0 < settings.intensity < 1
+        assert found.loss < 0.05
+        image = np.zeros((96, 96, 3))
+        image[48, 48] = 1
+        final = reference.apply(image, settings)["final"]
+        np.testing.assert_allclose(final, found.target + found.residual, atol=1e-5)
+
+    def test_more_levels_are_never_worse(self, renderer: Renderer) -> None:
+        losses = [
+            vkbloom.fit_pyramid(psf.harvey_shack(), n, size=(96, 96), renderer=renderer).loss
+            for n in (1, 3, 5)
+        ]
+        assert losses[0] > losses[1] > losses[2]
+
+    def test_refused(self, renderer: Renderer) -> None:
+        with pytest.raises(TypeError, match=r"psf: 3 is not a PSF"):
+            vkbloom.fit_pyramid(cast("Any", 3), renderer=renderer)
+        with pytest.raises(ValueError, match="levels: 9 is out of range, 1 to 5 for 64 x 64"):
+            vkbloom.fit_pyramid(psf.gaussian(2), 9, size=(64, 64), renderer=renderer)
+        with pytest.raises(ValueError, match="loss: 'flip' is not one of relative, log"):
+            vkbloom.fit_pyramid(psf.gaussian(2), loss=cast("Any", "flip"), renderer=renderer)
+        with pytest.raises(ValueError, match="radius: 17"):
+            vkbloom.fit_pyramid(psf.gaussian(2), radius=17, renderer=renderer)
