@@ -55,8 +55,8 @@ def alarm() -> Iterator[Callable[[float], None]]:
 
 @pytest.fixture(scope="module")
 def large() -> NDArray[np.float32]:
-    """A square image for which LONG takes more than half a second, so that there is a wait to
-    interrupt.
+    """A square image for which LONG takes more than 0.3 s, so that there is a wait to interrupt
+    after 0.1 s.
 
     It has at least 1 MiB, so that the device writes directly into the array.
     """
@@ -69,10 +69,10 @@ def large() -> NDArray[np.float32]:
             begin = time.perf_counter()
             renderer.apply(image, LONG, attachments="final")
             seconds = time.perf_counter() - begin
-            if seconds > 0.5:
+            if seconds > 0.3:
                 return image
             # No larger than necessary, since all of these tests wait for it several times.
-            side = int(side * min(2.0, max(1.1, math.sqrt(0.6 / seconds))))
+            side = int(side * min(2.0, max(1.1, math.sqrt(0.36 / seconds))))
     pytest.skip("this device is done before a wait can be interrupted")
 
 
