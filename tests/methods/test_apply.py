@@ -18,6 +18,7 @@ from tests.tolerance import (
     tolerance,
 )
 from vkbloom import (
+    Convolution,
     Renderer,
     Separable,
     Settings,
@@ -120,7 +121,10 @@ def test_no_settings_are_the_tutorials(renderer: Renderer) -> None:
     assert_matches_reference(frames, image, Separable())
 
 
-@pytest.mark.parametrize("name", presets)
+# (Convolutions have tests of their own: a transform's error is relative to the largest value.)
+@pytest.mark.parametrize(
+    "name", [name for name in presets if not isinstance(presets[name], Convolution)]
+)
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_presets(renderer: Renderer, name: str, dtype: str) -> None:
     image = hdr_picture(61, 43, 3, dtype)
