@@ -25,8 +25,11 @@ _EXTRAS: Final = {
     "cli": "the command line",
     "software": "a bundled driver that renders on any CPU",
     "quality": "quality figures such as SSIM",
+    "fit": "settings that give a picture: fit, translate, fit_pyramid",
+    "cvvdp": "the reduction ColorVideoVDP",
     "notebook": "the explorer, in notebooks and as a web page",
     "pytest": "frame_regression in tests",
+    "window": "vkbloom view, a window with live controls",
 }
 # Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
 _RELEVANT_VARIABLES: Final = re.compile(
