@@ -471,9 +471,12 @@ bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
 {
     struct vkb_error error;
 
-    if (!vkb_submission_over(device, submission)
-        || !vkb_submission_wait(device, &frame->submissions, submission, &error))
+    if (!vkb_submission_over(device, submission))
         return false;
+    // A wait is interruptible and takes the GIL, which the caller holds.
+    if (submission->pending && !vkb_commands_reset(device, &submission->commands, &error))
+        return false;
+    submission->pending = false;
     vkb_submissions_give_back(device, &frame->submissions, submission);
     return true;
 }

@@ -66,6 +66,12 @@ bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands,
     return vkb_device_wait(device, commands->fence, frames, error);
 }
 
+bool vkb_commands_reset(const struct vkb_device *device, const struct vkb_commands *commands,
+                        struct vkb_error *error)
+{
+    return VK(error, device->vk.vkResetFences(device->handle, 1, &commands->fence));
+}
+
 bool vkb_commands_over(const struct vkb_device *device, const struct vkb_commands *commands)
 {
     return device->vk.vkGetFenceStatus(device->handle, commands->fence) == VK_SUCCESS;

@@ -27,5 +27,8 @@ bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands,
                        struct vkb_error *error);
 // Whether the last submission is complete; does not wait.
 bool vkb_commands_over(const struct vkb_device *device, const struct vkb_commands *commands);
+// Makes the fence of a complete submission ready for the next one, as vkb_commands_wait does.
+bool vkb_commands_reset(const struct vkb_device *device, const struct vkb_commands *commands,
+                        struct vkb_error *error);
 
 #endif

@@ -319,6 +319,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice handle, uint32_t count, cons
                       .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
                       .pMessage = "an objection",
                   });
+    // The work is over by then, so that the renderer may drop the submission at once.
+    below.vkWaitForFences(handle, count, fences, all, UINT64_MAX);
     raise(SIGINT);
     return VK_TIMEOUT;
 }
