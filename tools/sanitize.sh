@@ -21,7 +21,7 @@ if [ $# = 0 ]; then
     set -- "$@" tests/grid/test_grid.py
     for name in apply_input.py::test_largest_side apply_input.py::test_long_odd_side \
         presets.py::test_a_preset_is_its_reference presets.py::test_hdrps_cubic_filter \
-        rg11b10.py::test_every_method variants.py::test_every_form variants.py::test_final_alone \
+        rg11b10.py::test_every_method variants.py::test_every_variant variants.py::test_final_alone \
         variants.py::test_large variants.py::test_the_forward_frame; do
         set -- "$@" --deselect "tests/methods/test_$name"
     done
