@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from tests.plugin.broken_laws import fails
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, gaussian_weights, reference, testing
 from vkbloom.testing import Probe
 
@@ -62,18 +63,6 @@ LEANING = kernel([[0, 0, 0], [0.2, 0.5, 0.3], [0, 0, 0]])
 SHIFTED = kernel([[0.5, 0.5]])
 PLUS = kernel([[0, 0.125, 0], [0.125, 0.5, 0.125], [0, 0.125, 0]])
 SEEING_BLACK = kernel([[1 / 9] * 3] * 3, mode="constant")
-
-
-def fails(assertion: Callable[..., None], *arguments: Any, **options: Any) -> str:
-    """Check the parts of a message (assertion, figure, position and law), and return it."""
-    with pytest.raises(AssertionError) as caught:
-        assertion(*arguments, **options)
-    message = str(caught.value)
-    first, law = message.split("\n  law: ")
-    assert first.startswith(assertion.__name__ + ": ")
-    assert "allowed" in first
-    assert law
-    return message
 
 
 @pytest.mark.parametrize("dtype", DTYPES)

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from tests.plugin.broken_laws import fails
 from vkbloom import DualKawase, KinoBloom, Pyramid, Renderer, testing
 from vkbloom.testing import Probe
 
@@ -45,17 +46,6 @@ def doubled(image: Image, off: float = 0.0) -> Image:
 def chain(image: Image, reduce: Callable[[Image], Image] = halved, off: float = 0.0) -> Image:
     """Two levels down and up."""
     return gaussian(doubled(doubled(reduce(reduce(image)), off)), 3.0)
-
-
-def fails(assertion: Callable[..., None], *arguments: Any, **options: Any) -> str:
-    with pytest.raises(AssertionError) as caught:
-        assertion(*arguments, **options)
-    message = str(caught.value)
-    first, law = message.split("\n  law: ")
-    assert first.startswith(assertion.__name__ + ": ")
-    assert "allowed" in first
-    assert law
-    return message
 
 
 class TestStability:

@@ -17,7 +17,7 @@ import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.glow_options import accompanying, glow_options
+from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
@@ -80,8 +80,8 @@ def command(
         raise click.UsageError(
             "--scene, --shading and --size are for a scene; leave them out with an IMAGE"
         )
-    if source is None and (mask or emission):
-        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
+    if source is None:
+        refuse_glow_of_scene(mask, emission)
     looked_at: vkbloom.Scene | NDArray[Any]
     begun: vkbloom.Settings | None = settings
     arguments: dict[str, Any] = {}

@@ -21,6 +21,7 @@ __all__ = [
     "glow_options",
     "has_straight",
     "premultiplied",
+    "refuse_glow_of_scene",
     "uploaded",
 ]
 
@@ -49,6 +50,12 @@ def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(**arguments)
 
     return run
+
+
+def refuse_glow_of_scene(mask: str | None, emission: str | None) -> None:
+    """Raise a UsageError if a scene is given a mask or an emission."""
+    if mask or emission:
+        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
 
 
 def accompanying(

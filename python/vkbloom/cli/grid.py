@@ -24,7 +24,7 @@ from vkbloom.checks import import_extra
 from vkbloom.cli import axis_options, no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
-from vkbloom.cli.glow_options import accompanying, glow_options
+from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.image_files import (
     input_colour_option,
     layer_option,
@@ -307,8 +307,7 @@ def _glows(
     """Return the arguments `mask` and `emission` of a grid of images."""
     if pictures:
         return accompanying(mask, emission, colour, raw=raw)(pictures[0].pixels)
-    if mask or emission:
-        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
+    refuse_glow_of_scene(mask, emission)
     return {}
 
 

@@ -15,7 +15,7 @@ import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.glow_options import accompanying, glow_options
+from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.image_files import layer_option, note, read_picture, subimage_option
 from vkbloom.cli.live import HELP, Live
 from vkbloom.cli.program import given
@@ -91,8 +91,8 @@ def command(
         raise click.UsageError(
             "--scene and --shading are for a scene; leave them out with an IMAGE"
         )
-    if source is None and (mask or emission):
-        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
+    if source is None:
+        refuse_glow_of_scene(mask, emission)
     shown: Any = None
     accompanied: dict[str, Any] = {}
     if source is not None:
