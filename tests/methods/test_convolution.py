@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from typing import Any, cast
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -275,3 +276,10 @@ def test_too_large(renderer: Renderer, scene: Scene) -> None:
     # Three images of 8192 x 8192 or less, 16 bytes a texel.
     with pytest.raises(OutOfMemoryError, match=r"[34]\d{3} MiB of images are needed"):
         renderer.plan(scene, Convolution(kernel_of(3, 3), bloom_size=size), size)
+    # It does not first compute a kernel of four times the size.
+    convolution = Convolution(kernel_size=(15999, 15999), bloom_size=size)
+    with (
+        patch.object(Convolution, "core_kernel", side_effect=AssertionError),
+        pytest.raises(OutOfMemoryError, match="MiB of images are needed"),
+    ):
+        renderer.plan(scene, convolution, size)
