@@ -303,7 +303,7 @@
 #define FFT_MOST_RADIX 64
 // The most where the other elements are in shared memory.
 #define FFT_MOST_GROUP_RADIX 16
-#define FFT_LIMIT      1e28
+#define FFT_LIMIT            1e28
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
