@@ -52,27 +52,23 @@ size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, uns
     return size;
 }
 
-void vkb_params_set_height(enum vkb_block block, int height, union vkb_params *params)
+#define SET_ROWS(block) \
+    case VKB_BLOCK_##block: \
+        params->block.target_height = rows->target_height; \
+        params->block.source_height = rows->source_height; \
+        params->block.row_offset = rows->row_offset; \
+        break;
+
+void vkb_params_set_rows(enum vkb_block block, const struct vkb_params_rows *rows,
+                         union vkb_params *params)
 {
     switch (block) {
-    case VKB_BLOCK_blur:
-        params->blur.target_height = height;
-        break;
-    case VKB_BLOCK_threshold:
-        params->threshold.target_height = height;
-        break;
-    case VKB_BLOCK_pyramid:
-        params->pyramid.target_height = height;
-        break;
-    case VKB_BLOCK_prefilter:
-        params->prefilter.target_height = height;
-        break;
-    case VKB_BLOCK_gather:
-        params->gather.target_height = height;
-        break;
-    case VKB_BLOCK_kawase:
-        params->kawase.target_height = height;
-        break;
+        SET_ROWS(blur)
+        SET_ROWS(threshold)
+        SET_ROWS(pyramid)
+        SET_ROWS(prefilter)
+        SET_ROWS(gather)
+        SET_ROWS(kawase)
     default:
         break;
     }

@@ -399,6 +399,21 @@ static bool read_kernel_tuple(PyObject *tuple, struct vkb_held_kernel *held,
     return true;
 }
 
+bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                          struct vkb_kernel_data *kernel)
+{
+    PyObject *tuple = PyObject_CallMethod(object, "core_kernel_size", "(II)(II)", frame.width,
+                                          frame.height, buffers.width, buffers.height);
+    const bool done = tuple && vkb_require_tuple(tuple, "core_kernel_size")
+                   && PyArg_ParseTuple(tuple, "O&O&", vkb_read_uint32, &kernel->width,
+                                       vkb_read_uint32, &kernel->height);
+
+    Py_XDECREF(tuple);
+    // No other kernel has this number, and the check of memory is for graphs with one.
+    kernel->serial = UINT64_MAX;
+    return done;
+}
+
 bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
                      struct vkb_held_kernel *held, struct vkb_kernel_data *kernel)
 {

@@ -155,7 +155,9 @@ struct vkb_held_kernel {
     bool held;
 };
 
-// Asks a convolution's settings for the kernel of these sizes.
+// Asks a convolution's settings for the kernel of these sizes, or only for about its size.
+bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                          struct vkb_kernel_data *kernel);
 bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
                      struct vkb_held_kernel *held, struct vkb_kernel_data *kernel);
 void vkb_release_kernel(struct vkb_held_kernel *held);
@@ -203,9 +205,8 @@ PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images,
 // source brings, whether it is a band of the image).
 bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyObject *names,
                    struct vkb_part *part);
-bool vkb_build_part(const struct vkb_device *device, const struct vkb_source *source,
-                    const struct vkb_settings *settings, const struct vkb_part *part,
-                    struct vkb_graph *graph, struct vkb_error *error);
+bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *settings,
+                    const struct vkb_part *part, struct vkb_graph *graph, struct vkb_error *error);
 
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);

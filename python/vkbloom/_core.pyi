@@ -82,12 +82,12 @@ class Renderer:
         source: Source,
         settings: object,
         names: tuple[str, ...] | None,
-        part: tuple[int, tuple[str, ...], bool] = ...,
+        part: tuple[int, tuple[str, ...], int] = ...,
         /,
     ) -> Plan: ...
     def bands(
         self, source: Source, settings: object, height: int, /
-    ) -> tuple[str | None, tuple[str, ...], int, int] | None: ...
+    ) -> tuple[str | None, int, tuple[str, ...], int, int] | None: ...
     def run(
         self,
         source: Source,

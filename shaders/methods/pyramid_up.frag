@@ -38,7 +38,7 @@ vec4 upsample_inset(Place place)
     Place kept = Place(mix(place.texel, size - 2, beyond), mix(place.part, vec2(0.5), beyond));
     if (UPSAMPLE == UPSAMPLE_INSET_LINEAR)
         return sample_at(smaller, kept, vec2(0.0), SAMPLING);
-    vec2 ratio = vec2(size) / vec2(params.target_width, params.target_height);
+    vec2 ratio = vec2(COMPLETE_SIZE(smaller)) / vec2(params.target_width, params.target_height);
     vec2 furthest = vec2(size - 1 - kept.texel) + 0.5 - ratio;
     return sample_cubic_within(smaller, kept, furthest, SAMPLING);
 }
