@@ -336,7 +336,9 @@
 #define FFT_COLUMNS    8
 #define FFT_ROWS       8
 #define FFT_MOST_RADIX 64
-#define FFT_LIMIT      1e28
+// The most where the other elements are in shared memory.
+#define FFT_MOST_GROUP_RADIX 16
+#define FFT_LIMIT            1e28
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -348,7 +350,9 @@
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
 // applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
 // first level. LEVELS is the number of levels that a pass adds up. RADIX_A to STAGE are of Fourier
-// transforms (fft.comp).
+// transforms (fft.comp). Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of
+// the stages; a workgroup has GROUP_SIZE invocations for each of GROUP_LINES lines, and exchanges
+// so many floats of each element at once.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -379,7 +383,14 @@
     CONSTANT(26, INVERSE, inverse) \
     CONSTANT(27, ROTATED, rotated) \
     CONSTANT(28, PADDED, padded) \
-    CONSTANT(29, STAGE, stage)
+    CONSTANT(29, STAGE, stage) \
+    CONSTANT(30, RADIX_1, radix_1) \
+    CONSTANT(31, RADIX_2, radix_2) \
+    CONSTANT(32, RADIX_3, radix_3) \
+    CONSTANT(33, RADIX_4, radix_4) \
+    CONSTANT(34, GROUP_LINES, group_lines) \
+    CONSTANT(35, GROUP_SIZE, group_size) \
+    CONSTANT(36, EXCHANGED, exchanged)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
