@@ -13,6 +13,7 @@ static const struct vkb_device any_device = {
         {
             .maxComputeSharedMemorySize = UINT32_MAX,
             .maxComputeWorkGroupInvocations = UINT32_MAX,
+            .maxComputeWorkGroupSize = {UINT32_MAX, UINT32_MAX, UINT32_MAX},
             .maxTexelBufferElements = UINT32_MAX,
             .maxStorageBufferRange = UINT32_MAX,
         },

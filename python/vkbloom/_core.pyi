@@ -5,9 +5,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 VALUES: dict[str, tuple[float, float, float]]
+GLARE_VALUES: dict[str, tuple[float, float, float]]
 CHOICES: dict[str, tuple[str, ...]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
+MAX_STAGES: int
 
 AdapterTuple = tuple[str, str, str, str, str, bytes, bool]
 _Array = NDArray[Any]

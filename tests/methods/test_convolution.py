@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from typing import Any, cast
 from unittest.mock import patch
 
@@ -105,6 +106,33 @@ def test_long_lines(renderer: Renderer) -> None:
     assert_close(renderer, image_of(4201, 3), Convolution(kernel_of(101, 2), boundary="edge"))
     # In colour: the frequencies of the other sign lie elsewhere.
     assert_close(renderer, image_of(4, 1100), Convolution(kernel_of(3, 99)))
+
+
+@pytest.fixture(scope="module")
+def gpu() -> Iterator[Renderer]:
+    """A renderer with the variants of GPUs, which transform complete lines."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VKBLOOM_FORM", "gpu")
+        opened = Renderer(validation=True)
+    with opened:
+        yield opened
+
+
+def test_complete_lines(gpu: Renderer) -> None:
+    """Of several stages and of one; with colours and alpha, and pixels beyond an edge."""
+    image = np.clip(image_of(17, 5, 4), 0, 1)
+    settings = Convolution(kernel_of(20, 7), boundary="edge", alpha="blur")
+    plan = gpu.plan(image, settings)
+    assert [each.variant for each in plan.passes].count("lines") == 6
+    bloom = gpu.apply(image, settings)["bloom"]
+    np.testing.assert_allclose(bloom, reference.apply(image, settings)["bloom"], atol=1e-5)
+
+
+def test_lines_that_shared_memory_cannot_hold(gpu: Renderer) -> None:
+    """They run stage by stage, which needs more images."""
+    image = np.zeros((1, 16000, 3), np.float32)
+    passes = gpu.plan(image, Convolution(kernel_of(3, 1))).passes
+    assert "lines" not in [each.variant for each in passes]
 
 
 def test_other_sizes(renderer: Renderer) -> None:
