@@ -3,7 +3,7 @@
 // Adds up levels of several sizes: each is enlarged and multiplied by its weight.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
-#include "lib/cubic.glsl"
+#include "lib/upsample.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
 #include "lib/storage.glsl"
@@ -24,10 +24,8 @@ vec4 share(sampler2D image, int level)
     if (level >= LEVELS)
         return vec4(0.0);
     float weight = params.shares[level >> 2][level & 3];
-    Place place = PLACE_IN(image);
-    if (UPSAMPLE == UPSAMPLE_CUBIC)
-        return weight * sample_cubic(image, place);
-    return weight * sample_at(image, place, vec2(0.0), SAMPLING);
+    ivec2 size = ivec2(params.target_width, params.target_height);
+    return weight * upsample(image, PIXEL, size, vec2(0.0));
 }
 
 vec4 shade()
