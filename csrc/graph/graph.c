@@ -234,7 +234,8 @@ bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t 
 {
     if (width == 0 || height == 0 || width > max_side || height > max_side)
         return vkb_fail(error, VKB_ERROR_VALUE,
-                        "%s: a size of %u x %u is out of this adapter's range, 1 to %u a side",
+                        "%s: a size of %u x %u is out of this adapter's range, 1 to %u a side; "
+                        "it must be smaller",
                         name, width, height, max_side);
     return true;
 }

@@ -116,7 +116,7 @@ static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN && !pass->constants.masked
+    return vkb_is_composite(pass) && pass->constants.bloom != BLOOM_LINES && !pass->constants.masked
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
         && has_format_of(graph, pass->reads[0], pass->reads[1])
@@ -224,6 +224,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
     {VKB_VARIANTS_GPU, "from_lines", vkb_add_from_lines, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_tiles, 0},
+    {VKB_VARIANTS_GPU, "lines", vkb_add_lines, 0},
     {VKB_VARIANTS_GPU, "halved", vkb_add_halved, HALVE_STRIPS},
     {VKB_VARIANTS_GPU, "doubled", vkb_add_doubled, DOUBLE_STRIPS},
     {VKB_VARIANTS_GPU, "doubled_final", vkb_add_doubled_final, DOUBLE_STRIPS},

@@ -17,8 +17,7 @@ vec4 AXIS_LINEAR(AXIS_IMAGE, Axis axis, float offset, int line)
 // target (Sigg and Hadwiger, "Fast Third-Order Texture Filtering", GPU Gems 2, chapter 20).
 vec4 AXIS_INSET_CUBIC(AXIS_IMAGE, Axis axis, int line)
 {
-    float furthest = float(axis.size - 1 - axis.texel) + 0.5
-                   - float(axis.size) / float(axis.target_size);
+    float furthest = float(axis.size - 1 - axis.texel) + 0.5 - axis.ratio;
     vec4 weights = cubic_weights(axis.part);
     float left = weights.x + weights.y, right = weights.z + weights.w;
     float near = min(weights.y / left - 1.0, furthest), far = min(weights.w / right + 1.0, furthest);

@@ -1,4 +1,5 @@
-// The filter UPSAMPLE of an image for one pixel of a larger one: along rows, then along columns.
+// The filter UPSAMPLE of an image for this pixel of a larger one: along rows, then along columns.
+// Include fullscreen.glsl before this file.
 #include "lib/axis.glsl"
 
 Axis along_row;
@@ -20,10 +21,11 @@ Axis along_row;
 #include "lib/axis_filter.glsl"
 
 // `tap_step` is the distance of the taps of a tent, in texels of the image.
-vec4 upsample(sampler2D image, ivec2 pixel, ivec2 target_size, vec2 tap_step)
+vec4 upsample(sampler2D image, vec2 tap_step)
 {
-    Place place = place_in(image, pixel, target_size);
+    Place place = PLACE_IN(image);
     ivec2 size = textureSize(image, 0);
-    along_row = axis_x(place, tap_step.x, size, target_size);
-    return filter_column(image, axis_y(place, tap_step.y, size, target_size), 0);
+    vec2 ratio = vec2(COMPLETE_SIZE(image)) / vec2(params.target_width, params.target_height);
+    along_row = axis_x(place, tap_step.x, size, ratio);
+    return filter_column(image, axis_y(place, tap_step.y, size, ratio), 0);
 }

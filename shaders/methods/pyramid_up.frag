@@ -4,7 +4,6 @@
 // level.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
-#include "lib/upsample.glsl"
 
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
@@ -15,6 +14,7 @@ layout(set = 0, binding = 2) uniform sampler2D own;
 
 #define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
+#include "lib/upsample.glsl"
 
 // The tent, or one bilinear tap, for a level of exactly twice the size of the smaller one.
 vec4 doubled()
@@ -32,10 +32,9 @@ vec4 doubled()
 
 vec4 shade()
 {
-    ivec2 size = ivec2(params.target_width, params.target_height);
     vec4 level = SAMPLING == SAMPLING_TEXEL
                    ? doubled()
-                   : upsample(smaller, PIXEL, size, vec2(params.step_x, params.step_y));
+                   : upsample(smaller, vec2(params.step_x, params.step_y));
     vec4 sum = params.coarse * level;
     if (ADD_OWN != 0)
         sum += params.own * texelFetch(own, PIXEL, 0);

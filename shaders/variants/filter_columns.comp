@@ -37,6 +37,8 @@ WRITE_IMAGE(3);
 #define AXIS_TEXEL(at) load_floats(image, read_shapes[0], line, at)
 #include "lib/axis_filter.glsl"
 
+#include "variants/row_axis.glsl"
+
 void main()
 {
     read_words();
@@ -50,7 +52,7 @@ void main()
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         raw[i] = uvec4(0);
     for (int y = first.y; y < end; ++y) {
-        Axis axis = axis_y(place_in_size(rows_size, ivec2(0, y), size), params.step_y, rows_size, size);
+        Axis axis = row_axis(rows_size, y, params.step_y);
         if (ADD_OWN != 0)
             load_own(first.x, y, raw);
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {

@@ -34,6 +34,8 @@ WRITE_IMAGE(8);
 #define AXIS_TEXEL(at) load_floats(image, shape, line, at)
 #include "lib/axis_filter.glsl"
 
+#include "variants/row_axis.glsl"
+
 vec4 sums[COLUMNS];
 
 void add(usamplerBuffer image, int level, int first, int y)
@@ -41,8 +43,7 @@ void add(usamplerBuffer image, int level, int first, int y)
     if (level >= LEVELS)
         return;
     ivec4 shape = read_shapes[level];
-    ivec2 size = TARGET_SIZE();
-    Axis axis = axis_y(place_in_size(shape.xy, ivec2(0, y), size), 0.0, shape.xy, size);
+    Axis axis = row_axis(shape.xy, y, 0.0);
     float weight = params.shares[level >> 2][level & 3];
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         sums[i] += weight * filter_column(image, shape, axis, first + i);
