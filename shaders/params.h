@@ -349,6 +349,8 @@
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
 #define TEXEL_ROWS                    16
+#define FILTER_COLUMNS                4
+#define FILTER_ROWS                   16
 #define TILE_LOADED                   64
 #define TILE_ROWS                     32
 #define TILE_RUNS                     4
