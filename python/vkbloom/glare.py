@@ -252,8 +252,8 @@ class Ghosts(Glare):
         ghosts(p) = v(p) sum over k of tint_k w(q_k) min(max(c(q_k) - threshold, 0), maximum)
 
     with w(q) = max(0, 1 - |q - 1/2| / radius)^falloff, and for (x, y) = 2 p - 1
-    v(p) = 1 + vignette (min((x^2 + y^2)^2, 1) - 1). Red is read at q + a, blue at q - a, with a of the length `aberration`
-    towards the centre.
+    v(p) = 1 + vignette (min((x^2 + y^2)^2, 1) - 1). Red is read at q + a, blue at q - a, with a of
+    the length `aberration` towards the centre.
 
     Source: Chapman, "Pseudo Lens Flare", 2013; the weights as in three.js (LensflareNode.js),
     Blender and Unity (LensFlareScreenSpaceCommon.hlsl), the aberration as in Filament (flare.mat).
