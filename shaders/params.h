@@ -314,9 +314,9 @@
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
 
-// Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and the
-// size of their scales, the taps of an iteration of a streak, and how often the size of the bloom
-// buffers is halved.
+// Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and
+// the size of their scales, the taps of an iteration of a streak, and how often the size of the
+// bloom buffers is halved.
 #define MAX_STAGES    (GATHERED_LEVELS - 2)
 #define MOST_GHOSTS   16
 #define GHOST_LIMIT   16.0
