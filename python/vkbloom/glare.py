@@ -262,7 +262,7 @@ class Ghosts(Glare):
     --------
     >>> image = np.zeros((9, 9, 3), np.float32)
     >>> image[4, 7] = 1
-    >>> ghosts = vkbloom.Ghosts(scales=(-1,), tints=((1, 0.5, 0),), halvings=0)
+    >>> ghosts = vkbloom.Ghosts(scales=(-1,), tints=((1, 0.5, 0),), falloff=0, halvings=0)
     >>> with vkbloom.Renderer("software") as renderer:
     ...     frames = renderer.apply(image, vkbloom.Pyramid(glare=(ghosts,)))
     >>> frames["ghosts"][4, 1]
