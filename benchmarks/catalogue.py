@@ -27,6 +27,8 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "overhead": "the constant cost of a call",
         "startup": "import, renderer and first frame, in fresh processes",
         "separable": "two passes of N taps against one of N x N",
+        "convolution": "convolution with large kernels against SciPy's transforms",
+        "convolution-gpu": "convolution at 4K and 1080p on a GPU, against torch.fft",
         "image-gpu": "an image's bloom at 4K on a GPU, against CUDA",
     }
 )

@@ -10,6 +10,9 @@
 //   INPUT(B, type, name)   a float or int that the core fills in for each pass
 //   VEC4S(B, name, count)  an array of vec4 that the core fills in for each pass
 //
+// The numbers of the stages of glare are in lists of their own, GLARE_SETTING_ROWS and
+// GLARE_COUNT_ROWS: settings can have several stages. The core fills them in.
+//
 // The block of a fused pass has the rows of the passes that it replaces.
 
 // The settings that shaders read, and `radius`: floats, SETTING(name, default, min, max).
@@ -32,10 +35,15 @@
     SETTING(exposure, 0.0, -32.0, 32.0)
 
 // For a pass that reads an image of another size: the size of its target, and the largest value of
-// the target's format.
+// the target's format. If the images are bands of rows, target_height and source_height are those
+// of the complete images, and row_offset is the distance of the first rows: twice the first row of
+// the target times source_height, less twice the first row of the source times target_height.
+// Otherwise source_height and row_offset are 0.
 #define SAMPLING_ROWS(B, INPUT) \
     INPUT(B, int, target_width) \
     INPUT(B, int, target_height) \
+    INPUT(B, int, source_height) \
+    INPUT(B, int, row_offset) \
     INPUT(B, float, limit)
 
 // For passes with a threshold, and for passes that write the finished picture.
@@ -136,6 +144,16 @@
     READS(B, offset) \
     SAMPLING_ROWS(B, INPUT)
 
+// An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
+// weight of each for each channel. The threshold is for the first iteration.
+#define STREAKS_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y) \
+    INPUT(B, int, count) \
+    VEC4S(B, weights, MOST_TAPS)
+
 // The light of the deferred system.
 #define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
 
@@ -203,6 +221,7 @@
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
+    BLOCK(streaks, STREAKS_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
@@ -244,6 +263,21 @@
     REAL(size, 0.5, 0.0, 1.0) \
     REAL(filter_radius, 0.005, 0.0, 1.0)
 
+// The numbers of the stages of glare: floats and integers, as above. Each stage has some of them.
+#define GLARE_SETTING_ROWS(SETTING) \
+    SETTING(intensity, 1.0, 0.0, 65504.0) \
+    SETTING(threshold, 0.0, 0.0, 65504.0) \
+    SETTING(angle, 0.0, -360.0, 360.0) \
+    SETTING(length, 1.0, 0.0, 16.0) \
+    SETTING(fade, 0.95, 0.0, 1.0) \
+    SETTING(colour_shift, 0.0, 0.0, 1.0)
+
+#define GLARE_COUNT_ROWS(COUNT) \
+    COUNT(halvings, 1, 0, MOST_HALVINGS) \
+    COUNT(directions, 6, 1, 16) \
+    COUNT(base, 4, 2, MOST_TAPS) \
+    COUNT(iterations, 4, 1, 6)
+
 // The largest values of 8 bits, of half floats and of floats.
 #define UNORM_LIMIT  1.0
 #define HALF_LIMIT   65504.0
@@ -258,6 +292,12 @@
 #define MAX_LAYERS  8
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
+
+// Of glare: the most stages (the bloom and a picture of dirt are added up with them), the taps of
+// an iteration of a streak, and how often the size of the bloom buffers is halved.
+#define MAX_STAGES    (GATHERED_LEVELS - 2)
+#define MOST_TAPS     8
+#define MOST_HALVINGS 4
 
 // Invocations of a workgroup: in a row, for shaders in which each invocation writes several pixels;
 // on each side, for shaders in which it writes one.
@@ -285,6 +325,8 @@
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
 #define TEXEL_ROWS                    16
+#define FILTER_COLUMNS                4
+#define FILTER_ROWS                   16
 #define TILE_LOADED                   64
 #define TILE_ROWS                     32
 #define TILE_RUNS                     4
@@ -296,7 +338,9 @@
 #define FFT_COLUMNS    8
 #define FFT_ROWS       8
 #define FFT_MOST_RADIX 64
-#define FFT_LIMIT      1e28
+// The most where the other elements are in shared memory.
+#define FFT_MOST_GROUP_RADIX 16
+#define FFT_LIMIT            1e28
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -308,7 +352,9 @@
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
 // applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
 // first level. LEVELS is the number of levels that a pass adds up. RADIX_A to STAGE are of Fourier
-// transforms (fft.comp).
+// transforms (fft.comp). Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of
+// the stages; a workgroup has GROUP_SIZE invocations for each of GROUP_LINES lines, and exchanges
+// so many floats of each element at once.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -339,7 +385,14 @@
     CONSTANT(26, INVERSE, inverse) \
     CONSTANT(27, ROTATED, rotated) \
     CONSTANT(28, PADDED, padded) \
-    CONSTANT(29, STAGE, stage)
+    CONSTANT(29, STAGE, stage) \
+    CONSTANT(30, RADIX_1, radix_1) \
+    CONSTANT(31, RADIX_2, radix_2) \
+    CONSTANT(32, RADIX_3, radix_3) \
+    CONSTANT(33, RADIX_4, radix_4) \
+    CONSTANT(34, GROUP_LINES, group_lines) \
+    CONSTANT(35, GROUP_SIZE, group_size) \
+    CONSTANT(36, EXCHANGED, exchanged)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -404,6 +457,7 @@
     NAME(STORED_UFLOAT, 4, ufloat) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
+    NAME(BLOOM_LIT, 2, lit) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
     NAME(UPSAMPLE_CUBIC, 2, cubic) \

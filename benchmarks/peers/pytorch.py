@@ -57,6 +57,25 @@ def image_bloom(
     return {"PyTorch": bloom}
 
 
+def _on_device(torch: Any, work: Any, fetch: Any) -> tuple[Any, Any, Any]:
+    """Return call, seconds and fetch of work on the device, as `gpu_bloom` gives them."""
+
+    def call(_: int) -> Any:
+        start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+        with torch.inference_mode():
+            start.record()
+            result = work()
+            end.record()
+        end.synchronize()
+        return result, start, end
+
+    def seconds(result: Any) -> float:
+        _, start, end = result
+        return float(start.elapsed_time(end)) * 1e-3
+
+    return call, seconds, fetch
+
+
 def gpu_bloom(
     image: NDArray[Any], kernel: NDArray[np.float32], threshold: float
 ) -> dict[str, tuple[Any, Any, Any]]:
@@ -77,22 +96,6 @@ def gpu_bloom(
     source = torch.tensor(image, device="cuda").permute(2, 0, 1)[None].contiguous()
     glow = blur.glow(source, threshold)
 
-    def timed(work: Any) -> Any:
-        def call(_: int) -> Any:
-            start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
-            with torch.inference_mode():
-                start.record()
-                result = work()
-                end.record()
-            end.synchronize()
-            return result, start, end
-
-        return call
-
-    def seconds(result: Any) -> float:
-        _, start, end = result
-        return float(start.elapsed_time(end)) * 1e-3
-
     def fetch(result: Any) -> NDArray[Any]:
         picture: NDArray[Any] = result[0][0].permute(1, 2, 0).contiguous().cpu().numpy()
         return picture
@@ -101,6 +104,62 @@ def gpu_bloom(
         return source + blur.blur(blur.glow(source, threshold))
 
     return {
-        "PyTorch conv2d": (timed(bloom), seconds, fetch),
-        "PyTorch conv2d, blur alone": (timed(lambda: blur.blur(glow)), seconds, fetch),
+        "PyTorch conv2d": _on_device(torch, bloom, fetch),
+        "PyTorch conv2d, blur alone": _on_device(torch, lambda: blur.blur(glow), fetch),
+    }
+
+
+def gpu_convolution(
+    image: NDArray[np.float16],
+    kernel: NDArray[np.float32],
+    padded: tuple[int, int],
+    threshold: float,
+) -> dict[str, tuple[Any, Any, Any]]:
+    """Return the bloom of an image (H, W, 4) by Fourier transforms, and the convolution alone.
+
+    The kernel (3, h, w) has its centre at [0, 0], and the padded size. Values as `gpu_bloom`, and
+    a copy of the image's bytes on the device.
+    """
+    torch = importlib.import_module("torch")
+    if not torch.cuda.is_available():
+        raise RuntimeError("torch finds no CUDA device")
+    source = torch.tensor(image, device="cuda")
+    spectrum = torch.fft.rfft2(torch.tensor(kernel, device="cuda"))
+    weights = torch.tensor([*REC709, 0.0], device="cuda", dtype=torch.float16)
+    height, width = image.shape[:2]
+    target = torch.empty_like(source)
+
+    def glow_of() -> Any:
+        return torch.where((source @ weights > threshold)[..., None], source, 0)
+
+    def convolved(glow: Any) -> Any:
+        # Three real transforms: alpha is not convolved.
+        planes = glow[..., :3].permute(2, 0, 1).float()
+        spectra = torch.fft.rfft2(planes, padded)
+        spectra *= spectrum
+        return torch.fft.irfft2(spectra, padded)[:, :height, :width].permute(1, 2, 0)
+
+    def alone() -> Any:
+        result = torch.empty_like(source)
+        result[..., :3] = convolved(glow)
+        result[..., 3] = 1
+        return result
+
+    def bloom() -> Any:
+        result = source.clone()
+        result[..., :3] += convolved(glow_of())
+        return result
+
+    def copy() -> Any:
+        return target.copy_(source)
+
+    def fetch(result: Any) -> NDArray[Any]:
+        picture: NDArray[Any] = result[0].cpu().numpy()
+        return picture
+
+    glow = glow_of()
+    return {
+        "torch.fft": _on_device(torch, bloom, fetch),
+        "torch.fft, convolution alone": _on_device(torch, alone, fetch),
+        "plain copy on the device": _on_device(torch, copy, fetch),
     }

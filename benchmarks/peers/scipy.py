@@ -1,4 +1,4 @@
-"""SciPy: one-dimensional correlations along both axes, in 32-bit floats, on one thread."""
+"""SciPy in 32-bit floats: correlations along both axes on one thread, and transforms."""
 
 from __future__ import annotations
 
@@ -37,3 +37,26 @@ def image_bloom(
         return rounded(np.add(single, blurred, out=blurred), picture.dtype)
 
     return {"SciPy": bloom}
+
+
+def convolution(
+    kernel: NDArray[np.float32], padded: tuple[int, int], threshold: float, threads: int
+) -> dict[str, ImageBloom]:
+    """Return blooms of RGB images by Fourier transforms of so many `threads`.
+
+    The kernel (3, h, w) has its centre at [0, 0], and the padded size.
+    """
+    fft = importlib.import_module("scipy.fft")
+    spectrum = fft.rfft2(kernel, workers=threads)
+
+    def bloom(picture: NDArray[Any]) -> NDArray[Any]:
+        single, glow = glow_of(picture, threshold)
+        # Transforms of planes are faster than those of interleaved channels.
+        spectra = fft.rfft2(np.ascontiguousarray(glow.transpose(2, 0, 1)), padded, workers=threads)
+        spectra *= spectrum
+        blurred = fft.irfft2(spectra, padded, workers=threads, overwrite_x=True)
+        height, width = picture.shape[:2]
+        result = single + blurred[:, :height, :width].transpose(1, 2, 0)
+        return rounded(result, picture.dtype)
+
+    return {"SciPy's transforms": bloom}

@@ -69,8 +69,25 @@ static double reach_of(const struct vkb_graph *graph, const struct vkb_pass_row 
     return own_reach(pass) * height / least;
 }
 
-// The first row of a band must be one of every image, and an even one where shaders take rows in
-// pairs.
+// Whether the images of a pass may begin at any of their rows: it finds its place in its source
+// from row_offset (SAMPLING_ROWS). Other passes need rows that begin at the same place in all
+// images. These are passes that read levels of several sizes, have variants for other sizes
+// (blurs), or take rows in pairs.
+static bool places_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    const uint32_t height = graph->images[pass->targets[0]].height;
+    bool same = true;
+
+    for (uint32_t i = 0; i < pass->read_count; ++i)
+        same = same && graph->images[pass->reads[i]].height == height;
+    if (pass->shader == VKB_SHADER_hdrp_blur_frag || pass->shader == VKB_SHADER_godot_blur_frag)
+        return false;
+    return same
+        || (pass->constants.sampling == SAMPLING_FETCH && pass->block != VKB_BLOCK_blur
+            && pass->block != VKB_BLOCK_gather);
+}
+
+// Makes the first row of a band that of a row of an image, an even one.
 static bool align(struct vkb_bands *bands, uint32_t image_height, uint32_t height)
 {
     const uint32_t own = 2 * (height / common_divisor(height, image_height));
@@ -88,9 +105,20 @@ static bool include(const struct vkb_graph *graph, const struct vkb_pass_row *pa
              && !pass->constants.dither && pass->constants.sampling != SAMPLING_FILTER;
 
     *reach += reach_of(graph, pass, height);
+    if (places_rows(graph, pass))
+        return fits;
     for (uint32_t i = 0; fits && i < pass->read_count; ++i)
         fits = align(bands, graph->images[pass->reads[i]].height, height);
     return fits && align(bands, graph->images[pass->targets[0]].height, height);
+}
+
+// Stages of glare read far from a target's place, and levels of their own beside the bloom's.
+static bool has_glare(const struct vkb_graph *graph)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].block == VKB_BLOCK_streaks)
+            return true;
+    return false;
 }
 
 bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t height,
@@ -99,6 +127,8 @@ bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t he
     double before = 0.0, after = 0.0;
 
     *bands = (struct vkb_bands){.head = VKB_NO_IMAGE, .step = 1};
+    if (has_glare(graph))
+        return false;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (!is_tall(graph, graph->passes[i].targets[0], height)
             && reads_tall(graph, &graph->passes[i], height))
@@ -203,22 +233,79 @@ static void keep_images(struct vkb_graph *graph, const bool *wanted, uint32_t *p
     }
 }
 
+struct rows {
+    uint32_t first, end;
+};
+
+// The rows of an image that belong to a band of the source. A given image has all that the band may
+// read; an image that is rendered, those that depend on the band alone.
+static struct rows rows_of(const struct vkb_image_row *image, const struct vkb_part *part)
+{
+    const uint64_t first = (uint64_t)part->first * image->height,
+                   end = first + (uint64_t)part->rows * image->height;
+    const uint32_t before = image->input >= VKB_INPUT_LEVEL ? 0 : part->height - 1;
+    const uint32_t after = part->height - 1 - before;
+
+    return (struct rows){(uint32_t)((first + before) / part->height),
+                         (uint32_t)((end + after) / part->height)};
+}
+
+static bool is_split(const struct vkb_image_row *image, const struct vkb_part *part)
+{
+    const uint64_t end = (uint64_t)part->first + part->rows;
+
+    return part->first * (uint64_t)image->height % part->height != 0
+        || end * image->height % part->height != 0;
+}
+
+static void set_rows(const struct vkb_graph *graph, const struct vkb_part *part,
+                     struct vkb_pass_row *pass)
+{
+    const struct vkb_image_row *target = &graph->images[pass->targets[0]];
+    const struct vkb_image_row *source = &graph->images[pass->reads[0]];
+    const struct rows to = rows_of(target, part), from = rows_of(source, part);
+    struct vkb_params_rows rows = {.target_height = (int)(to.end - to.first)};
+
+    if (places_rows(graph, pass))
+        rows = (struct vkb_params_rows){
+            .target_height = (int)target->height,
+            .source_height = (int)source->height,
+            .row_offset = (int)(2
+                                * ((int64_t)to.first * source->height
+                                   - (int64_t)from.first * target->height)),
+        };
+    vkb_params_set_rows(pass->block, &rows, &pass->params);
+}
+
+// Gives the passes and images of a graph the rows of a band.
 static bool shorten(struct vkb_graph *graph, const struct vkb_part *part, struct vkb_error *error)
 {
-    for (uint32_t i = 0; i < graph->image_count; ++i) {
-        struct vkb_image_row *row = &graph->images[i];
-        const uint64_t rows = (uint64_t)row->height * part->rows;
-        if (part->rows == 0 && row->input != VKB_INPUT_NONE && row->input < VKB_INPUT_LEVEL)
-            return vkb_fail(error, VKB_ERROR_VALUE, "part: it needs the %s", row->name);
-        if (part->rows > 0 && rows % part->height != 0)
-            return vkb_fail(error, VKB_ERROR_VALUE, "part: %s has no such rows", row->name);
-        if (part->rows > 0)
-            row->height = (uint32_t)(rows / part->height);
-    }
-    for (uint32_t i = 0; part->rows > 0 && i < graph->pass_count; ++i) {
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
         struct vkb_pass_row *pass = &graph->passes[i];
-        vkb_params_set_height(pass->block, (int)graph->images[pass->targets[0]].height,
-                              &pass->params);
+        bool split = is_split(&graph->images[pass->targets[0]], part);
+        for (uint32_t read = 0; read < pass->read_count; ++read)
+            split = split || is_split(&graph->images[pass->reads[read]], part);
+        if (split && !places_rows(graph, pass))
+            return vkb_fail(error, VKB_ERROR_VALUE, "part: %s has no such rows", pass->name);
+        set_rows(graph, part, pass);
+    }
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const struct rows rows = rows_of(&graph->images[i], part);
+        if (rows.end <= rows.first)
+            return vkb_fail(error, VKB_ERROR_VALUE, "part: %s has no such rows",
+                            graph->images[i].name);
+        graph->images[i].height = rows.end - rows.first;
+    }
+    return true;
+}
+
+// Without a band the part reads no row of the source.
+static bool check_inputs(const struct vkb_graph *graph, struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const struct vkb_image_row *row = &graph->images[i];
+        if (row->input != VKB_INPUT_NONE && row->input < VKB_INPUT_LEVEL)
+            return vkb_fail(error, VKB_ERROR_VALUE, "part: it needs the %s", row->name);
     }
     return true;
 }
@@ -236,5 +323,5 @@ bool vkb_graph_take(struct vkb_graph *graph, const struct vkb_part *part, struct
     }
     vkb_free(wanted);
     vkb_free(places);
-    return found && shorten(graph, part, error);
+    return found && (part->rows > 0 ? shorten(graph, part, error) : check_inputs(graph, error));
 }

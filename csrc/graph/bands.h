@@ -11,7 +11,7 @@ struct vkb_bands {
     uint32_t head;                     // the first smaller image; VKB_NO_IMAGE: there is none
     uint32_t levels[GATHERED_LEVELS];  // the smaller images that the result is made of
     uint32_t level_count;
-    uint32_t step;   // bands and what they are given beyond them are multiples of this, in rows
+    uint32_t step;   // bands start and end at multiples of this, in rows
     uint32_t reach;  // rows beyond a band that it may depend on
 };
 
@@ -26,8 +26,8 @@ struct vkb_part {
     vkb_image_name outputs[GATHERED_LEVELS];  // become framebuffers
     vkb_image_name levels[GATHERED_LEVELS];   // become inputs
     uint32_t output_count, level_count;
-    uint32_t height;  // of the source
-    uint32_t rows;    // that a band has of it: the other images have their share; 0: no bands
+    uint32_t height;       // of the source
+    uint32_t first, rows;  // of a band of it: the other images have their share; rows 0: no bands
 };
 
 // Leaves of the graph what the part needs.

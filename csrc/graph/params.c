@@ -8,12 +8,37 @@
     {#name, VKB_VALUE_FLOAT, offsetof(struct vkb_values, name), initial, low, high},
 #define COUNT_ROW(name, initial, low, high) \
     {#name, VKB_VALUE_INT, offsetof(struct vkb_values, name), initial, low, high},
+#define GLARE_SETTING_ROW(name, initial, low, high) \
+    {#name, VKB_VALUE_FLOAT, offsetof(struct vkb_glare_values, name), initial, low, high},
+#define GLARE_COUNT_ROW(name, initial, low, high) \
+    {#name, VKB_VALUE_INT, offsetof(struct vkb_glare_values, name), initial, low, high},
 #define REAL_ROW(name, initial, low, high) \
     {#name, VKB_VALUE_DOUBLE, offsetof(struct vkb_values, name), initial, low, high},
 
 const struct vkb_value_row vkb_value_rows[] = {SETTING_ROWS(SETTING_ROW) COUNT_ROWS(COUNT_ROW)
                                                    REAL_ROWS(REAL_ROW)};
 const size_t vkb_value_row_count = sizeof vkb_value_rows / sizeof vkb_value_rows[0];
+
+const struct vkb_value_row vkb_glare_rows[] = {GLARE_SETTING_ROWS(GLARE_SETTING_ROW)
+                                                   GLARE_COUNT_ROWS(GLARE_COUNT_ROW)};
+const size_t vkb_glare_row_count = sizeof vkb_glare_rows / sizeof vkb_glare_rows[0];
+
+void vkb_value_store(void *values, const struct vkb_value_row *row, double number)
+{
+    char *place = (char *)values + row->offset;
+
+    switch (row->type) {
+    case VKB_VALUE_FLOAT:
+        *(float *)place = (float)number;
+        break;
+    case VKB_VALUE_INT:
+        *(int *)place = (int)number;
+        break;
+    case VKB_VALUE_DOUBLE:
+        *(double *)place = number;
+        break;
+    }
+}
 
 #define SPELLING(name, value, spelling) [value] = #spelling,
 #define SPELLINGS(choice, NAMES) static const char *const choice##_spellings[] = {NAMES(SPELLING)};
@@ -52,27 +77,23 @@ size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, uns
     return size;
 }
 
-void vkb_params_set_height(enum vkb_block block, int height, union vkb_params *params)
+#define SET_ROWS(block) \
+    case VKB_BLOCK_##block: \
+        params->block.target_height = rows->target_height; \
+        params->block.source_height = rows->source_height; \
+        params->block.row_offset = rows->row_offset; \
+        break;
+
+void vkb_params_set_rows(enum vkb_block block, const struct vkb_params_rows *rows,
+                         union vkb_params *params)
 {
     switch (block) {
-    case VKB_BLOCK_blur:
-        params->blur.target_height = height;
-        break;
-    case VKB_BLOCK_threshold:
-        params->threshold.target_height = height;
-        break;
-    case VKB_BLOCK_pyramid:
-        params->pyramid.target_height = height;
-        break;
-    case VKB_BLOCK_prefilter:
-        params->prefilter.target_height = height;
-        break;
-    case VKB_BLOCK_gather:
-        params->gather.target_height = height;
-        break;
-    case VKB_BLOCK_kawase:
-        params->kawase.target_height = height;
-        break;
+        SET_ROWS(blur)
+        SET_ROWS(threshold)
+        SET_ROWS(pyramid)
+        SET_ROWS(prefilter)
+        SET_ROWS(gather)
+        SET_ROWS(kawase)
     default:
         break;
     }

@@ -25,7 +25,7 @@ static void choose_sizes(struct vkb_levels *levels)
     const int height = levels->settings->values.max_mip_dimension;
     const uint32_t count = (uint32_t)fmax(floor(log2(height)), 2.0) - 1;
     const double width = floor((double)frame.width * height / frame.height + 0.5);
-    struct vkb_size size = {width < 1.0 ? 1 : (uint32_t)width, (uint32_t)height};
+    struct vkb_size size = {(uint32_t)fmin(fmax(width, 1.0), WIDEST_LEVEL), (uint32_t)height};
 
     for (levels->count = 0; levels->count < count; size = vkb_halved(size))
         levels->sizes[levels->count++] = size;

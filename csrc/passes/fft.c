@@ -80,6 +80,20 @@ struct vkb_fft_line vkb_fft_line(uint32_t least)
     return best;
 }
 
+bool vkb_fft_group_radices(uint32_t length, uint32_t *radices_found)
+{
+    uint32_t first = 0, stages = 0;
+    bool found = false;
+
+    for (uint32_t i = 0; i < VKB_FFT_STAGES; ++i)
+        radices_found[i] = 1;
+    while (radix_of(first) > FFT_MOST_GROUP_RADIX)
+        ++first;
+    while (is_smooth(length) && !found && stages < VKB_FFT_STAGES)
+        found = split(length, first, ++stages, radices_found);
+    return found;
+}
+
 static const enum vkb_shader shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_comp);
 
 static uint32_t groups(uint32_t invocations, uint32_t side)

@@ -16,6 +16,10 @@ struct vkb_fft_line {
 // The line of at least `least` elements, up to 32768, that takes the least time.
 struct vkb_fft_line vkb_fft_line(uint32_t least);
 
+// The radices of a length for stages in shared memory, VKB_FFT_STAGES of up to FFT_MOST_GROUP_RADIX
+// each, the longest first. False: there are none.
+bool vkb_fft_group_radices(uint32_t length, uint32_t *radices);
+
 // How lines lie, and what is there of them before the transform.
 struct vkb_fft_axis {
     enum vkb_mode direction;

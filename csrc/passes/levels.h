@@ -5,6 +5,10 @@
 
 #include "passes/pass.h"
 
+// The widest level of a method that gives its levels a height and the aspect of the frame. Every
+// usual device has images of this width.
+#define WIDEST_LEVEL 16384.0
+
 struct vkb_levels {
     const struct vkb_settings *settings;
     const struct vkb_bloom_source *source;

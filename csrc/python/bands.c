@@ -21,21 +21,30 @@ static bool read_names(PyObject *tuple, vkb_image_name *names, uint32_t *count)
     return true;
 }
 
-// (height, levels, is_band)
+// (height, levels, first), where first is the place of the source's rows, or -1: without rows of
+// it.
 bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyObject *names,
                    struct vkb_part *part)
 {
     PyObject *levels;
-    int is_band;
+    Py_ssize_t first;
 
     *part = (struct vkb_part){0};
     if (!vkb_require_tuple(tuple, "part") || !vkb_require_tuple(names, "names")
-        || !PyArg_ParseTuple(tuple, "O&O!p:part", vkb_read_uint32, &part->height, &PyTuple_Type,
-                             &levels, &is_band)
+        || !PyArg_ParseTuple(tuple, "O&O!n:part", vkb_read_uint32, &part->height, &PyTuple_Type,
+                             &levels, &first)
         || !read_names(names, part->outputs, &part->output_count)
         || !read_names(levels, part->levels, &part->level_count))
         return false;
-    part->rows = is_band ? source->source.image.size.height : 0;
+    if (first < 0)
+        return true;
+    part->rows = source->source.image.size.height;
+    if (part->rows > part->height || (uint64_t)first > part->height - part->rows) {
+        PyErr_Format(PyExc_ValueError, "part: rows %zd to %zd of %u", first,
+                     first + (Py_ssize_t)part->rows, part->height);
+        return false;
+    }
+    part->first = (uint32_t)first;
     return true;
 }
 
@@ -56,16 +65,16 @@ static bool check_levels(const struct vkb_graph *graph, const struct vkb_source 
     return true;
 }
 
-bool vkb_build_part(const struct vkb_device *device, const struct vkb_source *source,
-                    const struct vkb_settings *settings, const struct vkb_part *part,
-                    struct vkb_graph *graph, struct vkb_error *error)
+bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *settings,
+                    const struct vkb_part *part, struct vkb_graph *graph, struct vkb_error *error)
 {
     struct vkb_source whole = *source;
 
     if (source->kind != VKB_SOURCE_IMAGE)
         return vkb_fail(error, VKB_ERROR_VALUE, "part: only images have bands");
     whole.image.size.height = part->height;
-    return vkb_source_build(&whole, settings, device->max_side, graph, error)
+    // A device that takes a band need not be able to take the complete image.
+    return vkb_source_build(&whole, settings, VKB_MAX_SIDE, graph, error)
         && vkb_graph_take(graph, part, error) && check_levels(graph, source, error);
 }
 
@@ -75,9 +84,10 @@ static PyObject *describe_bands(const struct vkb_graph *graph, const struct vkb_
 
     if (!levels)
         return NULL;
-    return Py_BuildValue("(zNII)",
-                         bands->head == VKB_NO_IMAGE ? NULL : graph->images[bands->head].name,
-                         levels, bands->step, bands->reach);
+    const struct vkb_image_row *head =
+        bands->head == VKB_NO_IMAGE ? NULL : &graph->images[bands->head];
+    return Py_BuildValue("(zINII)", head ? head->name : NULL, head ? head->height : 0, levels,
+                         bands->step, bands->reach);
 }
 
 PyObject *vkb_renderer_bands(PyObject *object, PyObject *arguments)
@@ -101,7 +111,7 @@ PyObject *vkb_renderer_bands(PyObject *object, PyObject *arguments)
     if (whole.kind != VKB_SOURCE_IMAGE)
         vkb_fail(&error, VKB_ERROR_VALUE, "bands: only images have bands");
     if (whole.kind != VKB_SOURCE_IMAGE || !vkb_require_open(renderer, &error)
-        || !vkb_source_build(&whole, &settings, renderer->device.max_side, &graph, &error))
+        || !vkb_source_build(&whole, &settings, VKB_MAX_SIDE, &graph, &error))
         vkb_raise(state, &error);
     else if (vkb_graph_bands(&graph, vkb_graph_find(&graph, "final"), height, &bands))
         result = describe_bands(&graph, &bands);

@@ -102,6 +102,12 @@ bool vkb_make_attributes(struct vkb_module_state *state);
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 
+// Reads the stages of glare of a settings object; without the attribute there are none.
+bool vkb_read_glare(PyObject *object, struct vkb_settings *settings);
+
+// Sets the ValueError of a number that is out of its range; returns false.
+bool vkb_out_of_range(const char *name, PyObject *value, double low, double high);
+
 // Whether the object is a tuple, which PyArg_ParseTuple requires; otherwise sets a TypeError.
 bool vkb_require_tuple(PyObject *object, const char *what);
 
@@ -155,7 +161,9 @@ struct vkb_held_kernel {
     bool held;
 };
 
-// Asks a convolution's settings for the kernel of these sizes.
+// Asks a convolution's settings for the kernel of these sizes, or only for about its size.
+bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                          struct vkb_kernel_data *kernel);
 bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
                      struct vkb_held_kernel *held, struct vkb_kernel_data *kernel);
 void vkb_release_kernel(struct vkb_held_kernel *held);
@@ -203,9 +211,8 @@ PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images,
 // source brings, whether it is a band of the image).
 bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyObject *names,
                    struct vkb_part *part);
-bool vkb_build_part(const struct vkb_device *device, const struct vkb_source *source,
-                    const struct vkb_settings *settings, const struct vkb_part *part,
-                    struct vkb_graph *graph, struct vkb_error *error);
+bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *settings,
+                    const struct vkb_part *part, struct vkb_graph *graph, struct vkb_error *error);
 
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);

@@ -13,6 +13,7 @@ static const struct vkb_device any_device = {
         {
             .maxComputeSharedMemorySize = UINT32_MAX,
             .maxComputeWorkGroupInvocations = UINT32_MAX,
+            .maxComputeWorkGroupSize = {UINT32_MAX, UINT32_MAX, UINT32_MAX},
             .maxTexelBufferElements = UINT32_MAX,
             .maxStorageBufferRange = UINT32_MAX,
         },
@@ -126,25 +127,36 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
                         const struct vkb_part *part, struct vkb_graph *graph,
                         struct vkb_error *error)
 {
-    return (part ? vkb_build_part(device, source, settings, part, graph, error)
+    return (part ? vkb_build_part(source, settings, part, graph, error)
                  : vkb_source_build(source, settings, device->max_side, graph, error))
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_image_cache_check(device, graph, error);
 }
 
-// The kernel of a convolution for the source's sizes.
+// The kernel of a convolution for the source's sizes. The graph is built once before it is
+// computed, so that images which do not fit the device are refused at once: a large kernel takes
+// long.
 static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_device *device,
                         PyObject *settings_object, struct vkb_settings *settings,
                         struct vkb_plan_object *self)
 {
     struct vkb_size frame, buffers;
+    struct vkb_graph graph = {0};
     struct vkb_error error = {0};
 
     if (settings->method != VKB_METHOD_CONVOLUTION || !settings->values.bloom)
         return true;
-    if (vkb_source_sizes(&self->source, settings, device->max_side, &frame, &buffers, &error))
-        return vkb_read_kernel(settings_object, frame, buffers, &self->kernel, &settings->kernel);
+    if (vkb_source_sizes(&self->source, settings, device->max_side, &frame, &buffers, &error)) {
+        if (!vkb_read_kernel_size(settings_object, frame, buffers, &settings->kernel))
+            return false;
+        const bool fits = build_graph(device, VKB_VARIANTS_FRAGMENT, &self->source, settings, NULL,
+                                      &graph, &error);
+        vkb_graph_destroy(&graph);
+        if (fits)
+            return vkb_read_kernel(settings_object, frame, buffers, &self->kernel,
+                                   &settings->kernel);
+    }
     vkb_raise(state, &error);
     return false;
 }

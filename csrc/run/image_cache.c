@@ -146,6 +146,16 @@ static bool check_dispatches(const struct vkb_device *device, const struct vkb_g
     return true;
 }
 
+// Whether passes use the image: a variant may leave out images of the method.
+static bool is_used(const struct vkb_graph *graph, uint32_t image)
+{
+    bool used = vkb_is_given(&graph->images[image]);
+
+    for (uint32_t i = 0; !used && i < graph->pass_count; ++i)
+        used = vkb_pass_writes(&graph->passes[i], image);
+    return used;
+}
+
 // The images of a convolution, which are many times larger than the frame, must fit the largest
 // heap of the device together.
 static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
@@ -157,7 +167,8 @@ static bool check_memory(const struct vkb_device *device, const struct vkb_graph
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         const struct vkb_image_row *row = &graph->images[i];
         convolves = convolves || row->serial;
-        needed += (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
+        if (is_used(graph, i))
+            needed += (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
     }
     for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
         if (device->memory.memoryHeaps[i].size > largest)

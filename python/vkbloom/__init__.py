@@ -32,6 +32,7 @@ from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.convolution import Convolution
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
+from vkbloom.glare import Glare, Streaks
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
 from vkbloom.image import Image
 from vkbloom.plans import Pass, Plan
@@ -93,6 +94,7 @@ __all__ = [
     "FilamentBloom",
     "FitResult",
     "Frames",
+    "Glare",
     "GodotBloom",
     "GridReport",
     "HdrpBloom",
@@ -108,6 +110,7 @@ __all__ = [
     "Separable",
     "Settings",
     "ShaderError",
+    "Streaks",
     "Surface",
     "UnrealBloom",
     "UrpBloom",

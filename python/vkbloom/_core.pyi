@@ -5,9 +5,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 VALUES: dict[str, tuple[float, float, float]]
+GLARE_VALUES: dict[str, tuple[float, float, float]]
 CHOICES: dict[str, tuple[str, ...]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
+MAX_STAGES: int
 
 AdapterTuple = tuple[str, str, str, str, str, bytes, bool]
 _Array = NDArray[Any]
@@ -82,12 +84,12 @@ class Renderer:
         source: Source,
         settings: object,
         names: tuple[str, ...] | None,
-        part: tuple[int, tuple[str, ...], bool] = ...,
+        part: tuple[int, tuple[str, ...], int] = ...,
         /,
     ) -> Plan: ...
     def bands(
         self, source: Source, settings: object, height: int, /
-    ) -> tuple[str | None, tuple[str, ...], int, int] | None: ...
+    ) -> tuple[str | None, int, tuple[str, ...], int, int] | None: ...
     def run(
         self,
         source: Source,

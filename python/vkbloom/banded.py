@@ -90,7 +90,7 @@ class BloomByBands:
         self._settings = settings
         self._sample = sample.rows(0, 1)
         self._height = height
-        self._head, self._names, self._rows, self._halo = parts
+        self._parts = parts
         self._levels: tuple[NDArray[Any], ...] = ()
 
     @classmethod
@@ -99,14 +99,16 @@ class BloomByBands:
     ) -> Self | None:
         """Make one; None where the bloom needs the whole image.
 
-        That is where the sizes of image and bloom have no small common divisor, where the bloom
-        reaches too far, and for dithering, which depends on a pixel's place.
+        That is where the bloom reaches too far, for dithering, which depends on a pixel's place,
+        and for passes that need rows at the same place in all images (Godot's, and `Separable`'s
+        with buffers of another size) where the heights have no small common divisor.
         """
         found = core.bands(sample.source(), settings, height)
         if found is None:
             return None
-        head, names, step, reach = found
-        parts = _Parts(head, names, max(rows // step, 1) * step, -(-reach // step) * step)
+        head, head_height, levels, step, reach = found
+        rows, halo = max(rows // step, 1) * step, -(-reach // step) * step
+        parts = _Parts(head, head_height, levels, rows, halo)
         if 2 * (parts.rows + 2 * parts.halo) > height:
             return None
         return cls(core, settings, sample, height, parts)
@@ -119,25 +121,28 @@ class BloomByBands:
         bands : iterable of Band
             With any number of rows each.
         """
-        if self._head is None:
+        head, head_height, names, _, _ = self._parts
+        if head is None:
             for band in bands:
                 yield len(band.image)
             return
         reduced: list[NDArray[Any]] = []
         for window in self._windows(bands):
-            part = self._height, (), True
-            (array,) = self._render(window.rows.source(), (self._head,), part)
-            # Rows of it for as many rows of the window.
-            count, own = len(array), len(window.rows.image)
-            reduced.append(array[window.first * count // own : window.end * count // own])
+            (array,) = self._render(window.rows.source(), (head,), (self._height, (), window.top))
+            # The first row that belongs to the window, and those of the window's own rows.
+            top, first, end = (
+                -(-place * head_height // self._height)
+                for place in (window.top, window.top + window.first, window.top + window.end)
+            )
+            reduced.append(array[first - top : end - top])
             yield window.end - window.first
-        head = np.concatenate(reduced)
+        smaller = np.concatenate(reduced)
         del reduced
-        others = tuple(name for name in self._names if name != self._head)
-        source = self._sample.source((head,))
-        made = self._render(source, others, (self._height, (self._head,), False)) if others else ()
-        found = {**dict(zip(others, made, strict=True)), self._head: head}
-        self._levels = tuple(found[name] for name in self._names)
+        others = tuple(name for name in names if name != head)
+        source = self._sample.source((smaller,))
+        made = self._render(source, others, (self._height, (head,), -1)) if others else ()
+        found = {**dict(zip(others, made, strict=True)), head: smaller}
+        self._levels = tuple(found[name] for name in names)
 
     @property
     def is_without(self) -> bool:
@@ -146,18 +151,21 @@ class BloomByBands:
 
     def finals(self, bands: Iterable[Band]) -> Iterator[NDArray[Any]]:
         """Take the image once more, and yield the rows of `final`; after `reduce`."""
-        part = self._height, self._names, True
         for window in self._windows(bands):
             first, end = window.top, window.top + len(window.rows.image)
             levels = tuple(
-                level[first * len(level) // self._height : end * len(level) // self._height]
+                level[first * len(level) // self._height : -(-end * len(level) // self._height)]
                 for level in self._levels
             )
-            (final,) = self._render(window.rows.source(levels), ("final",), part)
+            (final,) = self._render(
+                window.rows.source(levels),
+                ("final",),
+                (self._height, self._parts.levels, first),
+            )
             yield final[window.first : window.end]
 
     def _render(
-        self, source: _core.Source, names: tuple[str, ...], part: tuple[int, tuple[str, ...], bool]
+        self, source: _core.Source, names: tuple[str, ...], part: tuple[int, tuple[str, ...], int]
     ) -> tuple[NDArray[Any], ...]:
         plan = self._core.plan(source, self._settings, names, part)
         arrays = {name: np.empty(shape, dtype) for name, shape, dtype in plan.outputs}
@@ -172,13 +180,13 @@ class BloomByBands:
             held = band if held is None else held.joined(band)
             end = top + len(held.image)
             while first < self._height:
-                last = min(first + self._rows, self._height)
-                beyond = min(last + self._halo, self._height)
+                last = min(first + self._parts.rows, self._height)
+                beyond = min(last + self._parts.halo, self._height)
                 if beyond > end:
                     break
                 yield _Window(held.rows(0, beyond - top), top, first - top, last - top)
                 first = last
-                kept = max(first - self._halo, 0)
+                kept = max(first - self._parts.halo, 0)
                 held = held.rows(kept - top)
                 top = kept
 
@@ -190,6 +198,7 @@ class _Parts(NamedTuple):
     ----------
     head : str or None
         The smaller image that bands are reduced to.
+    head_height : int
     levels : tuple of str
         Those that the result is made of.
     rows : int
@@ -199,6 +208,7 @@ class _Parts(NamedTuple):
     """
 
     head: str | None
+    head_height: int
     levels: tuple[str, ...]
     rows: int
     halo: int
@@ -235,16 +245,19 @@ class ImageByBands:
         The first rows.
     height : int
         Height of the image in rows.
+    settings : Settings
 
     Raises
     ------
     ValueError, OutOfMemoryError, Error
-        As `vkbloom.Renderer.upload`.
+        As `vkbloom.Renderer.upload` and `apply`.
     """
 
-    def __init__(self, core: _core.Renderer, rows: Band, height: int) -> None:
+    def __init__(self, core: _core.Renderer, rows: Band, height: int, settings: Settings) -> None:
         self._core = core
         self._source = core.upload(rows.source(), None, False, height)
+        # Also refuses what does not fit the device, before more rows are read.
+        self._plan = core.plan(self._source, settings, ("final",))
         self._filled = len(rows.image)
 
     def add(self, rows: Band) -> None:
@@ -252,10 +265,9 @@ class ImageByBands:
         self._core.fill(self._source, rows.source(), self._filled)
         self._filled += len(rows.image)
 
-    def final(self, settings: Settings, first: int, count: int) -> NDArray[Any]:
+    def final(self, first: int, count: int) -> NDArray[Any]:
         """Return rows of the framebuffer `final`; the first call renders it."""
-        plan = self._core.plan(self._source, settings, ("final",))
-        ((_, (_, *rest), dtype),) = plan.outputs
+        ((_, (_, *rest), dtype),) = self._plan.outputs
         array = np.empty((count, *rest), dtype)
-        self._core.run(self._source, (plan,), ((array,),), first, count).wait()
+        self._core.run(self._source, (self._plan,), ((array,),), first, count).wait()
         return array

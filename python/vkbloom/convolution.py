@@ -15,7 +15,7 @@ from vkbloom.checks import check_size
 from vkbloom.psf.base import PSF, check_above
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.resampling import box_resample
-from vkbloom.psf.sampled import samples
+from vkbloom.psf.sampled import SampledPSF, samples
 from vkbloom.settings import Settings, choice_field
 
 __all__ = ["Boundary", "Convolution", "PSFLike"]
@@ -139,6 +139,7 @@ class Convolution(Settings):
             Plain values that JSON can hold.
         """
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        values["glare"] = [stage.to_dict() for stage in self.glare]
         return {"method": self.method, **values, "psf": cast("PSF", self.psf).to_dict()}
 
     @property
@@ -179,6 +180,16 @@ class Convolution(Settings):
         """Return the same for the core."""
         pixels, serial, is_grey = _core_kernel(self._shape, frame, buffers)
         return CoreKernel(pixels, serial, is_grey, self.prefilter)
+
+    def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
+        """Return about the kernel's width and height; (1, 1) where only the kernel tells them."""
+        if self.kernel_size is None and isinstance(self.psf, SampledPSF):
+            return 1, 1
+        sides = self.kernel_size or tuple(2 * side - 1 for side in frame)
+        width, height = (
+            max(side * to // of, 1) for side, to, of in zip(sides, buffers, frame, strict=True)
+        )
+        return width, height
 
     @property
     def _shape(self) -> Convolution:

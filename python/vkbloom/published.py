@@ -65,11 +65,11 @@ class BevyBloom(Settings):
     Notes
     -----
     ``down_0`` is `max_mip_dimension` high; its width follows from the aspect of the frame
-    (rounded). It is the sum of the five groups of the 13 taps of Jimenez, in texels of the frame.
-    Each group p, multiplied by its share, is divided by 1 + luminance(p) / 4. The sum is at least
-    0.0001; then the threshold is applied. There are N = floor(log2(max_mip_dimension)) - 1 levels.
-    Each next level has half the size, floored, by the plain 13 taps. For level m, with
-    x = m / (N - 1), f_m is
+    (rounded, at most 16384). It is the sum of the five groups of the 13 taps of Jimenez, in texels
+    of the frame. Each group p, multiplied by its share, is divided by 1 + luminance(p) / 4. The sum
+    is at least 0.0001; then the threshold is applied. There are
+    N = floor(log2(max_mip_dimension)) - 1 levels. Each next level has half the size, floored, by
+    the plain 13 taps. For level m, with x = m / (N - 1), f_m is
 
         (intensity + (1 - (1 - x)^(1 / (1 - curvature))) * boost * (1 - intensity))
         * (1 - clamp((x - high_pass) / high_pass, 0, 1)),
@@ -182,7 +182,8 @@ class FilamentBloom(Settings):
 
     Notes
     -----
-    The width of ``down_0`` follows from the aspect of the frame, floored to a multiple of 16. While
+    The width of ``down_0`` follows from the aspect of the frame, floored to a multiple of 16, at
+    most 16384. While
     ``down_0`` is less than half of the frame in width or height, the frame is halved first. All
     these steps are a bilinear sample of the image convolved with (1 2 1)^2 / 16. The first one
     includes the threshold: its four bilinear taps are weighted by 1 / (1 + brightest channel);

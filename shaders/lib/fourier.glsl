@@ -122,38 +122,24 @@ void transform_few(int count, int first, int step, bool inverse)
             held[first + i * step] = v[i];
 }
 
-// Of the first RADIX_A * RADIX_B elements; the result's element q is held[place_of(q)].
-const int RADIX = RADIX_A * RADIX_B;
-
-int place_of(int q)
+// Of the first a * b elements, both constants; the result's element q is held[place_of(q, a, b)].
+int place_of(int q, int a, int b)
 {
-    return RADIX_B * (q % RADIX_A) + q / RADIX_A;
+    return b * (q % a) + q / a;
 }
 
-void transform_held(bool inverse)
+void transform_held(int a, int b, bool inverse)
 {
-    [[unroll]] for (int j = 0; j < RADIX_B; ++j)
-        transform_few(RADIX_A, j, RADIX_B, inverse);
-    [[unroll]] for (int q = 1; q < RADIX_A; ++q) {
-        [[unroll]] for (int j = 1; j < RADIX_B; ++j) {
+    [[unroll]] for (int j = 0; j < b; ++j)
+        transform_few(a, j, b, inverse);
+    [[unroll]] for (int q = 1; q < a; ++q) {
+        [[unroll]] for (int j = 1; j < b; ++j) {
             // Of constants: compilers compute it.
-            float angle = 6.2831853071795865 * float(q * j) / float(RADIX);
+            float angle = 6.2831853071795865 * float(q * j) / float(a * b);
             vec2 turned = vec2(cos(angle), inverse ? sin(angle) : -sin(angle));
-            held[RADIX_B * q + j] = rotated(held[RADIX_B * q + j], turned);
+            held[b * q + j] = rotated(held[b * q + j], turned);
         }
     }
-    [[unroll]] for (int q = 0; q < RADIX_A; ++q)
-        transform_few(RADIX_B, RADIX_B * q, 1, inverse);
-}
-
-// exp(-2 pi i k q / n), or its inverse, for q of 0 to RADIX - 1.
-vec2 turns[FFT_MOST_RADIX];
-
-void compute_turns(int k, int n, bool inverse)
-{
-    vec2 one = turn(k, n);
-    turns[0] = vec2(1.0, 0.0);
-    turns[1] = inverse ? conjugate(one) : one;
-    [[unroll]] for (int q = 2; q < RADIX; ++q)
-        turns[q] = product(turns[q / 2], turns[q - q / 2]);
+    [[unroll]] for (int q = 0; q < a; ++q)
+        transform_few(b, b * q, 1, inverse);
 }

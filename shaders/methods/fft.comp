@@ -33,6 +33,8 @@ layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec2 texels[]; }
 layout(set = 0, binding = 3, std430) writeonly buffer Target { uint texels[]; } target;
 #endif
 
+const int RADIX = RADIX_A * RADIX_B;
+
 ivec2 texel_at(int along, int across)
 {
     return DIRECTION == DIRECTION_HORIZONTAL ? ivec2(along, across) : ivec2(across, along);
@@ -41,15 +43,7 @@ ivec2 texel_at(int along, int across)
 vec4 load_source(ivec2 at)
 {
 #ifdef WORDS
-    uvec4 word = texelFetch(source, at.y * words.reads[0].z + at.x * CHANNEL_BYTES / 4);
-#if CHANNEL_BYTES == 1
-    uvec2 half_word = (at.x & 2) == 0 ? word.xy : word.zw;
-    return value_of(uvec4((at.x & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0));
-#elif CHANNEL_BYTES == 2
-    return value_of(uvec4((at.x & 1) == 0 ? word.xy : word.zw, 0, 0));
-#else
-    return uintBitsToFloat(word);
-#endif
+    return load_pixel(source, words.reads[0], at.x, at.y);
 #else
     return imageLoad(source, at);
 #endif
@@ -70,10 +64,10 @@ void store(ivec2 at, vec4 value)
     imageStore(target, at, value);
 #elif TARGET_BYTES == 4
     // (Without the maximum LLVM packs lane by lane.)
-    target.texels[at.y * words.target.z + at.x] = max(floatBitsToUint(value), uvec4(words.zero));
+    target.texels[at.y * words.target.z + at.x] = max(floatBitsToUint(value), uvec4(words.reads[0].w));
 #elif TARGET_BYTES == 2
     uvec2 bits = uvec2(packHalf2x16(value.rg), packHalf2x16(value.ba));
-    target.texels[2 * at.y * words.target.z + at.x] = max(bits, uvec2(words.zero));
+    target.texels[2 * at.y * words.target.z + at.x] = max(bits, uvec2(words.reads[0].w));
 #else
     // A sum with 2^23 is rounded to an integer, which its last bits are.
     uvec4 level = floatBitsToUint(value * 255.0 + 8388608.0) & 255u;
@@ -82,43 +76,28 @@ void store(ivec2 at, vec4 value)
 #endif
 }
 
-// Unreal Engine's filter of bright colours.
-vec3 prefiltered(vec3 colour)
+#include "lib/padded.glsl"
+
+int place_of(int q)
 {
-    float luminance = dot(colour, vec3(0.2126, 0.7152, 0.0722));
-    float wanted = min(params.prefilter_factor * (luminance - params.prefilter_min)
-                           + params.prefilter_min,
-                       params.prefilter_max);
-    bool filters =
-        params.prefilter_max >= params.prefilter_min && luminance > params.prefilter_min;
-    return filters ? colour * (wanted / luminance) : colour;
+    return place_of(q, RADIX_A, RADIX_B);
 }
 
-vec4 glow_of(vec4 texel)
+void transform_held(bool inverse)
 {
-    vec4 kept = clamp(finite_or_zero(texel), -FFT_LIMIT, FFT_LIMIT);
-    return vec4(prefiltered(kept.rgb), ALPHA == ALPHA_BLUR ? kept.a : 0.0);
+    transform_held(RADIX_A, RADIX_B, inverse);
 }
 
-// What the transform has at a place of the padded line. Where that lies before the source's first texel
-// it is from `turn` on.
-vec4 load_padded(int along, int across)
-{
-    bool inside = along < params.extent, behind = along < params.turn;
-    int place = along;
-    if (params.boundary == BOUNDARY_WRAP)
-        place = behind ? along - params.extent : along - params.padded + params.extent;
-    else
-        place = behind ? params.extent - 1 : 0;
-    place = inside ? along : clamp(place, 0, params.extent - 1);
-    vec4 texel = load_source(texel_at(place, across));
-    return inside || params.boundary != BOUNDARY_ZERO ? texel : vec4(0.0);
-}
+// exp(-2 pi i k q / n), or its inverse, for q of 0 to RADIX - 1.
+vec2 turns[FFT_MOST_RADIX];
 
-vec4 load(int along, int across)
+void compute_turns(int k, int n, bool inverse)
 {
-    vec4 texel = PADDED != 0 ? load_padded(along, across) : load_source(texel_at(along, across));
-    return STAGE == STAGE_FIRST ? glow_of(texel) : texel;
+    vec2 one = turn(k, n);
+    turns[0] = vec2(1.0, 0.0);
+    turns[1] = inverse ? conjugate(one) : one;
+    [[unroll]] for (int q = 2; q < RADIX; ++q)
+        turns[q] = product(turns[q / 2], turns[q - q / 2]);
 }
 
 void load_line(int first, int across)

@@ -29,6 +29,12 @@ def settings_with(**fields: Any) -> object:
     return given
 
 
+def stage_with(**fields: Any) -> object:
+    given = Given()
+    vars(given).update({"stage": "streaks", **fields})
+    return given
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
@@ -60,10 +66,16 @@ def settings_with(**fields: Any) -> object:
         ({"layers": ((1.0, 1.0),) * 9}, "layers: 9 layers are out of range, 1 to 8"),
         ({"layers": (1.0,)}, "layers: a tuple is needed, not 1.0"),
         ({"layers": 5}, "len|sequence"),
+        ({"glare": 5}, "glare: a tuple is needed, not 5"),
+        ({"glare": (5,)}, "'int' object has no attribute 'stage'"),
+        ({"glare": (stage_with(stage="rain"),)}, "glare: there is no stage 'rain'"),
+        ({"glare": (stage_with(stage=5),)}, "glare: there is no stage 5"),
+        ({"glare": (stage_with(fade="1"),)}, "real number"),
+        ({"glare": (stage_with(),) * 6}, "glare: 6 stages are out of range, 0 to 5"),
     ],
 )
 def test_settings(fields: dict[str, Any], message: str) -> None:
-    with pytest.raises((TypeError, ValueError), match=message):
+    with pytest.raises((TypeError, ValueError, AttributeError), match=message):
         scene_plan(settings_with(**fields), (16, 16))
 
 
@@ -73,6 +85,17 @@ def test_every_number_has_a_range(name: str) -> None:
     for wrong in (low - 1, high + 1, np.nextafter(low, -np.inf), np.inf, -np.inf, np.nan, 1e300):
         with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
             scene_plan(settings_with(**{name: float(wrong)}), (16, 16))
+
+
+@pytest.mark.parametrize("name", sorted(_core.GLARE_VALUES))
+def test_every_number_of_glare_has_a_range(name: str) -> None:
+    _, low, high = _core.GLARE_VALUES[name]
+    for wrong in (low - 1, high + 1, np.inf, np.nan, 1e300):
+        glare = (stage_with(**{name: float(wrong)}),)
+        with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
+            scene_plan(settings_with(glare=glare), (16, 16))
+    for end in (low, high):
+        scene_plan(settings_with(glare=(stage_with(**{name: end}),)), (16, 16))
 
 
 @pytest.mark.parametrize("method", ["pyramid", "dual_kawase", *METHODS])

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from typing import Any, cast
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -104,6 +106,33 @@ def test_long_lines(renderer: Renderer) -> None:
     assert_close(renderer, image_of(4201, 3), Convolution(kernel_of(101, 2), boundary="edge"))
     # In colour: the frequencies of the other sign lie elsewhere.
     assert_close(renderer, image_of(4, 1100), Convolution(kernel_of(3, 99)))
+
+
+@pytest.fixture(scope="module")
+def gpu() -> Iterator[Renderer]:
+    """A renderer with the variants of GPUs, which transform complete lines."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VKBLOOM_FORM", "gpu")
+        opened = Renderer(validation=True)
+    with opened:
+        yield opened
+
+
+def test_complete_lines(gpu: Renderer) -> None:
+    """Of several stages and of one; with colours and alpha, and pixels beyond an edge."""
+    image = np.clip(image_of(17, 5, 4), 0, 1)
+    settings = Convolution(kernel_of(20, 7), boundary="edge", alpha="blur")
+    plan = gpu.plan(image, settings)
+    assert [each.variant for each in plan.passes].count("lines") == 6
+    bloom = gpu.apply(image, settings)["bloom"]
+    np.testing.assert_allclose(bloom, reference.apply(image, settings)["bloom"], atol=1e-5)
+
+
+def test_lines_that_shared_memory_cannot_hold(gpu: Renderer) -> None:
+    """They run stage by stage, which needs more images."""
+    image = np.zeros((1, 16000, 3), np.float32)
+    passes = gpu.plan(image, Convolution(kernel_of(3, 1))).passes
+    assert "lines" not in [each.variant for each in passes]
 
 
 def test_other_sizes(renderer: Renderer) -> None:
@@ -247,3 +276,10 @@ def test_too_large(renderer: Renderer, scene: Scene) -> None:
     # Three images of 8192 x 8192 or less, 16 bytes a texel.
     with pytest.raises(OutOfMemoryError, match=r"[34]\d{3} MiB of images are needed"):
         renderer.plan(scene, Convolution(kernel_of(3, 3), bloom_size=size), size)
+    # It does not first compute a kernel of four times the size.
+    convolution = Convolution(kernel_size=(15999, 15999), bloom_size=size)
+    with (
+        patch.object(Convolution, "core_kernel", side_effect=AssertionError),
+        pytest.raises(OutOfMemoryError, match="MiB of images are needed"),
+    ):
+        renderer.plan(scene, convolution, size)

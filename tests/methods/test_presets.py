@@ -329,6 +329,19 @@ def test_filaments_other_settings(renderer: Renderer, settings: Settings, format
     check(renderer, lights((211, 153), "float32"), settings.replace(format=format))
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [BevyBloom(max_mip_dimension=64), FilamentBloom(resolution=64)],
+    ids=["bevy", "filament"],
+)
+def test_levels_of_very_wide_frames(renderer: Renderer, settings: Settings) -> None:
+    """Of a row of pixels, the first level would be wider than an image of a device can be."""
+    row = lights((300, 2), "float32")[:1]
+    frames = renderer.apply(row, settings, attachments=("down_0",))
+    assert frames["down_0"].shape[:2] == (64, 16384)
+    check(renderer, row, settings)
+
+
 def test_filament_has_no_knee() -> None:
     with pytest.raises(ValueError, match=r"knee: 0\.5 is not 0"):
         FilamentBloom(knee=0.5)

@@ -30,6 +30,8 @@ __all__ = ["Large", "apply_by_rows", "is_large"]
 
 #: Pixels from which on a picture is taken by rows.
 LARGE: Final = 1 << 24
+#: Rows and columns that an image of usual devices has at the most. More are taken by rows.
+LONGEST_SIDE: Final = 1 << 14
 #: Pixels from which on a file of 8 bits becomes half floats, whose steps are finer than its own.
 HALVED: Final = 1 << 26
 
@@ -61,7 +63,7 @@ def is_large(path: str, subimage: int = 0, layer: str | None = None) -> bool:
     """Whether a file is taken by rows; a file that cannot be opened is not."""
     try:
         with opened_rows(path, subimage, layer) as rows:
-            return rows.size[0] * rows.size[1] >= LARGE
+            return rows.size[0] * rows.size[1] >= LARGE or max(rows.size) > LONGEST_SIDE
     except (OSError, ValueError):
         return False
 
@@ -97,7 +99,8 @@ def apply_by_rows(
         bands = stack.enter_context(closing(reading.bands()))
         first = next(bands)
         taken = itertools.chain([first], bands)
-        bloom = BloomByBands.of(renderer._core, settings, first, height, len(first.image))
+        count = min(len(first.image), LONGEST_SIDE // 4)
+        bloom = BloomByBands.of(renderer._core, settings, first, height, count)
         if bloom is None:
             finals = _held_whole(renderer, settings, taken, height, bar)
         else:
@@ -129,13 +132,13 @@ def _held_whole(
 ) -> Iterator[NDArray[Any]]:
     """Yield the rows of `final` of an image that the device holds."""
     first = next(bands)
-    image = ImageByBands(renderer._core, first, height)
+    image = ImageByBands(renderer._core, first, height, settings)
     bar.update(len(first.image))
     for band in bands:
         image.add(band)
         bar.update(len(band.image))
     for top in range(0, height, len(first.image)):
-        yield image.final(settings, top, min(len(first.image), height - top))
+        yield image.final(top, min(len(first.image), height - top))
 
 
 class _Reading:

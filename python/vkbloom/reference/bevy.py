@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .image import Storage
-from .levels import halved
+from .levels import WIDEST_LEVEL, halved
 from .pyramid import downsample, groups
 from .sampling import Array
 from .threshold import luminance, masked, soften
@@ -34,7 +34,8 @@ def passes(
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    down_0 is `max_mip_dimension` high, and its width follows from the aspect of the frame. Each
+    down_0 is `max_mip_dimension` high, and its width follows from the aspect of the frame, up to
+    `WIDEST_LEVEL`. Each
     next level has half the size. With p_g the five groups of the 13 taps, each times its share,
     down_0 is the sum of p_g / (1 + luminance(p_g) / 4), at least 0.0001, followed by the soft
     threshold. The other levels are the plain 13 taps. In up_k, the smaller level has the share
@@ -45,7 +46,7 @@ def passes(
     limit = settings.max_mip_dimension
     scale = (settings.scale_x, settings.scale_y)
     up = partial(tent, x_step=settings.scale_x, y_step=settings.scale_y)
-    level = (max(1, math.floor(width * limit / height + 0.5)), limit)
+    level = (min(max(1, math.floor(width * limit / height + 0.5)), WIDEST_LEVEL), limit)
     downs = [store(masked(_prefilter(glow, level, settings), mask))]
     for _ in range(1, _level_count(settings)):
         level = halved(level)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .image import Storage
-from .levels import halved
+from .levels import WIDEST_LEVEL, halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
 from .threshold import brightest, firefly_weight, masked
@@ -34,17 +34,18 @@ def passes(
 ) -> dict[str, Array]:
     """Return the framebuffers.
 
-    down_0 is `resolution` high, and its width follows from the aspect of the frame; both sides are
-    floored to multiples of 16. The frame is halved until down_0 is more than half of it, then
-    reduced to down_0, each time by the 3 x 3 binomial. The first of these steps includes the
-    threshold. Each further level has half the size, by nine taps, or by 13 if a side of the level
-    above is odd. up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level; the
-    bloom is up_0, bilinear, divided by the number of levels.
+    down_0 is `resolution` high, and its width follows from the aspect of the frame, up to
+    `WIDEST_LEVEL`; both sides are floored to multiples of 16. The frame is halved until down_0 is
+    more than half of it, then reduced to down_0, each time by the 3 x 3 binomial. The first of
+    these steps includes the threshold. Each further level has half the size, by nine taps, or by
+    13 if a side of the level above is odd. up_k = down_k + tent(up_k+1) with a tent of one pixel of
+    the larger level; the bloom is up_0, bilinear, divided by the number of levels.
     """
     height, width, _ = glow.shape
     top = settings.resolution
+    across = min(top * width / height, WIDEST_LEVEL)
     level = (
-        16 * max(1, math.floor(top * width / height / 16)),
+        16 * max(1, math.floor(across / 16)),
         16 * max(1, math.floor(top / 16)),
     )
     image, above, threshold = glow, (width, height), settings.threshold
@@ -53,7 +54,7 @@ def passes(
         image = store(masked(_reduce(image, above, threshold, settings.highlight), mask))
         threshold = mask = None
     downs = [store(masked(_reduce(image, level, threshold, settings.highlight), mask))]
-    longer = math.floor(max(top * width / height, top))
+    longer = math.floor(max(across, top))
     count = min(settings.levels, math.floor(math.log2(longer)) + 1)
     for _ in range(1, count):
         is_even = level[0] % 2 == 0 and level[1] % 2 == 0

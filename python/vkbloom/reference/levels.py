@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-__all__ = ["halved", "level_sizes"]
+from typing import Final
+
+__all__ = ["WIDEST_LEVEL", "halved", "level_sizes"]
+
+#: The widest level of a method that gives its levels a height and the aspect of the frame.
+WIDEST_LEVEL: Final = 16384
 
 
 def halved(size: tuple[int, int]) -> tuple[int, int]:
