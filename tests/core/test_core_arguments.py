@@ -301,6 +301,18 @@ def test_plans_with_other_images(renderer: Renderer) -> None:
         plans[0].shares_images(source)  # type: ignore[arg-type]
 
 
+def test_plans_of_an_image(renderer: Renderer, scene: Scene) -> None:
+    source, (plan,) = planned(renderer, Separable())
+    assert plan.is_of_image(source)
+    assert not plan.is_of_image(_core.image_source(np.zeros((4, 5, 3), np.uint8)))
+    # The camera is part of a scene's plan.
+    of_scene = _core.scene_source(*scene_arguments(scene, (4, 4), "forward", 0.0))
+    plan = renderer._core.plan(of_scene, Separable(), None)
+    assert not plan.is_of_image(of_scene)
+    with pytest.raises(TypeError, match="a Source is needed"):
+        plan.is_of_image(plan)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("names", [["final"], "final", 5], ids=str)
 def test_names_that_are_no_tuple(renderer: Renderer, names: Any) -> None:
     with pytest.raises(TypeError, match="attachments: a tuple is needed"):
