@@ -20,7 +20,14 @@ STAGES = (".vert", ".frag", ".comp")
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
 # Shaders whose images are always words.
-WORDS_ALONE = {"strip.comp", "threshold.comp", "blend.comp"}
+WORDS_ALONE = {
+    "strip.comp",
+    "threshold.comp",
+    "blend.comp",
+    "filter_rows.comp",
+    "filter_columns.comp",
+    "gather_columns.comp",
+}
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}
 # For shaders that keep arrays in registers: the optimizer makes one function of all. NVIDIA's driver

@@ -10,6 +10,9 @@
 //   INPUT(B, type, name)   a float or int that the core fills in for each pass
 //   VEC4S(B, name, count)  an array of vec4 that the core fills in for each pass
 //
+// The numbers of the stages of glare are in lists of their own, GLARE_SETTING_ROWS and
+// GLARE_COUNT_ROWS: settings can have several stages. The core fills them in.
+//
 // The block of a fused pass has the rows of the passes that it replaces.
 
 // The settings that shaders read, and `radius`: floats, SETTING(name, default, min, max).
@@ -141,6 +144,30 @@
     READS(B, offset) \
     SAMPLING_ROWS(B, INPUT)
 
+// An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
+// weight of each for each channel. The threshold is for the first iteration.
+#define STREAKS_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y) \
+    INPUT(B, int, count) \
+    VEC4S(B, weights, MOST_TAPS)
+
+// Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
+// ghosts.
+#define FLARE_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, maximum) \
+    INPUT(B, float, aberration) \
+    INPUT(B, float, radius) \
+    INPUT(B, float, falloff) \
+    INPUT(B, float, vignette) \
+    INPUT(B, float, width) \
+    INPUT(B, int, count) \
+    VEC4S(B, ghosts, MOST_GHOSTS)
+
 // The light of the deferred system.
 #define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
 
@@ -209,6 +236,8 @@
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
+    BLOCK(streaks, STREAKS_BLOCK) \
+    BLOCK(flare, FLARE_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
@@ -250,6 +279,27 @@
     REAL(size, 0.5, 0.0, 1.0) \
     REAL(filter_radius, 0.005, 0.0, 1.0)
 
+// The numbers of the stages of glare: floats and integers, as above. Each stage has some of them.
+#define GLARE_SETTING_ROWS(SETTING) \
+    SETTING(intensity, 1.0, 0.0, 65504.0) \
+    SETTING(threshold, 0.0, 0.0, 65504.0) \
+    SETTING(angle, 0.0, -360.0, 360.0) \
+    SETTING(length, 1.0, 0.0, 16.0) \
+    SETTING(fade, 0.95, 0.0, 1.0) \
+    SETTING(colour_shift, 0.0, 0.0, 1.0) \
+    SETTING(maximum, 65504.0, 0.0, 65504.0) \
+    SETTING(aberration, 0.0, 0.0, 0.5) \
+    SETTING(radius, 1.0, 0.001, 4.0) \
+    SETTING(falloff, 0.0, 0.0, 64.0) \
+    SETTING(vignette, 0.0, 0.0, 1.0) \
+    SETTING(width, 0.1, 0.001, 4.0)
+
+#define GLARE_COUNT_ROWS(COUNT) \
+    COUNT(halvings, 1, 0, MOST_HALVINGS) \
+    COUNT(directions, 6, 1, 16) \
+    COUNT(base, 4, 2, MOST_TAPS) \
+    COUNT(iterations, 4, 1, 6)
+
 // The largest values of 8 bits, of half floats and of floats.
 #define UNORM_LIMIT  1.0
 #define HALF_LIMIT   65504.0
@@ -264,6 +314,15 @@
 #define MAX_LAYERS  8
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
+
+// Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and
+// the size of their scales, the taps of an iteration of a streak, and how often the size of the
+// bloom buffers is halved.
+#define MAX_STAGES    (GATHERED_LEVELS - 2)
+#define MOST_GHOSTS   16
+#define GHOST_LIMIT   16.0
+#define MOST_TAPS     8
+#define MOST_HALVINGS 4
 
 // Invocations of a workgroup: in a row, for shaders in which each invocation writes several pixels;
 // on each side, for shaders in which it writes one.
@@ -291,6 +350,8 @@
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
 #define TEXEL_ROWS                    16
+#define FILTER_COLUMNS                4
+#define FILTER_ROWS                   16
 #define TILE_LOADED                   64
 #define TILE_ROWS                     32
 #define TILE_RUNS                     4
@@ -423,6 +484,7 @@
     NAME(STORED_UFLOAT, 4, ufloat) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
+    NAME(BLOOM_LIT, 2, lit) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
     NAME(UPSAMPLE_CUBIC, 2, cubic) \

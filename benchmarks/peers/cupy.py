@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -129,25 +130,41 @@ def gpu_copy(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
     return {"plain copy on the device": _timed(cupy, copy)}
 
 
-def transfer_to_host(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
-    """Return the bare transfer of an image's bytes into pinned memory of the host.
+def transfers(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
+    """Return the bare transfers of an image's bytes from and into pinned memory of the host.
 
     The memory is allocated once and not used otherwise. Wall-clock time.
     """
     cupy = _cupy()
+    runtime = cupy.cuda.runtime
     source = cupy.asarray(image)
     pinned = cupy.cuda.alloc_pinned_memory(source.nbytes)
+    held: NDArray[Any] = np.frombuffer(pinned, image.dtype, image.size).reshape(image.shape)
+    held[...] = image
 
-    def call(_: int) -> float:
-        cupy.cuda.Device().synchronize()
-        start = time.perf_counter()
-        cupy.cuda.runtime.memcpy(
-            pinned.ptr, source.data.ptr, source.nbytes, cupy.cuda.runtime.memcpyDeviceToHost
-        )
-        return time.perf_counter() - start
+    def copy(to: int, origin: int, kind: int) -> Callable[[int], float]:
+        def call(_: int) -> float:
+            cupy.cuda.Device().synchronize()
+            start = time.perf_counter()
+            runtime.memcpy(to, origin, source.nbytes, kind)
+            cupy.cuda.Device().synchronize()
+            return time.perf_counter() - start
+
+        return call
 
     def fetch(_: Any) -> NDArray[Any]:
-        held: NDArray[Any] = np.frombuffer(pinned, image.dtype, image.size).reshape(image.shape)
         return held.copy()
 
-    return {"bare transfer into pinned memory": (call, float, fetch)}
+    there, here = source.data.ptr, pinned.ptr
+    return {
+        "bare upload from pinned memory": (
+            copy(there, here, runtime.memcpyHostToDevice),
+            float,
+            fetch,
+        ),
+        "bare readback into pinned memory": (
+            copy(here, there, runtime.memcpyDeviceToHost),
+            float,
+            fetch,
+        ),
+    }

@@ -112,12 +112,24 @@ static bool include(const struct vkb_graph *graph, const struct vkb_pass_row *pa
     return fits && align(bands, graph->images[pass->targets[0]].height, height);
 }
 
+// Stages of glare read far from a target's place, and levels of their own beside the bloom's.
+static bool has_glare(const struct vkb_graph *graph)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].block == VKB_BLOCK_streaks
+            || graph->passes[i].block == VKB_BLOCK_flare)
+            return true;
+    return false;
+}
+
 bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t height,
                      struct vkb_bands *bands)
 {
     double before = 0.0, after = 0.0;
 
     *bands = (struct vkb_bands){.head = VKB_NO_IMAGE, .step = 1};
+    if (has_glare(graph))
+        return false;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (!is_tall(graph, graph->passes[i].targets[0], height)
             && reads_tall(graph, &graph->passes[i], height))

@@ -294,7 +294,7 @@ static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb
     const struct vkb_pass_row *pass = &graph->passes[index];
 
     if (pass->target_count > VKB_MAX_TARGETS
-        || pass->read_count > (pass->reading == VKB_READING_SAMPLED ? VKB_MAX_READS : VKB_MAX_LOADS)
+        || pass->read_count > (pass->reading == VKB_READING_LOADED ? VKB_MAX_LOADS : VKB_MAX_READS)
         || (pass->reading != VKB_READING_SAMPLED && pass->geometry != VKB_GEOMETRY_DISPATCH)
         || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
         || (pass->geometry == VKB_GEOMETRY_DISPATCH

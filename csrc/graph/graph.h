@@ -11,7 +11,7 @@
 enum {
     VKB_NAME_SIZE = 32,
     VKB_MAX_READS = GATHERED_LEVELS,
-    // Storage images or words. With the target, one less than the four that every device supports.
+    // Storage images. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
 };

@@ -8,12 +8,37 @@
     {#name, VKB_VALUE_FLOAT, offsetof(struct vkb_values, name), initial, low, high},
 #define COUNT_ROW(name, initial, low, high) \
     {#name, VKB_VALUE_INT, offsetof(struct vkb_values, name), initial, low, high},
+#define GLARE_SETTING_ROW(name, initial, low, high) \
+    {#name, VKB_VALUE_FLOAT, offsetof(struct vkb_glare_values, name), initial, low, high},
+#define GLARE_COUNT_ROW(name, initial, low, high) \
+    {#name, VKB_VALUE_INT, offsetof(struct vkb_glare_values, name), initial, low, high},
 #define REAL_ROW(name, initial, low, high) \
     {#name, VKB_VALUE_DOUBLE, offsetof(struct vkb_values, name), initial, low, high},
 
 const struct vkb_value_row vkb_value_rows[] = {SETTING_ROWS(SETTING_ROW) COUNT_ROWS(COUNT_ROW)
                                                    REAL_ROWS(REAL_ROW)};
 const size_t vkb_value_row_count = sizeof vkb_value_rows / sizeof vkb_value_rows[0];
+
+const struct vkb_value_row vkb_glare_rows[] = {GLARE_SETTING_ROWS(GLARE_SETTING_ROW)
+                                                   GLARE_COUNT_ROWS(GLARE_COUNT_ROW)};
+const size_t vkb_glare_row_count = sizeof vkb_glare_rows / sizeof vkb_glare_rows[0];
+
+void vkb_value_store(void *values, const struct vkb_value_row *row, double number)
+{
+    char *place = (char *)values + row->offset;
+
+    switch (row->type) {
+    case VKB_VALUE_FLOAT:
+        *(float *)place = (float)number;
+        break;
+    case VKB_VALUE_INT:
+        *(int *)place = (int)number;
+        break;
+    case VKB_VALUE_DOUBLE:
+        *(double *)place = number;
+        break;
+    }
+}
 
 #define SPELLING(name, value, spelling) [value] = #spelling,
 #define SPELLINGS(choice, NAMES) static const char *const choice##_spellings[] = {NAMES(SPELLING)};

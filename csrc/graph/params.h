@@ -62,13 +62,24 @@ struct vkb_values {
 #undef VKB_REAL_MEMBER
 };
 
+// The numbers of a stage of glare.
+struct vkb_glare_values {
+#define VKB_SETTING_MEMBER(name, initial, low, high) float name;
+    GLARE_SETTING_ROWS(VKB_SETTING_MEMBER)
+#undef VKB_SETTING_MEMBER
+#define VKB_COUNT_MEMBER(name, initial, low, high) int name;
+    GLARE_COUNT_ROWS(VKB_COUNT_MEMBER)
+#undef VKB_COUNT_MEMBER
+};
+
 enum vkb_value_type { VKB_VALUE_FLOAT, VKB_VALUE_INT, VKB_VALUE_DOUBLE };
 
 // Copies the settings that a block reads.
 void vkb_params_read(enum vkb_block block, const struct vkb_values *values,
                      union vkb_params *params);
 
-// The offset of a setting in struct vkb_values, its default and its range.
+// The offset of a setting in struct vkb_values, or of a number in struct vkb_glare_values, its
+// default and its range.
 struct vkb_value_row {
     const char *name;
     enum vkb_value_type type;
@@ -78,6 +89,11 @@ struct vkb_value_row {
 
 extern const struct vkb_value_row vkb_value_rows[];
 extern const size_t vkb_value_row_count;
+extern const struct vkb_value_row vkb_glare_rows[];
+extern const size_t vkb_glare_row_count;
+
+// Sets the member of the row in the struct that it is of.
+void vkb_value_store(void *values, const struct vkb_value_row *row, double number);
 
 // A setting that is one of a list of names; the names' values count from 0.
 struct vkb_choice_row {

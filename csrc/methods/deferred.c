@@ -118,7 +118,11 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
 {
     struct vkb_mesh_params params = vkb_scene_params(source);
     struct gbuffer gbuffer;
-    struct vkb_composite_source composite = {.bloom = VKB_NO_IMAGE, .mask = VKB_NO_IMAGE};
+    struct vkb_composite_source composite = {
+        .bloom = VKB_NO_IMAGE,
+        .mask = VKB_NO_IMAGE,
+        .lit = vkb_has_glare(settings),
+    };
     uint32_t glow = VKB_NO_IMAGE;
 
     if (settings->values.bloom && source->has_glow) {

@@ -40,7 +40,11 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
                        struct vkb_graph *graph, struct vkb_error *error)
 {
     const struct vkb_mesh_params params = vkb_scene_params(source);
-    struct vkb_composite_source composite = {.bloom = VKB_NO_IMAGE, .mask = VKB_NO_IMAGE};
+    struct vkb_composite_source composite = {
+        .bloom = VKB_NO_IMAGE,
+        .mask = VKB_NO_IMAGE,
+        .lit = vkb_has_glare(settings),
+    };
 
     if (settings->values.bloom) {
         struct vkb_bloom_source glow = {

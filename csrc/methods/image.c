@@ -88,6 +88,7 @@ bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image
     struct vkb_composite_source source = {
         .bloom = VKB_NO_IMAGE,
         .apart = image->has_emission,
+        .lit = vkb_has_glare(settings),
         .alpha = (enum vkb_alpha)settings->choices[VKB_CHOICE_alpha],
     };
     struct inputs inputs;

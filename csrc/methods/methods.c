@@ -33,7 +33,12 @@ bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
-    return methods[settings->method](settings, source, graph, bloom, error);
+    uint32_t stages[MAX_STAGES];
+
+    return vkb_add_stages(settings, source, graph, stages, error)
+        && methods[settings->method](settings, source, graph, bloom, error)
+        && (!vkb_has_glare(settings)
+            || vkb_add_light(settings, source, stages, graph, bloom, error));
 }
 
 static uint32_t scaled(double scale, uint32_t side)

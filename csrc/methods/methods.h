@@ -40,7 +40,18 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
 bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image_source *image,
                      struct vkb_graph *graph, struct vkb_error *error);
 
-// Adds the rows of the method that the settings name; *bloom is the last image.
+// Whether the settings have glare that is added to the bloom.
+bool vkb_has_glare(const struct vkb_settings *settings);
+
+// Adds the rows of the stages of glare to the graph; `stages` gets the image of each.
+bool vkb_add_stages(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                    struct vkb_graph *graph, uint32_t *stages, struct vkb_error *error);
+// Adds the sum of the bloom and the stages, each times its intensity; *bloom becomes this image.
+bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                   const uint32_t *stages, struct vkb_graph *graph, uint32_t *bloom,
+                   struct vkb_error *error);
+
+// Adds the rows of the method that the settings name, and those of glare; *bloom is the last image.
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
 #define VKB_METHOD_FUNCTION(constant, name, published) \

@@ -55,6 +55,7 @@ bool vkb_add_composite(const struct vkb_settings *settings,
     row.constants.dither = dither;
     row.constants.alpha = off ? ALPHA_KEEP : source->alpha;
     row.constants.masked = row.constants.composite == COMPOSITE_MIX && source->mask != VKB_NO_IMAGE;
+    row.constants.bloom = source->lit ? BLOOM_LIT : BLOOM_OWN;
     row.reads[0] = source->scene;
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = off ? source->scene : source->bloom;

@@ -10,6 +10,7 @@
 struct vkb_composite_source {
     uint32_t scene, bloom, mask;
     bool apart;  // the bloom was made from another image
+    bool lit;    // it is the sum of the bloom, times the intensity, and the glare
     enum vkb_alpha alpha;
 };
 

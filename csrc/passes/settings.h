@@ -45,6 +45,27 @@ struct vkb_kernel_data {
     float prefilter[3];  // min, max, factor; min above max: none
 };
 
+// Every stage of glare: STAGE(name in C, name in Python, of its framebuffer and of its vkb_add_
+// function).
+#define VKB_STAGES(STAGE) \
+    STAGE(STREAKS, streaks) \
+    STAGE(GHOSTS, ghosts) \
+    STAGE(HALO, halo)
+
+enum vkb_stage_kind {
+#define VKB_STAGE_ENUM(constant, name) VKB_STAGE_##constant,
+    VKB_STAGES(VKB_STAGE_ENUM)
+#undef VKB_STAGE_ENUM
+        VKB_STAGE_COUNT,
+};
+
+struct vkb_stage {
+    enum vkb_stage_kind kind;
+    struct vkb_glare_values values;  // at the offsets of vkb_glare_rows
+    float ghosts[MOST_GHOSTS][4];    // tint and scale of each
+    uint32_t ghost_count;
+};
+
 struct vkb_settings {
     enum vkb_method method;
     struct vkb_values values;  // the numbers, at the offsets of vkb_value_rows
@@ -59,6 +80,8 @@ struct vkb_settings {
     float level_weights[MAX_LEVELS];
     uint32_t level_weight_count;  // 0: none are given
     struct vkb_kernel_data kernel;
+    struct vkb_stage stages[MAX_STAGES];  // of glare
+    uint32_t stage_count;
 };
 
 static inline bool vkb_is_published(const struct vkb_settings *settings)

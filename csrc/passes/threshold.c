@@ -2,11 +2,16 @@
 
 #include <math.h>
 
-enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
+enum vkb_mode vkb_own_threshold_mode(const struct vkb_settings *settings)
 {
-    if (!settings->thresholded || vkb_is_published(settings))
+    if (!settings->thresholded)
         return THRESHOLD_NONE;
     return settings->values.knee > 0.0f ? THRESHOLD_KNEE : THRESHOLD_HARD;
+}
+
+enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
+{
+    return vkb_is_published(settings) ? THRESHOLD_NONE : vkb_own_threshold_mode(settings);
 }
 
 // The luminances of 8-bit colours, (2126 r + 7152 g + 722 b) / 10000 / 255, are integer multiples
@@ -22,16 +27,24 @@ static float between_levels(float threshold)
 bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
                        uint32_t glow, struct vkb_graph *graph, struct vkb_error *error)
 {
+    return vkb_add_threshold_in(vkb_threshold_mode(settings), settings, image,
+                                vkb_is_published(settings) ? VKB_NO_IMAGE : mask, glow, graph,
+                                error);
+}
+
+bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *settings, uint32_t image,
+                          uint32_t mask, uint32_t glow, struct vkb_graph *graph,
+                          struct vkb_error *error)
+{
     struct vkb_pass_row row =
         vkb_fullscreen_row(graph->images[glow].name, VKB_SHADER_threshold_frag, glow);
     const struct vkb_sampling sampling = vkb_sampling_into(graph, glow);
-    const enum vkb_mode mode = vkb_threshold_mode(settings);
 
     row.constants.threshold_mode = mode;
     // Not the sampler's filter: it would spread NaN, and a threshold magnifies its rounding errors.
     row.constants.sampling = vkb_same_size(graph, image, glow) ? SAMPLING_TEXEL : SAMPLING_FETCH;
     row.reads[0] = image;
-    vkb_apply_mask(&row, vkb_is_published(settings) ? VKB_NO_IMAGE : mask);
+    vkb_apply_mask(&row, mask);
     row.block = VKB_BLOCK_threshold;
     // Without a threshold its settings stay 0, so that the pass does not depend on them.
     if (mode != THRESHOLD_NONE)

@@ -4,12 +4,20 @@
 
 #include "passes/pass.h"
 
+// How the threshold pass applies the threshold: NONE for published methods, which apply it later.
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
+// The same as if no method did.
+enum vkb_mode vkb_own_threshold_mode(const struct vkb_settings *settings);
 
 // Adds a pass that reduces `image` to the size of `glow`, applies the threshold, and multiplies by
 // the mask (VKB_NO_IMAGE: none). Published methods apply their threshold and the mask later.
 bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
                        uint32_t glow, struct vkb_graph *graph, struct vkb_error *error);
+
+// The same in a mode, with this mask.
+bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *settings, uint32_t image,
+                          uint32_t mask, uint32_t glow, struct vkb_graph *graph,
+                          struct vkb_error *error);
 
 // Whether the row is a threshold pass that reads only the texel at each pixel's own position.
 bool vkb_is_threshold(const struct vkb_pass_row *pass);

@@ -117,24 +117,7 @@ int vkb_read_serial(PyObject *object, void *number)
     return serial != 0;
 }
 
-static void store_value(struct vkb_values *values, const struct vkb_value_row *row, double number)
-{
-    char *place = (char *)values + row->offset;
-
-    switch (row->type) {
-    case VKB_VALUE_FLOAT:
-        *(float *)place = (float)number;
-        break;
-    case VKB_VALUE_INT:
-        *(int *)place = (int)number;
-        break;
-    case VKB_VALUE_DOUBLE:
-        *(double *)place = number;
-        break;
-    }
-}
-
-static bool out_of_range(const char *name, PyObject *value, double low, double high)
+bool vkb_out_of_range(const char *name, PyObject *value, double low, double high)
 {
     PyObject *from = PyFloat_FromDouble(low), *to = PyFloat_FromDouble(high);
 
@@ -152,16 +135,16 @@ static bool read_value(const struct reader *reader, size_t index, struct vkb_val
     PyObject *value = optional_attribute(reader, ATTRIBUTE_VALUES + index);
     bool done = true;
 
-    store_value(values, row, row->initial);
+    vkb_value_store(values, row, row->initial);
     if (!value)
         return !PyErr_Occurred();
     if (value != Py_None) {
         double number = PyFloat_AsDouble(value);
         done = !PyErr_Occurred();
         if (done && !(number >= row->low && number <= row->high))
-            done = out_of_range(row->name, value, row->low, row->high);
+            done = vkb_out_of_range(row->name, value, row->low, row->high);
         if (done)
-            store_value(values, row, number);
+            vkb_value_store(values, row, number);
     }
     Py_DECREF(value);
     return done;
@@ -272,7 +255,7 @@ static bool read_numbers(const struct reader *reader, size_t attribute, Py_ssize
         PyObject *item = PySequence_GetItem(value, i);
         const double weight = item ? PyFloat_AsDouble(item) : 0.0;
         if (!PyErr_Occurred() && !(fabs(weight) <= FLT_MAX))
-            out_of_range(attribute_name(attribute), item, -FLT_MAX, FLT_MAX);
+            vkb_out_of_range(attribute_name(attribute), item, -FLT_MAX, FLT_MAX);
         else
             numbers[i] = (float)weight;
         Py_XDECREF(item);
@@ -309,7 +292,7 @@ static bool read_layers(const struct reader *reader, struct vkb_settings *settin
             && PyArg_ParseTuple(item, "ff;layers must hold (scale, strength)", &layer->scale,
                                 &layer->strength)
             && !(is_layer_number(layer->scale) && is_layer_number(layer->strength)))
-            out_of_range("layers", item, 0.0, LAYER_LIMIT);
+            vkb_out_of_range("layers", item, 0.0, LAYER_LIMIT);
         Py_XDECREF(item);
     }
     settings->layer_count = (uint32_t)count;
@@ -348,7 +331,7 @@ static bool read_all(const struct reader *reader, struct vkb_settings *settings)
         && read_layers(reader, settings)
         && read_numbers(reader, ATTRIBUTE_LEVEL_WEIGHTS, MAX_LEVELS, settings->level_weights,
                         &settings->level_weight_count)
-        && require_kernel(settings);
+        && require_kernel(settings) && vkb_read_glare(reader->object, settings);
 }
 
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,

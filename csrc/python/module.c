@@ -124,12 +124,12 @@ static bool add_steal(PyObject *module, const char *name, PyObject *value)
 }
 
 // {name: (default, low, high)}
-static PyObject *value_table(void)
+static PyObject *value_table(const struct vkb_value_row *rows, size_t count)
 {
     PyObject *table = PyDict_New();
 
-    for (size_t i = 0; table && i < vkb_value_row_count; ++i) {
-        const struct vkb_value_row *row = &vkb_value_rows[i];
+    for (size_t i = 0; table && i < count; ++i) {
+        const struct vkb_value_row *row = &rows[i];
         PyObject *entry =
             row->type == VKB_VALUE_INT
                 ? Py_BuildValue("(iii)", (int)row->initial, (int)row->low, (int)row->high)
@@ -262,10 +262,15 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
                 && add_type(module, &vkb_screen_spec, "Screen", &state->screen_type)
-                && vkb_make_attributes(state) && add_steal(module, "VALUES", value_table())
+                && vkb_make_attributes(state)
+                && add_steal(module, "VALUES", value_table(vkb_value_rows, vkb_value_row_count))
+                && add_steal(module, "GLARE_VALUES",
+                             value_table(vkb_glare_rows, vkb_glare_row_count))
                 && add_steal(module, "CHOICES", choice_table())
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
+                && PyModule_AddIntMacro(module, MAX_STAGES) == 0
+                && PyModule_AddIntMacro(module, MOST_GHOSTS) == 0
              ? 0
              : -1;
 }

@@ -102,6 +102,12 @@ bool vkb_make_attributes(struct vkb_module_state *state);
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 
+// Reads the stages of glare of a settings object; without the attribute there are none.
+bool vkb_read_glare(PyObject *object, struct vkb_settings *settings);
+
+// Sets the ValueError of a number that is out of its range; returns false.
+bool vkb_out_of_range(const char *name, PyObject *value, double low, double high);
+
 // Whether the object is a tuple, which PyArg_ParseTuple requires; otherwise sets a TypeError.
 bool vkb_require_tuple(PyObject *object, const char *what);
 

@@ -49,7 +49,7 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
                             {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets},
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, sets * VKB_MAX_READS},
                             {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_LOADS + 1)},
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_LOADS},
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_READS},
                             {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets},
                         },
                 },

@@ -241,7 +241,7 @@ static void describe_words(const struct vkb_image *image, size_t row_pitch, int3
 static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pass,
                        const struct band *band)
 {
-    struct vkb_words words = {.zero = 0};
+    struct vkb_words words = {0};
 
     describe_words(&run->images[pass->targets[0]]->image, band->row_pitch, words.target);
     words.target[3] = (int32_t)band->first;

@@ -1,5 +1,7 @@
 #include "run/upload.h"
 
+#include "run/parts.h"
+
 #include <string.h>
 
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload)
@@ -69,6 +71,11 @@ static const unsigned char *input_row(const struct vkb_input *input, uint32_t y)
     return (const unsigned char *)input->memory + y * input->row_stride;
 }
 
+static size_t row_size(const struct vkb_input *input)
+{
+    return (size_t)input->width * vkb_pixel_size(input->format);
+}
+
 static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t y)
 {
     const unsigned char *from = input_row(input, y);
@@ -76,7 +83,7 @@ static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t 
     const bool contiguous = is_contiguous(input);
 
     if (contiguous && is_complete(input)) {
-        memcpy(to, from, (size_t)input->width * vkb_pixel_size(input->format));
+        memcpy(to, from, row_size(input));
         return;
     }
     switch (vkb_formats[input->format].channel_size) {
@@ -100,14 +107,51 @@ static unsigned char *kept_row(const struct vkb_upload *upload, uint32_t y)
     return upload->pixels + y * upload->row_pitch;
 }
 
-static bool row_differs(const struct vkb_upload *upload, const struct vkb_input *input, uint32_t y)
+// Work on rows of an input whose first row is row `offset` of the image.
+struct rows {
+    struct vkb_upload *upload;
+    const struct vkb_input *input;
+    uint32_t offset;
+    uint32_t different[VKB_MAX_PARTS];  // the first such row of each part; the height: none
+};
+
+static bool row_differs(const struct rows *rows, uint32_t part, uint32_t y)
 {
-    const size_t size = (size_t)input->width * vkb_pixel_size(input->format);
+    const struct vkb_input *input = rows->input;
+    const struct vkb_upload *upload = rows->upload;
+    const size_t size = row_size(input);
+    unsigned char *packed = upload->packed + part * size;
 
     if (is_complete(input) && is_contiguous(input))
         return memcmp(kept_row(upload, y), input_row(input, y), size) != 0;
-    pack_row(upload->packed, input, y);
-    return memcmp(kept_row(upload, y), upload->packed, size) != 0;
+    pack_row(packed, input, y);
+    return memcmp(kept_row(upload, y), packed, size) != 0;
+}
+
+static void compare_part(void *context, uint32_t part, uint32_t first, uint32_t end)
+{
+    struct rows *rows = context;
+
+    while (first < end && !row_differs(rows, part, first))
+        ++first;
+    rows->different[part] = first < end ? first : rows->input->height;
+}
+
+// The first row in which the input differs from the image that is held; its height: none.
+static uint32_t first_difference(struct vkb_upload *upload, const struct vkb_input *input)
+{
+    struct rows rows = {.upload = upload, .input = input};
+    uint32_t first = input->height;
+
+    // Another image usually differs in its first row, without work for several threads.
+    if (row_differs(&rows, 0, 0))
+        return 0;
+    for (int part = 0; part < VKB_MAX_PARTS; ++part)
+        rows.different[part] = first;
+    vkb_in_parts(compare_part, &rows, 1, input->height, input->height * row_size(input));
+    for (int part = 0; part < VKB_MAX_PARTS; ++part)
+        first = rows.different[part] < first ? rows.different[part] : first;
+    return first;
 }
 
 enum { COUNTED_AT_ONCE = 32768 };  // a sum of this many fits the 16-bit counters below
@@ -169,21 +213,21 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
                       const struct vkb_input *input, const struct vkb_image *image,
                       struct vkb_error *error)
 {
-    const size_t row_size = (size_t)input->width * vkb_pixel_size(input->format);
+    const size_t size = row_size(input);
 
     vkb_upload_forget(upload);
     if (!vkb_grow(error, &upload->rows, &upload->row_capacity, input->height, sizeof *upload->rows)
-        || !vkb_grow(error, &upload->packed, &upload->packed_capacity, row_size, 1))
+        || !vkb_grow(error, &upload->packed, &upload->packed_capacity, VKB_MAX_PARTS * size, 1))
         return false;
     // Cached host memory, since the host reads it to compare it with the next image.
     if (!image->mapped
         && !vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                               row_size * input->height, &upload->staging, error))
+                               size * input->height, &upload->staging, error))
         return false;
     memset(upload->rows, 0, input->height * sizeof *upload->rows);
     upload->specials = (struct vkb_specials){0};
     upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
-    upload->row_pitch = image->mapped ? image->row_pitch : row_size;
+    upload->row_pitch = image->mapped ? image->row_pitch : size;
     upload->format = input->format;
     upload->width = input->width;
     upload->height = input->height;
@@ -191,14 +235,24 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
     return true;
 }
 
+static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end)
+{
+    const struct rows *rows = context;
+
+    (void)part;
+    for (uint32_t y = first; y < end; ++y) {
+        pack_row(kept_row(rows->upload, rows->offset + y), rows->input, y);
+        rows->upload->rows[rows->offset + y] = count_row(rows->upload, rows->offset + y);
+    }
+}
+
 // Packs rows `from` to the last of the input, whose first row is row `first` of the image.
 static void pack_rows(struct vkb_upload *upload, const struct vkb_input *input, uint32_t from,
                       uint32_t first)
 {
-    for (uint32_t y = from; y < input->height; ++y) {
-        pack_row(kept_row(upload, first + y), input, y);
-        upload->rows[first + y] = count_row(upload, first + y);
-    }
+    struct rows rows = {.upload = upload, .input = input, .offset = first};
+
+    vkb_in_parts(pack_part, &rows, from, input->height, (input->height - from) * row_size(input));
     upload->specials = (struct vkb_specials){0};
     for (uint32_t y = 0; y < upload->height; ++y) {
         upload->specials.nan += upload->rows[y].nan;
@@ -219,10 +273,8 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       const struct vkb_image *image, bool *changed, struct vkb_error *error)
 {
     const bool fresh = !holds_such(upload, input);
-    uint32_t first = 0;
+    const uint32_t first = fresh ? 0 : first_difference(upload, input);
 
-    while (!fresh && first < input->height && !row_differs(upload, input, first))
-        ++first;
     *changed = first < input->height;
     if (!*changed)
         return true;

@@ -29,7 +29,7 @@ struct vkb_upload {
     uint32_t width, height, channels;
     struct vkb_specials *rows;     // in each row of the image
     struct vkb_specials specials;  // in the complete image
-    unsigned char *packed;         // one row, for the comparison
+    unsigned char *packed;         // a row of each part, for the comparison
     size_t row_capacity, packed_capacity;
 };
 

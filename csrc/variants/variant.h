@@ -26,6 +26,9 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
 // Levels of exactly half and exactly twice the size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
+// Upsampling by any factor as two passes, along rows and along columns; the sum of several levels
+// that are upsampled so.
+vkb_variant_add vkb_add_upsampled, vkb_add_gathered;
 // Transforms of complete lines in shared memory.
 vkb_variant_add vkb_add_lines;
 

@@ -116,7 +116,7 @@ static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_composite(pass) && pass->constants.bloom == BLOOM_OWN && !pass->constants.masked
+    return vkb_is_composite(pass) && pass->constants.bloom != BLOOM_LINES && !pass->constants.masked
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
         && has_format_of(graph, pass->reads[0], pass->reads[1])
@@ -205,6 +205,10 @@ struct variant {
 // and 18. Doubling to 1024 x 1024 takes 33 and 45; to 512 x 512, 29 and 15.
 enum { HALVE_STRIPS = 1 << 17, DOUBLE_STRIPS = 1 << 19 };
 
+// A filter as two passes instead of one is slow in small images, since each pass takes time to
+// start.
+enum { TWO_PASSES = 1 << 12 };
+
 static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "line", vkb_add_line, 0},
     {VKB_VARIANTS_CPU, "enlarged", vkb_add_enlarged, 0},
@@ -213,6 +217,8 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "halved", vkb_add_halved, 0},
     {VKB_VARIANTS_CPU, "doubled", vkb_add_doubled, 0},
     {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
+    {VKB_VARIANTS_CPU, "upsampled", vkb_add_upsampled, TWO_PASSES},
+    {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered, TWO_PASSES},
     {VKB_VARIANTS_CPU, "words", add_transform, 0},
     {VKB_VARIANTS_CPU, "pixels", add_pixels, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},

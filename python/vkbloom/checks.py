@@ -24,6 +24,7 @@ __all__ = [
     "check_floats",
     "check_image",
     "check_index",
+    "check_like",
     "check_mask",
     "check_number",
     "check_size",
@@ -112,6 +113,26 @@ def check_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
         if not abs(number) <= FLT_MAX:
             raise ValueError(f"{name}: {number!r} is out of range, {-FLT_MAX:g} to {FLT_MAX:g}")
     return numbers
+
+
+def check_like(example: object, name: str, value: Any, low: float, high: float) -> float:
+    """Return a number as the type of an example: float, int or bool. NumPy scalars print otherwise.
+
+    Raises
+    ------
+    TypeError
+        The value is not a number.
+    ValueError
+        It is out of range, or not an integer where the example is one.
+    """
+    number = check_number(name, value, low, high)
+    if not isinstance(example, int):
+        return number
+    integer = int(number)
+    if integer != value:
+        raise ValueError(f"{name}: {value!r} is not an integer")
+    # Converts flags to bool.
+    return type(example)(integer)
 
 
 def check_size(name: str, size: Any) -> tuple[int, int]:

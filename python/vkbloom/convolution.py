@@ -139,6 +139,7 @@ class Convolution(Settings):
             Plain values that JSON can hold.
         """
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        values["glare"] = [stage.to_dict() for stage in self.glare]
         return {"method": self.method, **values, "psf": cast("PSF", self.psf).to_dict()}
 
     @property

@@ -13,7 +13,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, Self, cast, get_args
 
 from vkbloom import _core
-from vkbloom.checks import as_float, check_floats, check_number, check_size
+from vkbloom.checks import as_float, check_floats, check_like, check_size
+from vkbloom.glare import Glare, check_glare
 
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
@@ -125,6 +126,10 @@ class Settings:
         nearest one; negative values and NaN become 0; values above 65024 (64512 for blue) become
         this limit. Its arrays are float32. Published methods store only their levels in it:
         ``glow`` and ``bloom``, which are the frame before and after in an engine, are not rounded.
+    glare : sequence of Glare
+        Up to 5 stages, such as `Streaks`, that read what glows and add light to the bloom. Each has
+        a framebuffer of its name, with a number if there are several of a kind. In ``final``,
+        i b + sum of i_k g_k stands in place of i b, with framebuffer g_k and intensity i_k of each.
 
     Raises
     ------
@@ -168,6 +173,7 @@ class Settings:
     bloom_size: tuple[int, int] | None = dataclasses.field(default=None, metadata={"unit": "pixel"})
     bloom_scale: float = number_field("bloom_scale")
     format: BloomFormat | None = None
+    glare: tuple[Glare, ...] = ()
 
     def __post_init__(self) -> None:
         if type(self) is Settings:
@@ -184,16 +190,11 @@ class Settings:
             self._check_name("format", BLOOM_FORMATS)
         if self.bloom_size is not None:
             object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
+        object.__setattr__(self, "glare", check_glare(self.glare))
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
         """Check a number and store it as a Python number; NumPy scalars print differently."""
-        number = check_number(field.name, value, *field_range(field))
-        if isinstance(field.default, int):
-            integer = int(number)
-            if integer != value:
-                raise ValueError(f"{field.name}: {value!r} is not an integer")
-            # Converts flags to bool.
-            number = type(field.default)(integer)
+        number = check_like(field.default, field.name, value, *field_range(field))
         object.__setattr__(self, field.name, number)
 
     def _check_name(self, field: str, names: tuple[str, ...], of: str = "") -> None:
@@ -253,7 +254,9 @@ class Settings:
         >>> vkbloom.Pyramid(levels=3).to_dict()["levels"]
         3
         """
-        return {"method": self.method, **dataclasses.asdict(self)}
+        values = dataclasses.asdict(self)
+        values["glare"] = [stage.to_dict() for stage in self.glare]
+        return {"method": self.method, **values}
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
@@ -487,6 +490,9 @@ class Pyramid(Settings):
     level_weights : sequence of float or None
         As many finite numbers w_0, w_1, ... as `levels`; they may be negative. If the chain ends
         early, only the first ones are used. None: the mean of the levels.
+    scale_x, scale_y : float
+        Factors of the distances of all taps, 0 to 16. scale_x=4 stretches the bloom along x, as an
+        anamorphic lens does.
     **settings
         The fields of `Settings`.
 
@@ -528,6 +534,8 @@ class Pyramid(Settings):
     radius: float = number_field("radius", unit="texel")
     firefly_filter: bool = flag_field("firefly_filter")
     level_weights: tuple[float, ...] | None = None
+    scale_x: float = number_field("scale_x")
+    scale_y: float = number_field("scale_y")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,18 +5,30 @@
 #include "lib/finite.glsl"
 #include "lib/tonemap.glsl"
 
+// The light of the bloom, or with glare of both, which the image then has the sum of.
+vec3 light_of(vec3 b)
+{
+    return BLOOM == BLOOM_LIT ? b : params.intensity * b;
+}
+
+vec3 mixed(vec3 s, vec3 b, float share)
+{
+    return BLOOM == BLOOM_LIT ? s + (b - params.intensity * share * s)
+                              : s + (b - share * s) * params.intensity;
+}
+
 // `share` is the part of the scene from which the bloom was made.
 vec3 composite(vec3 s, vec3 b, float share)
 {
     if (COMPOSITE == COMPOSITE_MIX)
-        return s + (b - share * s) * params.intensity;
+        return mixed(s, b, share);
     if (COMPOSITE == COMPOSITE_SCREEN) {
         // 1 - (1 - s)(1 - b), expanded: differences from 1 lose the precision of dark values.
         s = clamp(s, 0.0, 1.0);
-        return s + (1.0 - s) * clamp(params.intensity * b, 0.0, 1.0);
+        return s + (1.0 - s) * clamp(light_of(b), 0.0, 1.0);
     }
     if (COMPOSITE == COMPOSITE_ADD)
-        return s + params.intensity * b;
+        return s + light_of(b);
     return s;
 }
 
@@ -26,7 +38,7 @@ float blend_alpha(float alpha, vec4 bloom)
     if (ALPHA == ALPHA_KEEP)
         return alpha;
     float light = ALPHA == ALPHA_MAX ? max(bloom.r, max(bloom.g, bloom.b)) : bloom.a;
-    light = clamp(params.intensity * light, 0.0, 1.0);
+    light = clamp(light_of(vec3(light)).r, 0.0, 1.0);
     float blended = ALPHA == ALPHA_MAX ? max(alpha, light) : alpha + (1.0 - alpha) * light;
     return is_finite(vec3(alpha)).r ? storable(vec3(blended)).r : alpha;
 }

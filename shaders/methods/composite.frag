@@ -18,7 +18,7 @@ layout(set = 0, binding = 3) uniform sampler2D mask;
 // The bloom from its image; or from the lines of the last blur, rounded as that image would be.
 vec4 bloom_light()
 {
-    if (BLOOM == BLOOM_OWN)
+    if (BLOOM != BLOOM_LINES)
         return texelFetch(bloom, PIXEL, 0);
     bool floats = FORMAT == STORED_HALF || FORMAT == STORED_SINGLE;
     int sampling = floats ? SAMPLING_FETCH : SAMPLING_FILTER;

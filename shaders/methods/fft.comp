@@ -43,15 +43,7 @@ ivec2 texel_at(int along, int across)
 vec4 load_source(ivec2 at)
 {
 #ifdef WORDS
-    uvec4 word = texelFetch(source, at.y * words.reads[0].z + at.x * CHANNEL_BYTES / 4);
-#if CHANNEL_BYTES == 1
-    uvec2 half_word = (at.x & 2) == 0 ? word.xy : word.zw;
-    return value_of(uvec4((at.x & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0));
-#elif CHANNEL_BYTES == 2
-    return value_of(uvec4((at.x & 1) == 0 ? word.xy : word.zw, 0, 0));
-#else
-    return uintBitsToFloat(word);
-#endif
+    return load_pixel(source, words.reads[0], at.x, at.y);
 #else
     return imageLoad(source, at);
 #endif
@@ -72,10 +64,10 @@ void store(ivec2 at, vec4 value)
     imageStore(target, at, value);
 #elif TARGET_BYTES == 4
     // (Without the maximum LLVM packs lane by lane.)
-    target.texels[at.y * words.target.z + at.x] = max(floatBitsToUint(value), uvec4(words.zero));
+    target.texels[at.y * words.target.z + at.x] = max(floatBitsToUint(value), uvec4(words.reads[0].w));
 #elif TARGET_BYTES == 2
     uvec2 bits = uvec2(packHalf2x16(value.rg), packHalf2x16(value.ba));
-    target.texels[2 * at.y * words.target.z + at.x] = max(bits, uvec2(words.zero));
+    target.texels[2 * at.y * words.target.z + at.x] = max(bits, uvec2(words.reads[0].w));
 #else
     // A sum with 2^23 is rounded to an integer, which its last bits are.
     uvec4 level = floatBitsToUint(value * 255.0 + 8388608.0) & 255u;

@@ -3,7 +3,6 @@
 // Adds up levels of several sizes: each is enlarged and multiplied by its weight.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
-#include "lib/cubic.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
 #include "lib/storage.glsl"
@@ -18,16 +17,14 @@ layout(set = 0, binding = 7) uniform sampler2D level_6;
 
 #define TARGET_BINDING 8
 #include "lib/fullscreen.glsl"
+#include "lib/upsample.glsl"
 
 vec4 share(sampler2D image, int level)
 {
     if (level >= LEVELS)
         return vec4(0.0);
     float weight = params.shares[level >> 2][level & 3];
-    Place place = PLACE_IN(image);
-    if (UPSAMPLE == UPSAMPLE_CUBIC)
-        return weight * sample_cubic(image, place);
-    return weight * sample_at(image, place, vec2(0.0), SAMPLING);
+    return weight * upsample(image, vec2(0.0));
 }
 
 vec4 shade()

@@ -27,12 +27,12 @@ vec3 soft_light(vec3 s, vec3 light)
 
 vec3 blend(vec3 s, vec3 bloom_light, float share)
 {
-    vec3 light = params.intensity * bloom_light;
+    vec3 light = light_of(bloom_light);
     if (COMPOSITE == COMPOSITE_SOFT_LIGHT)
         return soft_light(apply_tonemap(s, TONEMAP), apply_tonemap(light, TONEMAP));
     vec3 sum = s + light;
     if (COMPOSITE == COMPOSITE_MIX)
-        sum = s + (bloom_light - share * s) * params.intensity;
+        sum = mixed(s, bloom_light, share);
     if (COMPOSITE == COMPOSITE_REPLACE)
         sum = light;
     if (COMPOSITE == COMPOSITE_SCREEN) {

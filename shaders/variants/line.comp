@@ -1,5 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // A blur in one direction with all taps on integer texels. An invocation writes LINE_OUTPUTS pixels
 // along the line and loads each texel once for all of them.
 #include "lib/block.glsl"
@@ -28,10 +29,10 @@ void add_short(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
 {
     vec4 texels[LOADED];
 
-    for (int i = 0; i < LOADED; ++i)
+    [[unroll]] for (int i = 0; i < LOADED; ++i)
         texels[i] = load(first, i - RADIUS);
-    for (int i = 0; i < LINE_OUTPUTS; ++i)
-        for (int tap = 0; tap <= 2 * RADIUS; ++tap)
+    [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
+        [[unroll]] for (int tap = 0; tap <= 2 * RADIUS; ++tap)
             sums[i] += params.kernel[tap >> 2][tap & 3] * texels[i + tap];
 }
 
@@ -40,15 +41,15 @@ void add_long(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
 {
     vec4 texels[2 * LINE_OUTPUTS - 1];
 
-    for (int i = 0; i < LINE_OUTPUTS - 1; ++i)
+    [[unroll]] for (int i = 0; i < LINE_OUTPUTS - 1; ++i)
         texels[LINE_OUTPUTS + i] = load(first, i - params.radius);
     for (int chunk = 0; chunk <= 2 * params.radius; chunk += LINE_OUTPUTS) {
-        for (int i = 0; i < LINE_OUTPUTS - 1; ++i)
+        [[unroll]] for (int i = 0; i < LINE_OUTPUTS - 1; ++i)
             texels[i] = texels[LINE_OUTPUTS + i];
-        for (int i = 0; i < LINE_OUTPUTS; ++i)
+        [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
             texels[LINE_OUTPUTS - 1 + i] = load(first, chunk + LINE_OUTPUTS - 1 + i - params.radius);
-        for (int tap = 0; tap < LINE_OUTPUTS; ++tap)
-            for (int i = 0; i < LINE_OUTPUTS; ++i)
+        [[unroll]] for (int tap = 0; tap < LINE_OUTPUTS; ++tap)
+            [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
                 sums[i] += params.kernel[(chunk >> 2) + (tap >> 2)][tap & 3] * texels[i + tap];
     }
 }
@@ -60,13 +61,13 @@ void main()
 
     if (any(greaterThanEqual(first, imageSize(target))))
         return;
-    for (int i = 0; i < LINE_OUTPUTS; ++i)
+    [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
         sums[i] = vec4(0.0);
     if (RADIUS > 0)
         add_short(first, sums);
     else
         add_long(first, sums);
-    for (int i = 0; i < LINE_OUTPUTS; ++i) {
+    [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i) {
         ivec2 pixel = first + i * along();
         if (all(lessThan(pixel, imageSize(target))))
             imageStore(target, pixel, stored(sums[i]));

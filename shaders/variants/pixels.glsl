@@ -14,20 +14,21 @@
 
 layout(push_constant) uniform Words {
     ivec4 target;    // width, height, words in a row, first row of the bound buffer
-    ivec4 reads[2];  // by binding, from 1 on: width, height, words in a row
-    uint zero;       // 0, but unknown to compilers
+    // By binding, from 1 on: width, height, words in a row; of the first also a 0 that compilers do
+    // not know.
+    ivec4 reads[GATHERED_LEVELS];
 } words;
 
 // Copies of the members that are used after a store. After a store compilers load a constant again,
 // lane by lane.
-ivec4 target_shape, read_shapes[2];
+ivec4 target_shape, read_shapes[GATHERED_LEVELS];
 uint unknown_zero;
 
 void read_words()
 {
     target_shape = words.target;
     read_shapes = words.reads;
-    unknown_zero = words.zero;
+    unknown_zero = uint(words.reads[0].w);
 }
 
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
@@ -129,3 +130,27 @@ uvec4 finished(uvec4 own, vec4 value)
 #endif
     return result;
 }
+
+#ifdef WORDS
+
+// A pixel anywhere in an image of this shape (see Words).
+vec4 load_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
+{
+    uvec4 word = texelFetch(image, row * shape.z + at * CHANNEL_BYTES / 4);
+#if CHANNEL_BYTES == 1
+    uvec2 half_word = (at & 2) == 0 ? word.xy : word.zw;
+    return value_of(uvec4((at & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0));
+#elif CHANNEL_BYTES == 2
+    return value_of(uvec4((at & 1) == 0 ? word.xy : word.zw, 0, 0));
+#else
+    return value_of(word);
+#endif
+}
+
+// A pixel of an image of single floats. Above and below the image, the outermost rows are repeated.
+vec4 load_floats(usamplerBuffer image, ivec4 shape, int x, int row)
+{
+    return uintBitsToFloat(texelFetch(image, clamp(row, 0, shape.y - 1) * shape.z + x));
+}
+
+#endif

@@ -29,6 +29,12 @@ def settings_with(**fields: Any) -> object:
     return given
 
 
+def stage_with(**fields: Any) -> object:
+    given = Given()
+    vars(given).update({"stage": "streaks", **fields})
+    return given
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
@@ -60,10 +66,31 @@ def settings_with(**fields: Any) -> object:
         ({"layers": ((1.0, 1.0),) * 9}, "layers: 9 layers are out of range, 1 to 8"),
         ({"layers": (1.0,)}, "layers: a tuple is needed, not 1.0"),
         ({"layers": 5}, "len|sequence"),
+        ({"glare": 5}, "glare: a tuple is needed, not 5"),
+        ({"glare": (5,)}, "'int' object has no attribute 'stage'"),
+        ({"glare": (stage_with(stage="rain"),)}, "glare: there is no stage 'rain'"),
+        ({"glare": (stage_with(stage=5),)}, "glare: there is no stage 5"),
+        ({"glare": (stage_with(fade="1"),)}, "real number"),
+        ({"glare": (stage_with(stage="ghosts"),)}, "no attribute 'ghosts'"),
+        ({"glare": (stage_with(stage="ghosts", ghosts=5),)}, "ghosts: a tuple is needed"),
+        ({"glare": (stage_with(stage="ghosts", ghosts=(1,)),)}, "ghosts: a tuple is needed"),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((17.0, (1, 1, 1)),)),)},
+            r"ghosts: .* is out of range, -16.0 to 16.0",
+        ),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((1.0, (1, float("nan"), 1)),)),)},
+            "ghosts: .* is out of range",
+        ),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((1.0, (1, 1, 1)),) * 17),)},
+            "ghosts: 17 are out of range, 0 to 16",
+        ),
+        ({"glare": (stage_with(),) * 6}, "glare: 6 stages are out of range, 0 to 5"),
     ],
 )
 def test_settings(fields: dict[str, Any], message: str) -> None:
-    with pytest.raises((TypeError, ValueError), match=message):
+    with pytest.raises((TypeError, ValueError, AttributeError), match=message):
         scene_plan(settings_with(**fields), (16, 16))
 
 
@@ -73,6 +100,17 @@ def test_every_number_has_a_range(name: str) -> None:
     for wrong in (low - 1, high + 1, np.nextafter(low, -np.inf), np.inf, -np.inf, np.nan, 1e300):
         with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
             scene_plan(settings_with(**{name: float(wrong)}), (16, 16))
+
+
+@pytest.mark.parametrize("name", sorted(_core.GLARE_VALUES))
+def test_every_number_of_glare_has_a_range(name: str) -> None:
+    _, low, high = _core.GLARE_VALUES[name]
+    for wrong in (low - 1, high + 1, np.inf, np.nan, 1e300):
+        glare = (stage_with(**{name: float(wrong)}),)
+        with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
+            scene_plan(settings_with(glare=glare), (16, 16))
+    for end in (low, high):
+        scene_plan(settings_with(glare=(stage_with(**{name: end}),)), (16, 16))
 
 
 @pytest.mark.parametrize("method", ["pyramid", "dual_kawase", *METHODS])
@@ -261,6 +299,18 @@ def test_plans_with_other_images(renderer: Renderer) -> None:
         renderer._core.run(source, plans, arrays_for(*plans))
     with pytest.raises(TypeError, match="a Plan is needed"):
         plans[0].shares_images(source)  # type: ignore[arg-type]
+
+
+def test_plans_of_an_image(renderer: Renderer, scene: Scene) -> None:
+    source, (plan,) = planned(renderer, Separable())
+    assert plan.is_of_image(source)
+    assert not plan.is_of_image(_core.image_source(np.zeros((4, 5, 3), np.uint8)))
+    # The camera is part of a scene's plan.
+    of_scene = _core.scene_source(*scene_arguments(scene, (4, 4), "forward", 0.0))
+    plan = renderer._core.plan(of_scene, Separable(), None)
+    assert not plan.is_of_image(of_scene)
+    with pytest.raises(TypeError, match="a Source is needed"):
+        plan.is_of_image(plan)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("names", [["final"], "final", 5], ids=str)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tests.framebuffers import assert_same
 from tests.images import picture
-from vkbloom import Pyramid, Renderer, Separable, _core, requests
+from vkbloom import AdapterInfo, Pyramid, Renderer, Separable, _core, requests
 
 #: Changes of size, dtype and channels, and sizes above 1 MiB, which are copied in another way.
 IMAGES: list[tuple[int, int, int, str]] = [
@@ -251,7 +251,11 @@ def test_an_image_in_use_is_not_taken_over(renderer: Renderer) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_the_memory_of_a_handle_goes_with_it(new_renderer: Callable[[], Renderer]) -> None:
+def test_the_memory_of_a_handle_goes_with_it(
+    monkeypatch: pytest.MonkeyPatch, software: AdapterInfo, new_renderer: Callable[[], Renderer]
+) -> None:
+    # Only a software adapter has its images in the memory of the process.
+    monkeypatch.setenv("VKBLOOM_ADAPTER", software.name)
     renderer = new_renderer()
     image = np.full((2048, 2048, 4), 0.5, np.float32)
     settings = Separable(bloom=False)
@@ -394,3 +398,30 @@ def test_results_that_nobody_takes(renderer: Renderer) -> None:
     del results
     gc.collect()
     assert renderer.apply(picture(16, 16)).timings
+
+
+# Images of several megabytes, whose rows several threads compare and pack
+
+
+@pytest.mark.parametrize("channels", [4, 3])
+def test_a_change_in_any_row_of_a_large_image_is_uploaded(
+    new_renderer: Callable[[], Renderer], channels: int
+) -> None:
+    renderer = new_renderer()
+    image = np.full((1031, 1024, channels), 0.25, np.float16)
+    settings = Separable(bloom=False)
+
+    def final() -> NDArray[Any]:
+        frames = renderer.apply(image, settings, attachments=("final",))
+        assert frames.info["nan"] == np.isnan(image).sum()
+        assert frames.info["inf"] == np.isinf(image).sum()
+        return frames["final"]
+
+    final()
+    for row, value in [(0, 0.5), (1, np.inf), (515, np.nan), (516, 0.5), (1030, np.nan)]:
+        image[row, 7, 1] = value
+        image[row, 8, 2] = 0.75
+        got = final()
+        finite = np.isfinite(image)
+        np.testing.assert_array_equal(got[finite], image[finite])
+        assert renderer.apply(image, settings, attachments=("final",)).timings == {}

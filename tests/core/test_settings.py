@@ -35,6 +35,7 @@ DEFAULTS = {
     "bloom_size": None,
     "bloom_scale": 1.0,
     "format": None,
+    "glare": (),
     "blur_scale": 1.0,
     "blur_strength": 1.5,
     "weights": (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -49,3 +50,18 @@ def test_no_operation_on_floats_may_be_contracted() -> None:
         counts.append(len(results))
     assert len(counts) > 60, "modules were not found"
     assert sum(counts) > 2000, "operations were not found"
+
+
+def test_loops_over_arrays_are_unrolled() -> None:
+    # Mesa 25 unrolls only what it is told to. An array indexed by the counter of another loop is
+    # in memory, which makes a pass take up to five times as long.
+    rows = re.compile(r"for \(int (y|chunk) = ")
+    checked = 0
+    for shader in sorted((Path(__file__).parents[2] / "shaders" / "variants").iterdir()):
+        lines = shader.read_text().splitlines()
+        # Only GPUs run tiles.
+        loops = [line for line in lines if "for (" in line and shader.name != "tile.comp"]
+        checked += len(loops)
+        for line in loops:
+            assert rows.search(line) or "[[unroll]] for (" in line, (shader.name, line)
+    assert checked > 50, "the loops were not found"

@@ -16,6 +16,7 @@ import vkbloom
 from vkbloom import psf
 from vkbloom.cli.program import given
 from vkbloom.convolution import PSFLike
+from vkbloom.glare import Glare
 from vkbloom.psf.base import PSF
 from vkbloom.views.descriptions import described_parameters
 
@@ -79,8 +80,22 @@ def _plain(text: str) -> object:
 #: The type of an option for (width, height).
 SIZE: Final = _Word("WxH", _read_size)
 
+
+def _read_glare(word: str) -> tuple[Glare, ...]:
+    """Read stages with their fields, such as streaks:directions=4,angle=45+streaks."""
+    if word.lower() in ("", "none"):
+        return ()
+    found = []
+    for one in word.split("+"):
+        name, _, rest = one.partition(":")
+        fields = dict(part.split("=", 1) for part in rest.split(",") if part)
+        found.append(Glare.from_dict({"stage": name} | {k: _plain(v) for k, v in fields.items()}))
+    return tuple(found)
+
+
 _OPTION_TYPES: Final[Mapping[object, _ParamType]] = {
     PSFLike: _Word("NAME[:A=1,...]|FILE", _read_psf),
+    tuple[Glare, ...]: _Word("STAGE[:A=1,...]+...", _read_glare),
     float: click.FLOAT,
     int: click.INT,
     tuple[int, int]: SIZE,
@@ -125,6 +140,8 @@ def _spelled(value: object, separator: str = ",") -> str:
             return f"{value:.12g}"
         case PSF():
             return type(value).__name__
+        case ():
+            return "none"
         case tuple():
             return separator.join(_spelled(part, ":") for part in value)
         case _:

@@ -53,6 +53,7 @@ def composite(
     dtype: DTypeLike | None = None,
     *,
     share: float | Array = 1.0,
+    is_light: bool = False,
 ) -> Array:
     """Return the final image: composite, exposure, tone map, encoding, dither, in this order.
 
@@ -80,6 +81,8 @@ def composite(
         Dtype of the final image; by default the scene's. The result is clamped to its range.
     share : float or ndarray, shape (H, W, 1)
         The share of the scene in the bloom's source: the mask, or 0 with an emission.
+    is_light : bool
+        Whether `bloom` is already i b, or the sum of that and glare.
 
     Returns
     -------
@@ -118,7 +121,7 @@ def composite(
     elif bloom is None:
         raise TypeError("bloom must be an array where settings.bloom is True, not None")
     else:
-        light = as_float(bloom, "bloom", (3, 4))
+        light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else settings.intensity)
         glow = light[..., :3]
         if glow.shape != rgb.shape:
             raise ValueError(
@@ -130,7 +133,7 @@ def composite(
             rgb = _godots(rgb * scale, glow, settings, curve, share)
         else:
             rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
-        alpha = _blend_alpha(alpha, light, settings)
+        alpha = _blend_alpha(alpha, light, settings.alpha)
     rgb = ENCODINGS[settings.encoding](rgb)
     store = storage(format_of(np.empty(0, stored), None))
     rgb = store(rgb)
@@ -141,43 +144,41 @@ def composite(
     return kept
 
 
-def _blend_alpha(alpha: Array, bloom: Array, settings: CompositeSettings) -> Array:
+def _blend_alpha(alpha: Array, light: Array, mode: str) -> Array:
     """Return the alpha of the final image, (H, W, 1); (H, W, 0) if the scene has none."""
-    if settings.alpha == "max":
-        brightest = settings.intensity * bloom[..., :3].max(axis=-1, keepdims=True)
-        larger: Array = np.maximum(alpha, np.clip(brightest, 0, 1))
+    if mode == "max":
+        larger: Array = np.maximum(alpha, np.clip(light[..., :3].max(axis=-1, keepdims=True), 0, 1))
         return larger
-    if settings.alpha == "blur":
-        if bloom.shape[2] == 3:
+    if mode == "blur":
+        if light.shape[2] == 3:
             raise ValueError('bloom must have 4 channels where settings.alpha is "blur", not 3')
-        return 1 - (1 - alpha) * (1 - np.clip(settings.intensity * bloom[..., 3:], 0, 1))
+        return 1 - (1 - alpha) * (1 - np.clip(light[..., 3:], 0, 1))
     return alpha
 
 
-def _blend(scene: Array, bloom: Array, mode: str, intensity: float, share: float | Array) -> Array:
-    """Return the combination of scene and bloom."""
+def _blend(scene: Array, light: Array, mode: str, intensity: float, share: float | Array) -> Array:
+    """Return the combination of scene and light, which is i b."""
     if mode == "add":
-        return scene + intensity * bloom
+        return scene + light
     if mode == "mix":
-        return scene + (bloom - share * scene) * intensity
+        return scene + light - intensity * share * scene
     if mode == "screen":
-        return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(intensity * bloom, 0, 1))
+        return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(light, 0, 1))
     raise ValueError(f'composite must be "add", "mix" or "screen", not {mode!r}')
 
 
 def _godots(
     scene: Array,
-    bloom: Array,
+    glow: Array,
     settings: CompositeSettings,
     curve: Callable[[Array], Array],
     share: float | Array,
 ) -> Array:
-    """Return scene and bloom after the tone map, as Godot blends them.
+    """Return scene and light after the tone map, as Godot blends them.
 
     From godotengine/godot, servers/rendering/renderer_rd/shaders/effects/tonemap.glsl
     @ 001c8c9c24dc.
     """
-    glow = settings.intensity * bloom
     if settings.composite == "soft_light":
         light, toned = np.clip(curve(glow), 0, 1), curve(scene)
         dark = ((16 * toned - 12) * toned + 4) * toned
@@ -189,7 +190,7 @@ def _godots(
         return curve(scene + glow - scene * glow / white)
     if settings.composite == "replace":
         return curve(glow)
-    return curve(_blend(scene, bloom, settings.composite, settings.intensity, share))
+    return curve(_blend(scene, glow, settings.composite, settings.intensity, share))
 
 
 def _noise(size: tuple[int, int], seed: int) -> Array:

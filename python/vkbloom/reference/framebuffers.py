@@ -15,6 +15,7 @@ from . import (
     convolution,
     dual_kawase,
     filament,
+    glare,
     godot,
     hdrp,
     kino,
@@ -47,6 +48,8 @@ class Settings(CompositeSettings, Protocol):
     def bloom_scale(self) -> float: ...
     @property
     def format(self) -> str | None: ...
+    @property
+    def glare(self) -> tuple[Any, ...]: ...
 
 
 class _Method(NamedTuple):
@@ -131,7 +134,8 @@ def apply(
     Returns
     -------
     dict of str to ndarray of float64
-        In the order of the data flow: "glow", then those of `passes`, then "final". The values are
+        In the order of the data flow: "glow", those of the stages of glare, those of `passes`, then
+        "final". The values are
         in real units: 0..1 for unorm formats. Bloom buffers have 4 channels. Their alpha is 1,
         except with ``settings.alpha`` "blur". "final" has the image's channels. With
         ``settings.bloom`` off there is only "final".
@@ -181,12 +185,25 @@ def apply(
     else:
         glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), weights))
         blurred = method.passes(glow, settings, (width, height), store)
-    framebuffers = _with_alphas({"glow": glow, **blurred})
+    stages = glare.stages(_glowing(glow, settings, weights), settings.glare, format)
+    framebuffers = _with_alphas({"glow": glow, **stages, **blurred})
     # The share of the scene from which the bloom is made.
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     bloom = framebuffers["bloom"]
-    framebuffers["final"] = composite(scene, bloom, settings, dtype, share=share)
+    if settings.glare:
+        images = [framebuffers[name] for name in stages]
+        bloom = glare.light(bloom, settings.intensity, images, settings.glare)
+    framebuffers["final"] = composite(
+        scene, bloom, settings, dtype, share=share, is_light=bool(settings.glare)
+    )
     return framebuffers
+
+
+def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
+    """Return what the stages of glare read: published methods have not thresholded the glow."""
+    if not _METHODS[settings.method].published:
+        return glow
+    return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
 
 
 def passes(

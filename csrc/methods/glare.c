@@ -1,0 +1,266 @@
+// Glare beside the bloom: stages that read what glows and add light to the bloom.
+//
+// They read the thresholded and masked image, halved as often as each of them says. Published
+// methods apply threshold and mask later, so that there a pass of its own makes this image. The
+// bloom, times its intensity, and all stages are added up to the image that the composite reads in
+// place of the bloom.
+#include "methods/methods.h"
+#include "passes/levels.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+// A stage that is being added.
+struct stage {
+    const struct vkb_stage *settings;
+    struct vkb_levels levels;  // for its images
+    char name[VKB_NAME_SIZE];
+    uint32_t from;
+};
+
+typedef bool add_stage(const struct stage *stage, uint32_t *image, struct vkb_error *error);
+static add_stage vkb_add_streaks, vkb_add_ghosts, vkb_add_halo;
+
+static const struct {
+    const char *name;
+    add_stage *add;
+} kinds[VKB_STAGE_COUNT] = {
+#define STAGE_ROW(constant, name) [VKB_STAGE_##constant] = {#name, vkb_add_##name},
+    VKB_STAGES(STAGE_ROW)
+#undef STAGE_ROW
+};
+
+static struct vkb_size size_of(const struct stage *stage, uint32_t image)
+{
+    const struct vkb_image_row *row = &stage->levels.graph->images[image];
+    return (struct vkb_size){row->width, row->height};
+}
+
+// The weights of iteration i: f^(k base^i) for tap k, all divided by their sum, times a gain. Of
+// each tap but the first two channels, which alternate, are less.
+static void set_weights(const struct vkb_glare_values *values, int iteration, double gain,
+                        struct vkb_streaks_params *params)
+{
+    const double fade = pow(values->fade, pow(values->base, iteration));
+    const double less = 1.0 - pow(values->colour_shift, iteration + 1);
+    double sum = 0.0;
+
+    for (int tap = 0; tap < values->base; ++tap)
+        sum += pow(fade, tap);
+    for (int tap = 0; tap < values->base; ++tap) {
+        const double weight = gain * pow(fade, tap) / sum;
+        const int kept = (4 - tap % 3) % 3;  // red, then blue, then green
+        for (int channel = 0; channel < 4; ++channel)
+            params->weights[tap][channel] =
+                (float)(tap == 0 || channel == kept || channel == 3 ? weight : weight * less);
+    }
+    params->count = values->base;
+}
+
+// A step along an axis has no part across it: a cosine of a right angle is not quite 0.
+static float step_of(double step)
+{
+    return fabs(step) < 1e-9 ? 0.0f : (float)step;
+}
+
+// An iteration of ray `ray`, of so many, into the image `to`. `before`, if there is one, is added.
+static bool add_iteration(const struct stage *stage, int ray, int rays, int iteration,
+                          uint32_t from, uint32_t before, uint32_t to, struct vkb_error *error)
+{
+    const struct vkb_glare_values *values = &stage->settings->values;
+    const double angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays);
+    const double step = values->length * pow(values->base, iteration);
+    const bool last = iteration == values->iterations - 1;
+    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, VKB_SHADER_streaks_frag, from, to);
+    struct vkb_streaks_params *params = &row.params.streaks;
+
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row.reads[1] = before != VKB_NO_IMAGE ? before : from;
+    row.read_count = 2;
+    row.constants.add_own = before != VKB_NO_IMAGE;
+    row.constants.first = iteration == 0;
+    row.block = VKB_BLOCK_streaks;
+    set_weights(values, iteration, last ? 1.0 / rays : 1.0, params);
+    // Light goes in the direction of the angle, so that it comes from the other one.
+    params->step_x = step_of(-step * cos(angle));
+    params->step_y = step_of(step * sin(angle));
+    params->threshold = iteration == 0 ? values->threshold : 0.0f;
+    params->limit = vkb_formats[stage->levels.source->format].limit;
+    return vkb_graph_add_pass(stage->levels.graph, &row, error);
+}
+
+// Adds the image that a pass of ray `ray` writes; the last one is the stage's framebuffer.
+static bool add_ray_image(const struct stage *stage, int ray, int iteration, bool last,
+                          uint32_t *image, struct vkb_error *error)
+{
+    char name[2 * VKB_NAME_SIZE];
+
+    if (last)
+        return vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
+                                error);
+    snprintf(name, sizeof name, "%s_%d_%d", stage->name, ray, iteration);
+    return vkb_levels_step(&stage->levels, name, 0, size_of(stage, stage->from), image, error);
+}
+
+// Each ray is iterated by itself; its last iteration adds the rays before.
+static bool vkb_add_streaks(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    const struct vkb_glare_values *values = &stage->settings->values;
+    // One direction is a line to both sides.
+    const int rays = values->directions == 1 ? 2 : values->directions;
+    uint32_t before = VKB_NO_IMAGE;
+
+    for (int ray = 0; ray < rays; ++ray, before = *image) {
+        uint32_t from = stage->from;
+        for (int iteration = 0; iteration < values->iterations; ++iteration, from = *image) {
+            const bool last = iteration == values->iterations - 1;
+            if (!add_ray_image(stage, ray, iteration, last && ray == rays - 1, image, error)
+                || !add_iteration(stage, ray, rays, iteration, from, last ? before : VKB_NO_IMAGE,
+                                  *image, error))
+                return false;
+        }
+    }
+    return true;
+}
+
+// A stage of one pass with the block of ghosts and halo.
+static bool add_flare(const struct stage *stage, enum vkb_shader fragment, uint32_t *image,
+                      struct vkb_error *error)
+{
+    const struct vkb_glare_values *values = &stage->settings->values;
+
+    if (!vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
+                          error))
+        return false;
+    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, fragment, stage->from, *image);
+    row.block = VKB_BLOCK_flare;
+    row.params.flare = (struct vkb_flare_params){
+        .threshold = values->threshold,
+        .limit = vkb_formats[stage->levels.source->format].limit,
+        .maximum = values->maximum,
+        .aberration = values->aberration,
+        .radius = values->radius,
+        .falloff = values->falloff,
+        .vignette = values->vignette,
+        .width = values->width,
+        .count = (int)stage->settings->ghost_count,
+    };
+    memcpy(row.params.flare.ghosts, stage->settings->ghosts, sizeof row.params.flare.ghosts);
+    return vkb_graph_add_pass(stage->levels.graph, &row, error);
+}
+
+static bool vkb_add_ghosts(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    return add_flare(stage, VKB_SHADER_ghosts_frag, image, error);
+}
+
+static bool vkb_add_halo(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    return add_flare(stage, VKB_SHADER_halo_frag, image, error);
+}
+
+bool vkb_has_glare(const struct vkb_settings *settings)
+{
+    return settings->values.bloom && settings->stage_count > 0;
+}
+
+// What the stages read: the glow, or in published methods what the threshold and the mask leave of
+// it.
+static bool add_source(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                       const struct vkb_levels *levels, uint32_t *image, struct vkb_error *error)
+{
+    const enum vkb_mode mode = vkb_own_threshold_mode(settings);
+
+    *image = source->glow;
+    if (!vkb_is_published(settings) || (mode == THRESHOLD_NONE && source->mask == VKB_NO_IMAGE))
+        return true;
+    return vkb_levels_step(levels, "glare_source", 0, source->buffers, image, error)
+        && vkb_add_threshold_in(mode, settings, source->glow, source->mask, *image, levels->graph,
+                                error);
+}
+
+// Adds images of half the size, until there are as many as the stage wants.
+static bool add_halvings(const struct vkb_levels *levels, int halvings, uint32_t *images,
+                         int *count, struct vkb_error *error)
+{
+    for (; *count <= halvings; ++*count) {
+        const uint32_t from = images[*count - 1];
+        const struct vkb_image_row *above = &levels->graph->images[from];
+        const struct vkb_size size = vkb_halved((struct vkb_size){above->width, above->height});
+        if (!vkb_levels_step(levels, "glare_down_%u", (uint32_t)*count - 1, size, &images[*count],
+                             error))
+            return false;
+        const struct vkb_pass_row row = vkb_down_row(levels, false, from, images[*count]);
+        if (!vkb_graph_add_pass(levels->graph, &row, error))
+            return false;
+    }
+    return true;
+}
+
+// The framebuffer of stage `index`: its kind, with a number where there are several of it.
+static void name_stage(const struct vkb_settings *settings, uint32_t index, char *name)
+{
+    const enum vkb_stage_kind kind = settings->stages[index].kind;
+    uint32_t number = 0, count = 0;
+
+    for (uint32_t i = 0; i < settings->stage_count; ++i) {
+        count += settings->stages[i].kind == kind;
+        number += i < index && settings->stages[i].kind == kind;
+    }
+    if (count == 1)
+        snprintf(name, VKB_NAME_SIZE, "%s", kinds[kind].name);
+    else
+        snprintf(name, VKB_NAME_SIZE, "%s_%u", kinds[kind].name, number);
+}
+
+bool vkb_add_stages(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                    struct vkb_graph *graph, uint32_t *stages, struct vkb_error *error)
+{
+    struct vkb_bloom_source floats = *source;
+    struct stage stage = {.levels = {.settings = settings, .source = &floats, .graph = graph}};
+    uint32_t images[MOST_HALVINGS + 1];
+    int count = 1;
+
+    if (!vkb_has_glare(settings))
+        return true;
+    // A streak spreads a pixel over hundreds: 8 bits and 6 bits of mantissa hold too little.
+    if (source->format != VKB_FORMAT_RGBA32_FLOAT)
+        floats.format = VKB_FORMAT_RGBA16_FLOAT;
+    if (!add_source(settings, source, &stage.levels, &images[0], error))
+        return false;
+    for (uint32_t i = 0; i < settings->stage_count; ++i) {
+        stage.settings = &settings->stages[i];
+        name_stage(settings, i, stage.name);
+        const int halvings = stage.settings->values.halvings;
+        if (!add_halvings(&stage.levels, halvings, images, &count, error))
+            return false;
+        stage.from = images[halvings];
+        if (!kinds[stage.settings->kind].add(&stage, &stages[i], error))
+            return false;
+    }
+    return true;
+}
+
+bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                   const uint32_t *stages, struct vkb_graph *graph, uint32_t *bloom,
+                   struct vkb_error *error)
+{
+    struct vkb_bloom_source floats = *source;
+    struct vkb_levels levels = {.settings = settings, .source = &floats, .graph = graph};
+    double shares[MAX_STAGES + 1] = {settings->values.intensity};
+    uint32_t light;
+
+    // Not rounded where the bloom's buffers are coarse: the composite rounds.
+    if (vkb_end_format(settings, source->format) != VKB_FORMAT_RGBA16_FLOAT)
+        floats.format = VKB_FORMAT_RGBA32_FLOAT;
+    levels.downs[levels.count++] = *bloom;
+    for (uint32_t i = 0; i < settings->stage_count; ++i) {
+        shares[levels.count] = settings->stages[i].values.intensity;
+        levels.downs[levels.count++] = stages[i];
+    }
+    if (!vkb_levels_step(&levels, "light", 0, source->final, &light, error))
+        return false;
+    *bloom = light;
+    return vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, light, error);
+}

@@ -1,0 +1,119 @@
+// The stages of glare of a settings object.
+#include "python/module.h"
+
+// A missing number has its default.
+static bool read_number(PyObject *object, const struct vkb_value_row *row,
+                        struct vkb_glare_values *values)
+{
+    vkb_value_store(values, row, row->initial);
+    if (!PyObject_HasAttrString(object, row->name))
+        return true;
+    PyObject *value = PyObject_GetAttrString(object, row->name);
+    const double number = value ? PyFloat_AsDouble(value) : 0.0;
+    bool done = !PyErr_Occurred();
+    if (done && !(number >= row->low && number <= row->high))
+        done = vkb_out_of_range(row->name, value, row->low, row->high);
+    if (done)
+        vkb_value_store(values, row, number);
+    Py_XDECREF(value);
+    return done;
+}
+
+static bool read_kind(PyObject *object, enum vkb_stage_kind *kind)
+{
+#define STAGE_NAME(constant, name) [VKB_STAGE_##constant] = #name,
+    static const char *const names[VKB_STAGE_COUNT] = {VKB_STAGES(STAGE_NAME)};
+#undef STAGE_NAME
+    PyObject *value = PyObject_GetAttrString(object, "stage");
+
+    if (!value)
+        return false;
+    for (int i = 0; PyUnicode_Check(value) && i < VKB_STAGE_COUNT; ++i)
+        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0) {
+            *kind = (enum vkb_stage_kind)i;
+            Py_DECREF(value);
+            return true;
+        }
+    PyErr_Format(PyExc_ValueError, "glare: there is no stage %R", value);
+    Py_DECREF(value);
+    return false;
+}
+
+static bool is_within(float number, double limit)
+{
+    return number >= -limit && number <= limit;
+}
+
+// A ghost: (scale, (red, green, blue)).
+static bool read_ghost(PyObject *tuple, float ghost[4])
+{
+    if (!vkb_require_tuple(tuple, "ghosts")
+        || !PyArg_ParseTuple(tuple, "f(fff);ghosts must hold (scale, (red, green, blue))",
+                             &ghost[3], &ghost[0], &ghost[1], &ghost[2]))
+        return false;
+    for (int i = 0; i < 4; ++i)
+        if (!is_within(ghost[i], i == 3 ? GHOST_LIMIT : HALF_LIMIT))
+            return vkb_out_of_range("ghosts", tuple, -GHOST_LIMIT, GHOST_LIMIT);
+    return true;
+}
+
+static bool read_ghost_tuple(PyObject *tuple, struct vkb_stage *stage)
+{
+    if (!vkb_require_tuple(tuple, "ghosts"))
+        return false;
+    const Py_ssize_t count = PyTuple_Size(tuple);
+    if (count > MOST_GHOSTS) {
+        PyErr_Format(PyExc_ValueError, "ghosts: %zd are out of range, 0 to %d", count, MOST_GHOSTS);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i)
+        if (!read_ghost(PyTuple_GetItem(tuple, i), stage->ghosts[i]))
+            return false;
+    stage->ghost_count = (uint32_t)count;
+    return true;
+}
+
+static bool read_ghosts(PyObject *object, struct vkb_stage *stage)
+{
+    PyObject *tuple = PyObject_GetAttrString(object, "ghosts");
+    const bool done = tuple && read_ghost_tuple(tuple, stage);
+
+    Py_XDECREF(tuple);
+    return done;
+}
+
+static bool read_stage(PyObject *object, struct vkb_stage *stage)
+{
+    for (size_t i = 0; i < vkb_glare_row_count; ++i)
+        if (!read_number(object, &vkb_glare_rows[i], &stage->values))
+            return false;
+    return read_kind(object, &stage->kind)
+        && (stage->kind != VKB_STAGE_GHOSTS || read_ghosts(object, stage));
+}
+
+static bool read_stages(PyObject *tuple, struct vkb_settings *settings)
+{
+    if (!vkb_require_tuple(tuple, "glare"))
+        return false;
+    const Py_ssize_t count = PyTuple_Size(tuple);
+    if (count > MAX_STAGES) {
+        PyErr_Format(PyExc_ValueError, "glare: %zd stages are out of range, 0 to %d", count,
+                     MAX_STAGES);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i)
+        if (!read_stage(PyTuple_GetItem(tuple, i), &settings->stages[i]))
+            return false;
+    settings->stage_count = (uint32_t)count;
+    return true;
+}
+
+bool vkb_read_glare(PyObject *object, struct vkb_settings *settings)
+{
+    if (!PyObject_HasAttrString(object, "glare"))
+        return true;
+    PyObject *tuple = PyObject_GetAttrString(object, "glare");
+    const bool done = tuple && read_stages(tuple, settings);
+    Py_XDECREF(tuple);
+    return done;
+}

@@ -1,0 +1,117 @@
+// Variants of upsampling by any factor: filters along rows, then along columns.
+#include "variants/variant.h"
+
+#include "passes/levels.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const enum vkb_shader rows_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(filter_rows);
+static const enum vkb_shader columns_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(filter_columns);
+static const enum vkb_shader gather_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(gather_columns);
+
+// Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
+static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
+{
+    return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
+}
+
+// The size of an image that is filtered along rows.
+static struct vkb_size rows_size(const struct vkb_variant_choice *choice,
+                                 const struct vkb_pass_row *pass, uint32_t from)
+{
+    return (struct vkb_size){choice->graph->images[pass->targets[0]].width,
+                             choice->graph->images[from].height};
+}
+
+// Whether words reach all pixels of the first `count` images that the pass reads, also filtered.
+static bool fits_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                      uint32_t count)
+{
+    bool fits = vkb_fits_words(choice, pass);
+
+    for (uint32_t i = 0; i < count; ++i) {
+        const struct vkb_size size = rows_size(choice, pass, pass->reads[i]);
+        fits = fits
+            && vkb_image_fits_words(choice->device, VKB_FORMAT_RGBA32_FLOAT, size.width,
+                                    size.height);
+    }
+    return fits;
+}
+
+// Adds an image and the pass that filters `from` along rows into it, at the positions of the pixels
+// of the target of `pass`.
+static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                     uint32_t from, uint32_t number, float step, uint32_t *rows,
+                     struct vkb_error *error)
+{
+    const struct vkb_size size = rows_size(choice, pass, from);
+    const enum vkb_format format = choice->graph->images[from].format;
+    char name[VKB_NAME_SIZE];
+    struct vkb_pass_row row;
+
+    snprintf(name, sizeof name, "%.20s_rows_%u", pass->name, number);
+    if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, rows, error))
+        return false;
+    memcpy(&row, pass, sizeof row);
+    row.constants = (struct vkb_constants){.upsample = pass->constants.upsample};
+    memset(&row.params, 0, sizeof row.params);
+    row.block = VKB_BLOCK_pyramid;
+    row.params.pyramid.step_x = step;
+    row.reads[0] = from;
+    vkb_drop_reads(&row, 1);
+    row.targets[0] = *rows;
+    vkb_make_words(&row, rows_shaders[format], FILTER_COLUMNS, FILTER_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+static void make_columns(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                         const enum vkb_shader *shaders)
+{
+    const enum vkb_format format = choice->graph->images[row->targets[0]].format;
+
+    row->constants.sampling = 0;
+    vkb_make_words(row, shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
+                   FILTER_ROWS);
+}
+
+bool vkb_add_upsampled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == VKB_SHADER_pyramid_up_frag && !vkb_doubles(pass)
+         && fits_rows(choice, pass, 1)
+         && (!pass->constants.add_own
+             || has_format_of(&choice->plain, pass->reads[1], pass->targets[0]));
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    if (!add_rows(choice, pass, pass->reads[0], 0, pass->params.pyramid.step_x, &row.reads[0],
+                  error))
+        return false;
+    if (!pass->constants.add_own)
+        row.reads[1] = row.reads[0];
+    make_columns(choice, &row, columns_shaders);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                      bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+    const uint32_t levels = (uint32_t)pass->constants.levels;
+
+    *fits = pass->shader == VKB_SHADER_gather_frag && fits_rows(choice, pass, levels);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    for (uint32_t level = 0; level < levels; ++level)
+        if (!add_rows(choice, pass, pass->reads[level], level, 0.0f, &row.reads[level], error))
+            return false;
+    for (uint32_t level = levels; level < row.read_count; ++level)
+        row.reads[level] = row.reads[0];
+    make_columns(choice, &row, gather_shaders);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}

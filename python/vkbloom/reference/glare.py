@@ -1,0 +1,198 @@
+"""The stages of glare: light beside the bloom, from what glows."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .image import Storage, storage
+from .levels import halved
+from .pyramid import downsample
+from .sampling import Array, sample
+
+__all__ = ["light", "stage_format", "stages"]
+
+
+def stage_format(format: str) -> str:
+    """Return the format of the stages' images, for bloom buffers of a format."""
+    return "rgba32float" if format == "rgba32float" else "rgba16float"
+
+
+def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]:
+    """Return the framebuffer of each stage.
+
+    Parameters
+    ----------
+    source : ndarray of float64, shape (H, W, C)
+        What glows, at the size of the bloom buffers, with threshold and mask.
+    glare : sequence of vkbloom.Glare
+    format : str
+        Of the bloom buffers.
+
+    Returns
+    -------
+    dict of str to ndarray of float64
+        By the stage's name, with a number where there are several of its kind.
+    """
+    store = storage(stage_format(format))
+    counts = Counter(stage.stage for stage in glare)
+    seen: Counter[str] = Counter()
+    found = {}
+    for stage in glare:
+        name = stage.stage
+        number = f"_{seen[name]}" if counts[name] > 1 else ""
+        seen[name] += 1
+        image = _reduced(source, stage.halvings, store)
+        found[name + number] = store(_STAGES[name](image, stage, store))
+    return found
+
+
+def light(bloom: Array, intensity: float, images: Sequence[Array], glare: Sequence[Any]) -> Array:
+    """Return intensity * bloom + the images of the stages, each times its own intensity."""
+    height, width, _ = bloom.shape
+    total = intensity * bloom
+    for image, stage in zip(images, glare, strict=True):
+        total = total + stage.intensity * sample(image, (width, height))
+    return total
+
+
+def _reduced(image: Array, halvings: int, store: Storage) -> Array:
+    for _ in range(halvings):
+        size = halved((image.shape[1], image.shape[0]))
+        image = store(downsample(image, size))
+    return image
+
+
+def _above(image: Array, threshold: float) -> Array:
+    """Return max(0, c - threshold); alpha is multiplied by the factor of the brightest channel."""
+    if threshold == 0:
+        return image
+    above = np.maximum(image - threshold, 0.0)
+    if image.shape[2] == 4:
+        brightest = np.maximum(image[..., :3].max(axis=2), 1e-30)
+        above[..., 3] = image[..., 3] * above[..., :3].max(axis=2) / brightest
+    return above
+
+
+def _moved(image: Array, x: float, y: float) -> Array:
+    """Return the image at places (x, y) texels further, bilinearly, with 0 outside of it."""
+    height, width, _ = image.shape
+    left, top = int(np.floor(x)), int(np.floor(y))
+    total = np.zeros_like(image)
+    for row, row_share in ((top, 1 - (y - top)), (top + 1, y - top)):
+        for column, share in ((left, 1 - (x - left)), (left + 1, x - left)):
+            rows = np.arange(height) + row
+            columns = np.arange(width) + column
+            inside = np.outer((rows >= 0) & (rows < height), (columns >= 0) & (columns < width))
+            texels = image[rows.clip(0, height - 1)][:, columns.clip(0, width - 1)]
+            total += row_share * share * inside[..., np.newaxis] * texels
+    return total
+
+
+def _streaks(image: Array, stage: Any, store: Storage) -> Array:
+    """Return the mean of the rays.
+
+    Iteration i of a ray adds its taps at multiples of base^i steps, with the weights
+    fade^(k base^i) over their sum.
+    """
+    base, count = stage.base, max(stage.directions, 2)
+    total: Array = np.zeros_like(image)
+    for ray in range(count):
+        angle = np.radians(stage.angle) + 2 * np.pi * ray / count
+        ray_image = _above(image, stage.threshold)
+        for iteration in range(stage.iterations):
+            weights = stage.fade ** (np.arange(base) * float(base**iteration))
+            weights /= weights.sum()
+            step = stage.length * base**iteration
+            less = 1 - stage.colour_shift ** (iteration + 1)
+            ray_image = store(
+                sum(
+                    weight
+                    * _colours(tap, less, image.shape[2])
+                    * _moved(ray_image, -tap * step * np.cos(angle), tap * step * np.sin(angle))
+                    for tap, weight in enumerate(weights)
+                )
+            )
+        total += ray_image / count
+    return total
+
+
+def _colours(tap: int, less: float, channels: int) -> Array:
+    """Return the factors of the channels at a tap: red, blue and green in turn keep theirs."""
+    factors = np.ones(channels)
+    if tap > 0:
+        factors[:3] = less
+        factors[(0, 2, 1)[(tap - 1) % 3]] = 1
+    return factors
+
+
+def _places(image: Array) -> tuple[Array, Array]:
+    """Return the places of the pixels along x and y less the centre's, as shares of the sides."""
+    height, width, _ = image.shape
+    x, y = ((np.arange(side) + 0.5) / side - 0.5 for side in (width, height))
+    return np.meshgrid(x, y)
+
+
+def _read(image: Array, x: Array, y: Array) -> Array:
+    """Return the image at places, bilinearly, with 0 outside of it."""
+    height, width, _ = image.shape
+    total = np.zeros_like(image)
+    column, row = (x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5
+    left, top = np.floor(column), np.floor(row)
+    for rows, row_share in ((top, top + 1 - row), (top + 1, row - top)):
+        for columns, share in ((left, left + 1 - column), (left + 1, column - left)):
+            inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+            texels = image[
+                rows.clip(0, height - 1).astype(int), columns.clip(0, width - 1).astype(int)
+            ]
+            total += (row_share * share * inside)[..., np.newaxis] * texels
+    return total
+
+
+def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
+    """Return what a ghost or the halo sees at places: red and blue apart, above the threshold."""
+    length = np.hypot(x, y)
+    moved = stage.aberration / np.where(length > 0, length, np.inf)
+    light = _read(image, x, y)
+    light[..., 0] = _read(image, x - moved * x, y - moved * y)[..., 0]
+    light[..., 2] = _read(image, x + moved * x, y + moved * y)[..., 2]
+    above = _above(light, stage.threshold)
+    above[..., :3] = np.minimum(above[..., :3], stage.maximum)
+    return above
+
+
+def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
+    """Return the sum of the pictures read at 1/2 + s (p - 1/2)."""
+    x, y = _places(image)
+    total = np.zeros_like(image)
+    for scale, tint in stage.ghosts:
+        distance = np.abs(scale) * np.hypot(x, y)
+        weight = np.maximum(0, 1 - distance / stage.radius) ** stage.falloff
+        factors = np.append(tint, [np.mean(tint)] * (image.shape[2] - 3))
+        total += weight[..., np.newaxis] * factors * _seen(image, stage, scale * x, scale * y)
+    corner = np.minimum(((2 * x) ** 2 + (2 * y) ** 2) ** 2, 1)
+    total *= (1 + stage.vignette * (corner - 1))[..., np.newaxis]
+    return total
+
+
+def _halo(image: Array, stage: Any, store: Storage) -> Array:
+    """Return what lies `radius` further towards the centre, weighted by a ring of that radius."""
+    height, width, _ = image.shape
+    x, y = _places(image)
+    across, down = x * width / height, y
+    distance = np.hypot(across, down)
+    step = stage.radius / np.where(distance > 0, distance, np.inf)
+    light = _seen(image, stage, x - step * x, y - step * y)
+    part = np.minimum(np.abs(distance - stage.radius) / stage.width, 1)
+    light *= (1 - part * part * (3 - 2 * part))[..., np.newaxis]
+    return light
+
+
+_STAGES: dict[str, Callable[[Array, Any, Storage], Array]] = {
+    "streaks": _streaks,
+    "ghosts": _ghosts,
+    "halo": _halo,
+}

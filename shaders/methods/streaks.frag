@@ -1,0 +1,39 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// One iteration of a streak in one direction: taps at multiples of a step (Kawase, "Frame Buffer
+// Postprocessing Effects in DOUBLE-S.T.E.A.L", GDC 2003). The last one adds the streaks before.
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(STREAKS_BLOCK);
+#include "lib/storage.glsl"
+#include "lib/glare.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+layout(set = 0, binding = 2) uniform sampler2D before;
+
+#define TARGET_BINDING 3
+#include "lib/fullscreen.glsl"
+
+vec4 fetch(ivec2 texel)
+{
+    vec4 value = fetch_inside(source, texel);
+    return FIRST != 0 ? above_threshold(value) : value;
+}
+
+vec4 sample_moved(vec2 offset)
+{
+    vec2 integer = floor(offset);
+    ivec2 texel = PIXEL + ivec2(integer);
+    vec4 four[4] = vec4[4](fetch(texel), fetch(texel + ivec2(1, 0)), fetch(texel + ivec2(0, 1)),
+                           fetch(texel + ivec2(1, 1)));
+    return bilinear(four, offset - integer);
+}
+
+vec4 shade()
+{
+    vec4 sum = ADD_OWN != 0 ? texelFetch(before, PIXEL, 0) : vec4(0.0);
+    for (int tap = 0; tap < params.count; ++tap)
+        sum += params.weights[tap] * sample_moved(float(tap) * vec2(params.step_x, params.step_y));
+    return stored(sum);
+}

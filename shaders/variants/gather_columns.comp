@@ -1,0 +1,76 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// Adds up levels of several sizes that filter_rows.comp has filtered along rows: filters each along
+// columns and multiplies it by its weight.
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+#include "lib/axis.glsl"
+
+UNIFORM_BLOCK(GATHER_BLOCK);
+#include "lib/storage.glsl"
+#include "variants/pixels.glsl"
+
+const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES);
+
+layout(local_size_x = ROW_INVOCATIONS) in;
+READ_IMAGE(1, level_0);
+READ_IMAGE(2, level_1);
+READ_IMAGE(3, level_2);
+READ_IMAGE(4, level_3);
+READ_IMAGE(5, level_4);
+READ_IMAGE(6, level_5);
+READ_IMAGE(7, level_6);
+WRITE_IMAGE(8);
+
+#define STORE_COUNT COLUMNS
+#include "variants/store.glsl"
+
+#define AXIS_FILTER filter_column
+#define AXIS_LINEAR linear_in_column
+#define AXIS_INSET_CUBIC inset_cubic_in_column
+#define AXIS_IMAGE usamplerBuffer image, ivec4 shape
+#define AXIS_ARGUMENT image, shape
+#define AXIS_TEXEL(at) load_floats(image, shape, line, at)
+#include "lib/axis_filter.glsl"
+
+#include "variants/row_axis.glsl"
+
+vec4 sums[COLUMNS];
+
+void add(usamplerBuffer image, int level, int first, int y)
+{
+    if (level >= LEVELS)
+        return;
+    ivec4 shape = read_shapes[level];
+    Axis axis = row_axis(shape.xy, y, 0.0);
+    float weight = params.shares[level >> 2][level & 3];
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        sums[i] += weight * filter_column(image, shape, axis, first + i);
+}
+
+void main()
+{
+    read_words();
+    ivec2 size = TARGET_SIZE();
+    ivec2 first = first_pixel(ivec2(COLUMNS, FILTER_ROWS));
+    int end = min(first.y + FILTER_ROWS, size.y);
+    uvec4 raw[COLUMNS];
+
+    if (any(greaterThanEqual(first, size)))
+        return;
+    for (int y = first.y; y < end; ++y) {
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            sums[i] = vec4(0.0);
+        add(level_0, 0, first.x, y);
+        add(level_1, 1, first.x, y);
+        add(level_2, 2, first.x, y);
+        add(level_3, 3, first.x, y);
+        add(level_4, 4, first.x, y);
+        add(level_5, 5, first.x, y);
+        add(level_6, 6, first.x, y);
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            raw[i] = buffer_of(sums[i]);
+        store(first.x, y, raw);
+    }
+}

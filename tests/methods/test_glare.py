@@ -1,0 +1,322 @@
+"""The stages of glare against their reference, and what they add to the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.images import hdr_picture, picture
+from tests.tolerance import assert_close, tolerance
+from vkbloom import (
+    BevyBloom,
+    FilamentBloom,
+    Ghosts,
+    Glare,
+    GodotBloom,
+    Halo,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    Streaks,
+    reference,
+)
+
+Image = NDArray[Any]
+
+TINTS = ((1.0, 0.5, 0.25), (0.0, 1.0, 0.0), (2.0, 0.0, 1.0))
+SHORT = Streaks(directions=3, angle=20, fade=0.8, base=3, iterations=2)
+
+
+class Case(NamedTuple):
+    settings: Settings
+    dtype: str = "float32"
+    size: tuple[int, int] = (61, 47)
+    given: tuple[str, ...] = ()
+
+
+# Every stage and every field of it; every format; all composites; odd sizes.
+CASES: dict[str, Case] = {
+    "streaks": Case(Pyramid(glare=(SHORT,), threshold=0.3, knee=0.5)),
+    "streaks-uint8": Case(Separable(glare=(SHORT,), threshold=0.30001), "uint8"),
+    "streaks-float16": Case(
+        Separable(glare=(SHORT,), composite="screen", intensity=0.1), "float16", (64, 48)
+    ),
+    "streaks-rg11b10": Case(Pyramid(glare=(SHORT,), format="rg11b10ufloat", composite="mix")),
+    "streaks-large": Case(
+        Pyramid(
+            glare=(Streaks(directions=1, colour_shift=0.5, threshold=0.2, halvings=0, length=0.7),),
+            bloom_scale=0.5,
+            intensity=0.3,
+            composite="mix",
+        ),
+        given=("mask",),
+    ),
+    "several": Case(
+        Separable(
+            glare=(SHORT, Streaks(directions=16, base=8, iterations=1, halvings=4, intensity=3)),
+            bloom_size=(31, 23),
+            alpha="max",
+        ),
+        given=("emission",),
+    ),
+    "alpha": Case(
+        Pyramid(
+            glare=(Streaks(threshold=0.1, halvings=2, iterations=2, colour_shift=0.3),),
+            alpha="blur",
+        )
+    ),
+    "ghosts": Case(
+        Pyramid(
+            glare=(
+                Ghosts(scales=(-1, 2.5, 0.4), tints=TINTS, threshold=0.2, maximum=2, halvings=0),
+            )
+        )
+    ),
+    "ghosts-uint8": Case(
+        Separable(glare=(Ghosts(aberration=0.02, falloff=25, radius=1, halvings=1),)), "uint8"
+    ),
+    "ghosts-float16": Case(
+        Separable(glare=(Ghosts(falloff=0, vignette=0.7),), bloom_scale=0.5), "float16", (75, 32)
+    ),
+    "ghosts-alpha": Case(
+        Pyramid(glare=(Ghosts(tints=TINTS, scales=(-2, 0, 1), threshold=0.1),), alpha="blur")
+    ),
+    "halo": Case(Pyramid(glare=(Halo(halvings=0, threshold=0.3, maximum=1.5),)), given=("mask",)),
+    "halo-uint8": Case(
+        Separable(glare=(Halo(radius=0.2, width=0.5, aberration=0.01, halvings=1),)), "uint8"
+    ),
+    "halo-alpha": Case(Pyramid(glare=(Halo(halvings=0),), alpha="blur"), "float32", (16, 33)),
+    "all": Case(
+        BevyBloom(
+            glare=(SHORT, Ghosts(), Halo(), Ghosts(scales=(-1.5,), intensity=0.5)),
+            threshold=0.5,
+            max_mip_dimension=32,
+            format="rgba32float",
+        ),
+        given=("mask", "emission"),
+    ),
+    "pyramid-scale": Case(Pyramid(glare=(SHORT,), scale_x=3, scale_y=0.5, firefly_filter=True)),
+    "one-pixel-flare": Case(Separable(glare=(Ghosts(), Halo(radius=0.01))), size=(1, 1)),
+    "one-pixel": Case(Separable(glare=(SHORT,)), size=(1, 1)),
+    "bevy": Case(
+        BevyBloom(
+            glare=(SHORT,), threshold=0.5, knee=0.2, max_mip_dimension=32, format="rgba32float"
+        )
+    ),
+    "filament": Case(
+        FilamentBloom(glare=(SHORT,), resolution=32, format="rgba32float"), given=("mask",)
+    ),
+    "godot": Case(GodotBloom(glare=(SHORT,), composite="soft_light", format="rgba32float")),
+    "godot-mix": Case(
+        GodotBloom(glare=(SHORT,), composite="mix", format="rgba32float"), given=("mask",)
+    ),
+    "no-intensity": Case(Pyramid(glare=(SHORT,), intensity=0)),
+}
+
+
+def source_of(case: Case) -> Image:
+    """Return a picture of four channels whose alpha is not 1."""
+    width, height = case.size
+    image = hdr_picture(width, height, 3, case.dtype)
+    return np.concatenate([image, picture(width, height, 1, case.dtype, seed=7)], axis=2)
+
+
+def given_of(case: Case, image: Image) -> dict[str, Any]:
+    mask = np.random.default_rng(3).random(image.shape[:2]).astype(np.float32)
+    every = {"mask": mask, "emission": image[::-1].copy()}
+    return {name: every[name] for name in case.given}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_stages(renderer: Renderer, name: str) -> None:
+    """All framebuffers agree with the reference."""
+    case = CASES[name]
+    image = source_of(case)
+    given = given_of(case, image)
+    frames = renderer.apply(image, case.settings, **given)
+    expected = reference.apply(image, case.settings, **given)
+    assert list(frames) == list(expected)
+    is_coarse = case.settings.format == "rg11b10ufloat"
+    for framebuffer in frames:
+        if is_coarse and framebuffer not in ("glow", "streaks"):
+            continue
+        limit = tolerance(
+            frames[framebuffer].dtype, expected[framebuffer], stages_of_8_bits=2, stages=8
+        )
+        assert_close(framebuffer, frames[framebuffer], expected[framebuffer], limit)
+    final = reference.apply(image, case.settings.replace(glare=()), **given)["final"]
+    assert np.abs(final - expected["final"]).max() > 0.01
+
+
+@pytest.mark.parametrize("form", ["fragment", "cpu", "gpu"])
+def test_variants(monkeypatch: pytest.MonkeyPatch, form: str) -> None:
+    """What is final does not depend on the framebuffers, with all variants."""
+    monkeypatch.setenv("VKBLOOM_FORM", form)
+    image = hdr_picture(96, 64, 3, "float16")
+    every = (SHORT, Ghosts(), Halo())
+    for settings in (Separable(glare=(SHORT,)), Pyramid(glare=every, levels=3)):
+        with Renderer(validation=True) as own:
+            alone = own.apply(image, settings, attachments="final")["final"]
+        with Renderer(validation=True) as own:
+            frames = own.apply(image, settings)
+        np.testing.assert_array_equal(alone, frames["final"])
+        expected = reference.apply(image, settings)
+        limit = tolerance("float16", expected["final"], stages=8)
+        assert_close("final", frames["final"], expected["final"], limit)
+
+
+@pytest.mark.parametrize("stage", [SHORT, Ghosts(), Halo()], ids=lambda stage: stage.stage)
+def test_nan_and_infinity(renderer: Renderer, stage: Glare) -> None:
+    """They count as 0 in the light, and stay in their pixels of the picture."""
+    image = hdr_picture(33, 21, 3, "float32")
+    image[4, 5], image[9, 9, 1] = np.nan, np.inf
+    frames = renderer.apply(image, Pyramid(glare=(stage,)))
+    clean = renderer.apply(np.where(np.isfinite(image), image, 0), Pyramid(glare=(stage,)))
+    np.testing.assert_array_equal(frames[stage.stage], clean[stage.stage])
+    np.testing.assert_array_equal(np.isfinite(frames["final"]), np.isfinite(image))
+
+
+def spread(renderer: Renderer, stage: Glare, x: int, y: int) -> Image:
+    """Return the light of a point of 1000."""
+    image = np.zeros((65, 65, 3), np.float32)
+    image[y, x] = 1000
+    light: Image = renderer.apply(image, Pyramid(glare=(stage,)))[stage.stage]
+    return light[..., 0]
+
+
+def test_energy_of_streaks(renderer: Renderer) -> None:
+    """Rays keep all light that stays in the picture; in the corner, one of four does."""
+    for angle in (0, 33):
+        streaks = Streaks(directions=4, angle=angle, fade=0.8, base=3, iterations=3, halvings=0)
+        assert spread(renderer, streaks, 32, 32).sum() == pytest.approx(1000, rel=1e-5)
+    streaks = streaks.from_dict({**streaks.to_dict(), "angle": 0})
+    # Two rays go along the border, the others keep only their first tap.
+    first = 1000 * (1 - 0.8) / (1 - 0.8**27)
+    corner = spread(renderer, streaks, 0, 0).sum()
+    assert corner == pytest.approx(500 + 2 * first / 4, rel=1e-5)
+
+
+def test_energy_of_ghosts(renderer: Renderer) -> None:
+    """A ghost has the light of its tint over the square of its scale, if it is in the picture."""
+    tints = ((1.0, 0.0, 0.0), (0.5, 0.0, 0.0))
+    ghosts = Ghosts(scales=(-0.5, 0.25), tints=tints, falloff=0, halvings=0)
+    assert spread(renderer, ghosts, 32, 32).sum() == pytest.approx(1000 * (4 + 8), rel=1e-4)
+    # From a corner, the ghosts lie outside, but for one of the picture's own size.
+    mirrored = spread(renderer, Ghosts(scales=(-1.0,), falloff=0, halvings=0), 0, 0)
+    assert mirrored[64, 64] == mirrored.sum() == 1000
+    assert spread(renderer, ghosts, 0, 0).sum() == 0
+    # A falloff leaves nothing of the corner.
+    assert spread(renderer, Ghosts(radius=0.6, halvings=0), 0, 0).sum() == 0
+
+
+def test_energy_of_the_halo(renderer: Renderer) -> None:
+    """A point in the centre becomes a ring of the halo's radius; one in a corner gives nothing."""
+    ring = spread(renderer, Halo(radius=0.25, width=0.05, halvings=0), 32, 32)
+    y, x = np.nonzero(ring > 1)
+    assert np.abs(np.hypot(x - 32, y - 32) / 65 - 0.25).max() < 0.05
+    assert len(x) > 60
+    assert spread(renderer, Halo(radius=0.25, width=0.05, halvings=0), 0, 0).sum() == 0
+
+
+def test_directions_of_streaks(renderer: Renderer) -> None:
+    """Angles count counter-clockwise from the right; one direction is a line."""
+    streaks = Streaks(directions=3, angle=90, base=2, iterations=3, halvings=0)
+    light = spread(renderer, streaks, 32, 32)
+    assert light[26, 32] > 0
+    assert light[38, 32] == 0
+    line = spread(renderer, Streaks(directions=1, base=2, iterations=3, halvings=0), 32, 32)
+    assert (np.nonzero(line)[0] == 32).all()
+    np.testing.assert_array_equal(line[32, 25:40], line[32, 25:40][::-1])
+
+
+def test_a_flat_image_keeps_its_value(renderer: Renderer) -> None:
+    image = np.full((65, 65, 3), 0.5, np.float32)
+    streaks = Streaks(base=2, iterations=3, halvings=0)
+    light = renderer.apply(image, Pyramid(glare=(streaks,)))["streaks"]
+    assert light[32, 32, 0] == pytest.approx(0.5, rel=1e-5)
+
+
+def test_only_what_changed_runs(new_renderer: Callable[[], Renderer]) -> None:
+    """A stage's intensity runs only the sum; a field of it only the stage."""
+    own = new_renderer()
+    image = hdr_picture(64, 48, 3, "float32")
+    settings = Separable(glare=(SHORT, Streaks(directions=1, base=2, iterations=1)))
+    own.apply(image, settings)
+    dim = Separable(glare=(SHORT, Streaks(directions=1, base=2, iterations=1, intensity=0.5)))
+    assert list(own.apply(image, dim).timings) == ["light", "final"]
+    turned = Separable(glare=(SHORT, Streaks(directions=1, base=2, iterations=1, angle=90)))
+    ran = list(own.apply(image, turned).timings)
+    assert "streaks_1" in ran
+    assert not {"streaks_0", "bloom", "glow"} & set(ran)
+    assert list(own.apply(image, turned.replace(exposure=1)).timings) == ["final"]
+
+
+def test_scenes(renderer: Renderer, scene: Scene) -> None:
+    """Both shadings have glare."""
+    for shading in ("forward", "deferred"):
+        plain = renderer.render(scene, Pyramid(), (160, 90), shading=cast("Any", shading))
+        settings = Pyramid(glare=(Streaks(directions=1, intensity=4),))
+        frames = renderer.render(scene, settings, (160, 90), shading=cast("Any", shading))
+        assert frames["streaks"][..., :3].max() > 0
+        assert (frames["final"] != plain["final"]).any()
+
+
+def test_without_bloom_there_is_no_glare(renderer: Renderer) -> None:
+    image = hdr_picture(16, 9, 3, "float32")
+    assert list(renderer.apply(image, Pyramid(glare=(SHORT,), bloom=False))) == ["final"]
+
+
+def test_settings() -> None:
+    settings = Pyramid(glare=(SHORT, Ghosts(tints=TINTS[:1]), Halo()))
+    assert settings.glare[0] == SHORT
+    assert Ghosts.from_dict(settings.glare[1].to_dict()) == settings.glare[1]
+    settings = Pyramid(glare=(SHORT,))
+    assert settings == Pyramid(glare=cast("Any", [SHORT]))
+    assert hash(settings) == hash(Pyramid(glare=cast("Any", SHORT.to_dict())))
+    assert settings != Pyramid()
+    again: Settings = Settings.from_json(settings.to_json())
+    assert again == settings
+    assert hash(again) == hash(settings)
+    assert repr(Streaks(directions=cast("Any", np.int64(4)))).startswith("Streaks(intensity=1.0")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Streaks(directions=17), "directions: 17 is out of range, 1 to 16"),
+        (lambda: Streaks(directions=cast("Any", 1.5)), "directions: 1.5 is not an integer"),
+        (lambda: Streaks(fade=np.nan), "fade: nan is out of range, 0 to 1"),
+        (lambda: Pyramid(glare=(SHORT,) * 6), "glare: 6 stages are out of range, 0 to 5"),
+        (
+            lambda: Pyramid(glare=cast("Any", {"stage": "rain"})),
+            "stage: 'rain' is not one of streaks",
+        ),
+        (
+            lambda: Pyramid(glare=cast("Any", [{"stage": "streaks", "size": 1}])),
+            "glare: streaks has no 'size'; it has intensity",
+        ),
+    ],
+)
+def test_wrong_values(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (Glare, "Glare is abstract"),
+        (lambda: Ghosts(tints=cast("Any", (1.0,))), "tints: .* is not a sequence"),
+        (lambda: Pyramid(glare=cast("Any", "streaks")), "'streaks' is not a sequence of stages"),
+        (lambda: Pyramid(glare=cast("Any", [1])), "1 is not a stage"),
+    ],
+)
+def test_wrong_types(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        make()
