@@ -30,8 +30,8 @@ WORDS_ALONE = {
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}
-# For shaders that keep arrays in registers: the optimizer makes one function of all. NVIDIA's driver
-# calls large functions, and what they share is then in memory.
+# For shaders that keep arrays in registers: the optimizer makes one function of all. A driver may
+# call large functions, and what these share is then in memory.
 INLINED = ("-Os",)
 
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
