@@ -507,28 +507,21 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
 
     Parameters
     ----------
-    glare : str, Glare, mapping, a sequence of stages and mappings, or None
-        A name of `vkbloom.glares`; a mapping is what `Glare.to_dict` gave; None is no stage.
+    glare : Glare, mapping, a sequence of them, or None
+        A mapping is what `Glare.to_dict` gave; None is no stage.
 
     Raises
     ------
     ValueError
-        There are too many stages, no such name, or a mapping does not describe a stage.
+        There are too many stages, or a mapping does not describe a stage.
     TypeError
         Something else is among them.
     """
-    if isinstance(glare, str):
-        # Imported here, since it is made of stages.
-        from vkbloom.glares import glares  # noqa: PLC0415
-
-        if glare not in glares:
-            raise ValueError(f"glare: {glare!r} is not one of {', '.join(glares)}")
-        glare = glares[glare]
     if glare is None:
         return ()
     if isinstance(glare, Glare | Mapping):
         glare = (glare,)
-    if not isinstance(glare, Iterable):
+    if isinstance(glare, str) or not isinstance(glare, Iterable):
         raise TypeError(f"glare: {glare!r} is not a sequence of stages")
     found = []
     for one in glare:

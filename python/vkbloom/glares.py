@@ -9,7 +9,7 @@ import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.glare import Dirt, Ghosts, Halo, Streaks
+from vkbloom.glare import Dirt, Ghosts, Halo, Streaks, check_glare
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -145,3 +145,12 @@ glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
         "godot_dirt": (Dirt(strength=0.8, mode="lerp"),),
     }
 )
+
+
+def read_glare(glare: object) -> tuple[Glare, ...]:
+    """Return the stages of settings, also of a name of `glares`, as `check_glare` does."""
+    if isinstance(glare, str):
+        if glare not in glares:
+            raise ValueError(f"glare: {glare!r} is not one of {', '.join(glares)}")
+        return glares[glare]
+    return check_glare(glare)

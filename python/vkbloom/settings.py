@@ -14,7 +14,8 @@ from typing import Any, ClassVar, Literal, Self, cast, get_args
 
 from vkbloom import _core
 from vkbloom.checks import as_float, check_floats, check_like, check_size
-from vkbloom.glare import Glare, check_glare, replaced_stages, stage_field_of
+from vkbloom.glare import Glare, replaced_stages, stage_field_of
+from vkbloom.glares import read_glare
 
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
@@ -190,7 +191,7 @@ class Settings:
             self._check_name("format", BLOOM_FORMATS)
         if self.bloom_size is not None:
             object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
-        object.__setattr__(self, "glare", check_glare(self.glare))
+        object.__setattr__(self, "glare", read_glare(self.glare))
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
         """Check a number and store it as a Python number; NumPy scalars print differently."""
@@ -238,9 +239,7 @@ class Settings:
         """
         nested = {name: changes.pop(name) for name in [*changes] if "." in name}
         if nested:
-            changes["glare"] = replaced_stages(
-                check_glare(changes.get("glare", self.glare)), nested
-            )
+            changes["glare"] = replaced_stages(read_glare(changes.get("glare", self.glare)), nested)
         return dataclasses.replace(self, **changes)
 
     def value_of(self, name: str) -> Any:

@@ -252,7 +252,6 @@ def test_options_change_a_preset() -> None:
         ("--format rgba8", "'--format': 'rgba8' is not rgba8unorm|"),
         ("--glare rain", "'--glare': 'rain' is not NAME[:A=1,...]+..."),
         ("--streaks 17", "'--streaks': 17 is not in the range"),
-        ("--dirt missing.png", "missing.png"),
         ("--tonemap filmic", "'--tonemap': 'filmic' is not one of 'none'"),
         ("--threshold high", "'--threshold': 'high' is not float|none"),
         ("--method box", "'--method': 'box'"),
