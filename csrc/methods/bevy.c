@@ -39,6 +39,7 @@ static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t f
 
     row.params.prefilter.step_x = (float)levels->settings->values.scale_x;
     row.params.prefilter.step_y = (float)levels->settings->values.scale_y;
+    row.reach += 2.0f * row.params.prefilter.step_y;
     vkb_mask_prefilter(levels, &row);
     return row;
 }
@@ -51,8 +52,7 @@ static struct vkb_pass_row further_row(const struct vkb_levels *levels, uint32_t
     if (values->scale_x != 1.0 || values->scale_y != 1.0) {
         // With these sizes the taps are not in the middle between texels.
         row.constants.sampling = SAMPLING_FETCH;
-        row.params.pyramid.step_x = (float)values->scale_x;
-        row.params.pyramid.step_y = (float)values->scale_y;
+        vkb_set_steps(&row, values->scale_x, values->scale_y);
     }
     return row;
 }

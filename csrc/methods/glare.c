@@ -79,6 +79,8 @@ static bool add_iteration(const struct stage *stage, int ray, int rays, int iter
     row.constants.add_own = before != VKB_NO_IMAGE;
     row.constants.first = iteration == 0;
     row.block = VKB_BLOCK_streaks;
+    // Its images are beside the bloom's levels, and the taps may be anywhere.
+    row.reach = INFINITY;
     set_weights(values, iteration, last ? 1.0 / rays : 1.0, params);
     // Light goes in the direction of the angle, so that it comes from the other one.
     params->step_x = step_of(-step * cos(angle));
