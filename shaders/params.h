@@ -154,6 +154,20 @@
     INPUT(B, int, count) \
     VEC4S(B, weights, MOST_TAPS)
 
+// Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
+// ghosts.
+#define FLARE_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, maximum) \
+    INPUT(B, float, aberration) \
+    INPUT(B, float, radius) \
+    INPUT(B, float, falloff) \
+    INPUT(B, float, vignette) \
+    INPUT(B, float, width) \
+    INPUT(B, int, count) \
+    VEC4S(B, ghosts, MOST_GHOSTS)
+
 // The light of the deferred system.
 #define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
 
@@ -222,6 +236,7 @@
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(streaks, STREAKS_BLOCK) \
+    BLOCK(flare, FLARE_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
@@ -270,7 +285,13 @@
     SETTING(angle, 0.0, -360.0, 360.0) \
     SETTING(length, 1.0, 0.0, 16.0) \
     SETTING(fade, 0.95, 0.0, 1.0) \
-    SETTING(colour_shift, 0.0, 0.0, 1.0)
+    SETTING(colour_shift, 0.0, 0.0, 1.0) \
+    SETTING(maximum, 65504.0, 0.0, 65504.0) \
+    SETTING(aberration, 0.0, 0.0, 0.5) \
+    SETTING(radius, 1.0, 0.001, 4.0) \
+    SETTING(falloff, 0.0, 0.0, 64.0) \
+    SETTING(vignette, 0.0, 0.0, 1.0) \
+    SETTING(width, 0.1, 0.001, 4.0)
 
 #define GLARE_COUNT_ROWS(COUNT) \
     COUNT(halvings, 1, 0, MOST_HALVINGS) \
@@ -293,9 +314,12 @@
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
 
-// Of glare: the most stages (the bloom and a picture of dirt are added up with them), the taps of
-// an iteration of a streak, and how often the size of the bloom buffers is halved.
+// Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and
+// the size of their scales, the taps of an iteration of a streak, and how often the size of the
+// bloom buffers is halved.
 #define MAX_STAGES    (GATHERED_LEVELS - 2)
+#define MOST_GHOSTS   16
+#define GHOST_LIMIT   16.0
 #define MOST_TAPS     8
 #define MOST_HALVINGS 4
 

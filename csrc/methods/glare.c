@@ -9,6 +9,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 // A stage that is being added.
 struct stage {
@@ -18,11 +19,12 @@ struct stage {
     uint32_t from;
 };
 
-static bool vkb_add_streaks(const struct stage *, uint32_t *, struct vkb_error *);
+typedef bool add_stage(const struct stage *stage, uint32_t *image, struct vkb_error *error);
+static add_stage vkb_add_streaks, vkb_add_ghosts, vkb_add_halo;
 
 static const struct {
     const char *name;
-    bool (*add)(const struct stage *stage, uint32_t *image, struct vkb_error *error);
+    add_stage *add;
 } kinds[VKB_STAGE_COUNT] = {
 #define STAGE_ROW(constant, name) [VKB_STAGE_##constant] = {#name, vkb_add_##name},
     VKB_STAGES(STAGE_ROW)
@@ -33,6 +35,16 @@ static struct vkb_size size_of(const struct stage *stage, uint32_t image)
 {
     const struct vkb_image_row *row = &stage->levels.graph->images[image];
     return (struct vkb_size){row->width, row->height};
+}
+
+// Its taps may be anywhere, and its images are beside the bloom's levels.
+static struct vkb_pass_row glare_row(const struct stage *stage, enum vkb_shader fragment,
+                                     uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, fragment, from, to);
+
+    row.reach = INFINITY;
+    return row;
 }
 
 // The weights of iteration i: f^(k base^i) for tap k, all divided by their sum, times a gain. Of
@@ -70,7 +82,7 @@ static bool add_iteration(const struct stage *stage, int ray, int rays, int iter
     const double angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays);
     const double step = values->length * pow(values->base, iteration);
     const bool last = iteration == values->iterations - 1;
-    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, VKB_SHADER_streaks_frag, from, to);
+    struct vkb_pass_row row = glare_row(stage, VKB_SHADER_streaks_frag, from, to);
     struct vkb_streaks_params *params = &row.params.streaks;
 
     // Every binding of the shader must be filled, also one that this variant does not read.
@@ -79,8 +91,6 @@ static bool add_iteration(const struct stage *stage, int ray, int rays, int iter
     row.constants.add_own = before != VKB_NO_IMAGE;
     row.constants.first = iteration == 0;
     row.block = VKB_BLOCK_streaks;
-    // Its images are beside the bloom's levels, and the taps may be anywhere.
-    row.reach = INFINITY;
     set_weights(values, iteration, last ? 1.0 / rays : 1.0, params);
     // Light goes in the direction of the angle, so that it comes from the other one.
     params->step_x = step_of(-step * cos(angle));
@@ -122,6 +132,42 @@ static bool vkb_add_streaks(const struct stage *stage, uint32_t *image, struct v
         }
     }
     return true;
+}
+
+// A stage of one pass with the block of ghosts and halo.
+static bool add_flare(const struct stage *stage, enum vkb_shader fragment, uint32_t *image,
+                      struct vkb_error *error)
+{
+    const struct vkb_glare_values *values = &stage->settings->values;
+
+    if (!vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
+                          error))
+        return false;
+    struct vkb_pass_row row = glare_row(stage, fragment, stage->from, *image);
+    row.block = VKB_BLOCK_flare;
+    row.params.flare = (struct vkb_flare_params){
+        .threshold = values->threshold,
+        .limit = vkb_formats[stage->levels.source->format].limit,
+        .maximum = values->maximum,
+        .aberration = values->aberration,
+        .radius = values->radius,
+        .falloff = values->falloff,
+        .vignette = values->vignette,
+        .width = values->width,
+        .count = (int)stage->settings->ghost_count,
+    };
+    memcpy(row.params.flare.ghosts, stage->settings->ghosts, sizeof row.params.flare.ghosts);
+    return vkb_graph_add_pass(stage->levels.graph, &row, error);
+}
+
+static bool vkb_add_ghosts(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    return add_flare(stage, VKB_SHADER_ghosts_frag, image, error);
+}
+
+static bool vkb_add_halo(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    return add_flare(stage, VKB_SHADER_halo_frag, image, error);
 }
 
 bool vkb_has_glare(const struct vkb_settings *settings)

@@ -10,6 +10,7 @@ CHOICES: dict[str, tuple[str, ...]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
 MAX_STAGES: int
+MOST_GHOSTS: int
 
 AdapterTuple = tuple[str, str, str, str, str, bytes, bool]
 _Array = NDArray[Any]

@@ -71,6 +71,21 @@ def stage_with(**fields: Any) -> object:
         ({"glare": (stage_with(stage="rain"),)}, "glare: there is no stage 'rain'"),
         ({"glare": (stage_with(stage=5),)}, "glare: there is no stage 5"),
         ({"glare": (stage_with(fade="1"),)}, "real number"),
+        ({"glare": (stage_with(stage="ghosts"),)}, "no attribute 'ghosts'"),
+        ({"glare": (stage_with(stage="ghosts", ghosts=5),)}, "ghosts: a tuple is needed"),
+        ({"glare": (stage_with(stage="ghosts", ghosts=(1,)),)}, "ghosts: a tuple is needed"),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((17.0, (1, 1, 1)),)),)},
+            r"ghosts: .* is out of range, -16.0 to 16.0",
+        ),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((1.0, (1, float("nan"), 1)),)),)},
+            "ghosts: .* is out of range",
+        ),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((1.0, (1, 1, 1)),) * 17),)},
+            "ghosts: 17 are out of range, 0 to 16",
+        ),
         ({"glare": (stage_with(),) * 6}, "glare: 6 stages are out of range, 0 to 5"),
     ],
 )
