@@ -182,8 +182,8 @@
 // lines of `padded` elements; the elements of a butterfly are `step` apart, and those before `kept`
 // are stored. Where it pads: `extent` texels are there, and from the place `turn` on the line goes
 // on before the first of them. With a product with colours: the radices of rows, of so many
-// elements, and those of columns without the last one, by which it finds the frequency of the other
-// sign.
+// elements, the last of them, and those of columns without the last one, by which it finds the
+// frequency of the other sign.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -198,6 +198,7 @@
     INPUT(B, int, row_b) \
     INPUT(B, int, row_c) \
     INPUT(B, int, row_d) \
+    INPUT(B, int, row_last) \
     INPUT(B, int, block_a) \
     INPUT(B, int, block_b) \
     INPUT(B, int, block_c) \
@@ -357,11 +358,12 @@
 #define TILE_RADIUS                   16
 #define FUSED_VEC4S                   5
 
-// Of a Fourier transform: the invocations of a workgroup, and the most elements of a butterfly.
+// Of a Fourier transform: the invocations of a workgroup, and how many of them are side by side in
+// one row, where columns are transformed all; the most elements of a butterfly.
 // Brighter values than FFT_LIMIT would overflow in sums.
-#define FFT_COLUMNS    8
-#define FFT_ROWS       8
-#define FFT_MOST_RADIX 64
+#define FFT_INVOCATIONS 64
+#define FFT_ROW_COLUMNS 8
+#define FFT_MOST_RADIX  64
 // The most where the other elements are in shared memory.
 #define FFT_MOST_GROUP_RADIX 16
 #define FFT_LIMIT            1e28
@@ -376,9 +378,10 @@
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
 // applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
 // first level. LEVELS is the number of levels that a pass adds up. RADIX_A to STAGE are of Fourier
-// transforms (fft.comp). Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of
-// the stages; a workgroup has GROUP_SIZE invocations for each of GROUP_LINES lines, and exchanges
-// so many floats of each element at once.
+// transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete
+// lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
+// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines, and they exchange EXCHANGED floats of
+// each element at once.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -414,8 +417,8 @@
     CONSTANT(31, RADIX_2, radix_2) \
     CONSTANT(32, RADIX_3, radix_3) \
     CONSTANT(33, RADIX_4, radix_4) \
-    CONSTANT(34, GROUP_LINES, group_lines) \
-    CONSTANT(35, GROUP_SIZE, group_size) \
+    CONSTANT(34, GROUP_WIDTH, group_width) \
+    CONSTANT(35, GROUP_HEIGHT, group_height) \
     CONSTANT(36, EXCHANGED, exchanged)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.

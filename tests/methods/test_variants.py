@@ -58,8 +58,8 @@ BIT_EQUAL = {
     "kawase": METHODS["dual-kawase-offset"],
 }
 
-# Presets with a blur into another size.
-NEARLY_EQUAL = ("unity_urp", "threejs_unreal")
+# Presets with a blur into another size, and Fourier transforms, whose stages differ.
+NEARLY_EQUAL = ("unity_urp", "threejs_unreal", "iris_6")
 
 
 # Convolutions have the same passes but for the kernel: one with colours stands for all.
