@@ -1,5 +1,7 @@
 #include "vulkan/swapchain.h"
 
+#include <string.h>
+
 static bool find_mode(const struct vkb_device *device, bool mailbox,
                       struct vkb_swapchain *swapchain, struct vkb_error *error)
 {
