@@ -463,6 +463,8 @@
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
+    NAME(UPSAMPLE_UNIT_TENT, 5, unit_tent) \
+    NAME(UPSAMPLE_PAIR, 6, pair) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

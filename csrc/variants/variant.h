@@ -28,7 +28,7 @@ vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lin
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 // Upsampling by any factor as two passes, along rows and along columns; the sum of several levels
 // that are upsampled so.
-vkb_variant_add vkb_add_upsampled, vkb_add_gathered;
+vkb_variant_add vkb_add_upsampled, vkb_add_gathered, vkb_add_kawase_up;
 // Transforms of complete lines in shared memory.
 vkb_variant_add vkb_add_lines;
 

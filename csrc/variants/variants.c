@@ -219,6 +219,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_upsampled, TWO_PASSES},
     {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered, TWO_PASSES},
+    {VKB_VARIANTS_CPU, "upsampled", vkb_add_kawase_up, TWO_PASSES},
     {VKB_VARIANTS_CPU, "words", add_transform, 0},
     {VKB_VARIANTS_CPU, "pixels", add_pixels, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
