@@ -28,6 +28,7 @@ WORDS_ALONE = {
     "filter_columns.comp",
     "gather_columns.comp",
     "kawase_columns.comp",
+    "halve_taps.comp",
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}

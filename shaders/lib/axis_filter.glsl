@@ -10,7 +10,7 @@ vec4 AXIS_LINEAR(AXIS_IMAGE, Axis axis, float offset, int line)
 {
     float moved = axis.part + offset, integer = floor(moved), part = moved - integer;
     int at = axis.texel + int(integer);
-    return (1.0 - part) * AXIS_TEXEL(at) + part * AXIS_TEXEL(at + 1);
+    return blended(AXIS_TEXEL(at), AXIS_TEXEL(at + 1), part);
 }
 
 // The cubic filter as two linear taps, neither of them further from the texel than 1 - 1 / size of the
