@@ -29,6 +29,9 @@ WORDS_ALONE = {
     "gather_columns.comp",
     "kawase_columns.comp",
     "halve_taps.comp",
+    "kino_bright.comp",
+    "highlights.comp",
+    "scale.comp",
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}

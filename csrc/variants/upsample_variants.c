@@ -86,13 +86,19 @@ static void make_columns(const struct vkb_variant_choice *choice, struct vkb_pas
                    FILTER_ROWS);
 }
 
+bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return pass->constants.upsample == UPSAMPLE_LINEAR && !pass->constants.add_own
+        && vkb_same_size(graph, pass->reads[0], pass->targets[0]);
+}
+
 bool vkb_add_upsampled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        bool *fits, struct vkb_error *error)
 {
     struct vkb_pass_row row;
 
     *fits = pass->shader == VKB_SHADER_pyramid_up_frag && !vkb_doubles(pass)
-         && fits_rows(choice, pass, 1)
+         && !vkb_only_scales(&choice->plain, pass) && fits_rows(choice, pass, 1)
          && (!pass->constants.add_own
              || has_format_of(&choice->plain, pass->reads[1], pass->targets[0]));
     if (!*fits)

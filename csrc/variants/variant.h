@@ -47,6 +47,9 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
 // pass.
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
 
+// Whether an upsampling by a linear filter reads an image of the target's size.
+bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass);
+
 // Removes all images after the first `read_count` from the images that the pass reads.
 void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 
