@@ -35,6 +35,9 @@ WORDS_ALONE = {
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}
+# For shaders that keep arrays in registers: the optimizer makes one function of all. A driver may
+# call large functions, and what these share is then in memory.
+INLINED = ("-Os",)
 
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
@@ -57,11 +60,13 @@ def modules(shader: Path) -> list[Module]:
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
+    inlined = INLINED if '#include "lib/fourier.glsl"' in text else ()
     if '#include "variants/pixels.glsl"' in text:
         found = []
         for ours, glsl in FORMATS.items():
             if shader.name not in WORDS_ALONE:
-                found.append(Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",)))
+                options = (f"-DSOURCE_FORMAT={glsl}", *inlined)
+                found.append(Module(f"{name}_{ours}", shader, options))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
             found.append(Module(f"{shader.stem}_words_{ours}", shader, words))
             if shader.name in WORDS_STORED:
@@ -73,7 +78,7 @@ def modules(shader: Path) -> list[Module]:
         return found
     if "SOURCE_FORMAT" in text:
         return [
-            Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",))
+            Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}", *inlined))
             for ours, glsl in FORMATS.items()
         ]
     if '#include "lib/fullscreen.glsl"' in text:

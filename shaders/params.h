@@ -154,6 +154,20 @@
     INPUT(B, int, count) \
     VEC4S(B, weights, MOST_TAPS)
 
+// Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
+// ghosts.
+#define FLARE_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, float, threshold) \
+    INPUT(B, float, limit) \
+    INPUT(B, float, maximum) \
+    INPUT(B, float, aberration) \
+    INPUT(B, float, radius) \
+    INPUT(B, float, falloff) \
+    INPUT(B, float, vignette) \
+    INPUT(B, float, width) \
+    INPUT(B, int, count) \
+    VEC4S(B, ghosts, MOST_GHOSTS)
+
 // The light of the deferred system.
 #define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
 
@@ -168,8 +182,8 @@
 // lines of `padded` elements; the elements of a butterfly are `step` apart, and those before `kept`
 // are stored. Where it pads: `extent` texels are there, and from the place `turn` on the line goes
 // on before the first of them. With a product with colours: the radices of rows, of so many
-// elements, and those of columns without the last one, by which it finds the frequency of the other
-// sign.
+// elements, the last of them, and those of columns without the last one, by which it finds the
+// frequency of the other sign.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -184,6 +198,7 @@
     INPUT(B, int, row_b) \
     INPUT(B, int, row_c) \
     INPUT(B, int, row_d) \
+    INPUT(B, int, row_last) \
     INPUT(B, int, block_a) \
     INPUT(B, int, block_b) \
     INPUT(B, int, block_c) \
@@ -222,6 +237,7 @@
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(streaks, STREAKS_BLOCK) \
+    BLOCK(flare, FLARE_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
@@ -270,7 +286,13 @@
     SETTING(angle, 0.0, -360.0, 360.0) \
     SETTING(length, 1.0, 0.0, 16.0) \
     SETTING(fade, 0.95, 0.0, 1.0) \
-    SETTING(colour_shift, 0.0, 0.0, 1.0)
+    SETTING(colour_shift, 0.0, 0.0, 1.0) \
+    SETTING(maximum, 65504.0, 0.0, 65504.0) \
+    SETTING(aberration, 0.0, 0.0, 0.5) \
+    SETTING(radius, 1.0, 0.001, 4.0) \
+    SETTING(falloff, 0.0, 0.0, 64.0) \
+    SETTING(vignette, 0.0, 0.0, 1.0) \
+    SETTING(width, 0.1, 0.001, 4.0)
 
 #define GLARE_COUNT_ROWS(COUNT) \
     COUNT(halvings, 1, 0, MOST_HALVINGS) \
@@ -293,9 +315,12 @@
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
 
-// Of glare: the most stages (the bloom and a picture of dirt are added up with them), the taps of
-// an iteration of a streak, and how often the size of the bloom buffers is halved.
+// Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and
+// the size of their scales, the taps of an iteration of a streak, and how often the size of the
+// bloom buffers is halved.
 #define MAX_STAGES    (GATHERED_LEVELS - 2)
+#define MOST_GHOSTS   16
+#define GHOST_LIMIT   16.0
 #define MOST_TAPS     8
 #define MOST_HALVINGS 4
 
@@ -333,11 +358,12 @@
 #define TILE_RADIUS                   16
 #define FUSED_VEC4S                   5
 
-// Of a Fourier transform: the invocations of a workgroup, and the most elements of a butterfly.
+// Of a Fourier transform: the invocations of a workgroup, and how many of them are side by side in
+// one row, where columns are transformed all; the most elements of a butterfly.
 // Brighter values than FFT_LIMIT would overflow in sums.
-#define FFT_COLUMNS    8
-#define FFT_ROWS       8
-#define FFT_MOST_RADIX 64
+#define FFT_INVOCATIONS 64
+#define FFT_ROW_COLUMNS 8
+#define FFT_MOST_RADIX  64
 // The most where the other elements are in shared memory.
 #define FFT_MOST_GROUP_RADIX 16
 #define FFT_LIMIT            1e28
@@ -352,10 +378,10 @@
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
 // applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
 // first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
-// makes of its taps. RADIX_A to STAGE are of Fourier
-// transforms (fft.comp). Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of
-// the stages; a workgroup has GROUP_SIZE invocations for each of GROUP_LINES lines, and exchanges
-// so many floats of each element at once.
+// makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
+// GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are
+// the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of GROUP_WIDTH
+// lines, and they exchange EXCHANGED floats of each element at once.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -391,8 +417,8 @@
     CONSTANT(31, RADIX_2, radix_2) \
     CONSTANT(32, RADIX_3, radix_3) \
     CONSTANT(33, RADIX_4, radix_4) \
-    CONSTANT(34, GROUP_LINES, group_lines) \
-    CONSTANT(35, GROUP_SIZE, group_size) \
+    CONSTANT(34, GROUP_WIDTH, group_width) \
+    CONSTANT(35, GROUP_HEIGHT, group_height) \
     CONSTANT(36, EXCHANGED, exchanged)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.

@@ -175,6 +175,16 @@ def ours(renderer: vkbloom.Renderer) -> Iterator[Subject]:
         (vkbloom.DualKawase(levels=3), "`DualKawase`, 3 levels"),
     ):
         yield Subject(f"{name} {text}", bloom(settings), CHAIN, vkbloom.reference.gain(settings))
+    glare = vkbloom.Convolution(vkbloom.psf.gaussian(SIGMA), boundary="edge", kernel_size=(25, 25))
+    kernel = glare.kernel(SMALL.size)[..., 0].sum(axis=0)
+    variance = float(kernel @ (np.arange(25) - 12) ** 2)
+    text = f"{name} `Convolution`, Gaussian"
+    yield Subject(text, bloom(glare), SMALL, 1.0, variance**0.5)
+    for preset, settings in vkbloom.presets.items():
+        if isinstance(settings, vkbloom.Convolution):
+            # Edges are continued, and each channel of the kernel has the sum 1.
+            kept = settings.normalize and settings.boundary == "edge"
+            yield Subject(f"{name} `{preset}`", bloom(settings), ENGINE, 1.0 if kept else None)
     for method in (
         vkbloom.BevyBloom,
         vkbloom.FilamentBloom,

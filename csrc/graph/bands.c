@@ -116,7 +116,8 @@ static bool include(const struct vkb_graph *graph, const struct vkb_pass_row *pa
 static bool has_glare(const struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].block == VKB_BLOCK_streaks)
+        if (graph->passes[i].block == VKB_BLOCK_streaks
+            || graph->passes[i].block == VKB_BLOCK_flare)
             return true;
     return false;
 }

@@ -43,20 +43,6 @@ static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t f
     return row;
 }
 
-static struct vkb_pass_row further_row(const struct vkb_levels *levels, uint32_t from, uint32_t to)
-{
-    const struct vkb_values *values = &levels->settings->values;
-    struct vkb_pass_row row = vkb_down_row(levels, false, from, to);
-
-    if (values->scale_x != 1.0 || values->scale_y != 1.0) {
-        // With these sizes the taps are not in the middle between texels.
-        row.constants.sampling = SAMPLING_FETCH;
-        row.params.pyramid.step_x = (float)values->scale_x;
-        row.params.pyramid.step_y = (float)values->scale_y;
-    }
-    return row;
-}
-
 bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
@@ -71,7 +57,8 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
                               error))
             return false;
         const struct vkb_pass_row row =
-            level ? further_row(&levels, from, levels.downs[level]) : first_row(&levels, from);
+            level ? vkb_scaled_down_row(&levels, false, from, levels.downs[level])
+                  : first_row(&levels, from);
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

@@ -9,6 +9,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 // A stage that is being added.
 struct stage {
@@ -18,11 +19,12 @@ struct stage {
     uint32_t from;
 };
 
-static bool vkb_add_streaks(const struct stage *, uint32_t *, struct vkb_error *);
+typedef bool add_stage(const struct stage *stage, uint32_t *image, struct vkb_error *error);
+static add_stage vkb_add_streaks, vkb_add_ghosts, vkb_add_halo;
 
 static const struct {
     const char *name;
-    bool (*add)(const struct stage *stage, uint32_t *image, struct vkb_error *error);
+    add_stage *add;
 } kinds[VKB_STAGE_COUNT] = {
 #define STAGE_ROW(constant, name) [VKB_STAGE_##constant] = {#name, vkb_add_##name},
     VKB_STAGES(STAGE_ROW)
@@ -120,6 +122,42 @@ static bool vkb_add_streaks(const struct stage *stage, uint32_t *image, struct v
         }
     }
     return true;
+}
+
+// A stage of one pass with the block of ghosts and halo.
+static bool add_flare(const struct stage *stage, enum vkb_shader fragment, uint32_t *image,
+                      struct vkb_error *error)
+{
+    const struct vkb_glare_values *values = &stage->settings->values;
+
+    if (!vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
+                          error))
+        return false;
+    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, fragment, stage->from, *image);
+    row.block = VKB_BLOCK_flare;
+    row.params.flare = (struct vkb_flare_params){
+        .threshold = values->threshold,
+        .limit = vkb_formats[stage->levels.source->format].limit,
+        .maximum = values->maximum,
+        .aberration = values->aberration,
+        .radius = values->radius,
+        .falloff = values->falloff,
+        .vignette = values->vignette,
+        .width = values->width,
+        .count = (int)stage->settings->ghost_count,
+    };
+    memcpy(row.params.flare.ghosts, stage->settings->ghosts, sizeof row.params.flare.ghosts);
+    return vkb_graph_add_pass(stage->levels.graph, &row, error);
+}
+
+static bool vkb_add_ghosts(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    return add_flare(stage, VKB_SHADER_ghosts_frag, image, error);
+}
+
+static bool vkb_add_halo(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    return add_flare(stage, VKB_SHADER_halo_frag, image, error);
 }
 
 bool vkb_has_glare(const struct vkb_settings *settings)

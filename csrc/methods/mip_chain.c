@@ -12,7 +12,7 @@ static bool add_down(struct vkb_levels *levels, uint32_t level, struct vkb_error
         return false;
     const bool firefly_filter = levels->settings->values.firefly_filter && level == 0;
     const struct vkb_pass_row row =
-        vkb_down_row(levels, firefly_filter, from, levels->downs[level]);
+        vkb_scaled_down_row(levels, firefly_filter, from, levels->downs[level]);
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
@@ -26,7 +26,8 @@ bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom
     for (uint32_t level = 0; level < levels.count; ++level)
         if (!add_down(&levels, level, error))
             return false;
-    combination.radius_x = combination.radius_y = settings->values.radius;
+    combination.radius_x = settings->values.radius * settings->values.scale_x;
+    combination.radius_y = settings->values.radius * settings->values.scale_y;
     combination.gain = 1.0 / levels.count;
     if (settings->level_weight_count) {
         for (uint32_t level = 0; level < levels.count; ++level)

@@ -65,9 +65,14 @@ static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode directi
                           uint32_t from, uint32_t to, struct vkb_error *error)
 {
     struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_hdrp_blur_frag, from, to);
+    const struct vkb_image_row *source = &levels->graph->images[from];
+    const struct vkb_image_row *target = &levels->graph->images[to];
 
     row.constants.direction = direction;
     row.constants.first = first;
+    if (direction == DIRECTION_HORIZONTAL ? source->width == 2 * target->width
+                                          : source->height == 2 * target->height)
+        row.constants.sampling = SAMPLING_TEXEL;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

@@ -126,8 +126,12 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     row.reading = VKB_READING_LOADED;
     row.variant = "dispatch";
     row.block_width = row.block_height = 1;
-    row.groups_width = groups(horizontal ? count : stage->lines, FFT_COLUMNS);
-    row.groups_height = groups(horizontal ? stage->lines : count, FFT_ROWS);
+    row.constants.group_width = horizontal ? FFT_ROW_COLUMNS : FFT_INVOCATIONS;
+    row.constants.group_height = FFT_INVOCATIONS / row.constants.group_width;
+    row.groups_width =
+        groups(horizontal ? count : stage->lines, (uint32_t)row.constants.group_width);
+    row.groups_height =
+        groups(horizontal ? stage->lines : count, (uint32_t)row.constants.group_height);
     // Every binding of the shader must be filled, also one that this pass does not read.
     row.reads[0] = row.reads[1] = stage->from;
     row.read_count = 2;
@@ -157,6 +161,7 @@ void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis
                       uint32_t spectrum, bool grey, struct vkb_pass_row *row)
 {
     const uint32_t *row_radices = rows->line.radices;
+    const uint32_t last = row_radices[rows->line.stage_count - 1];
     uint32_t blocks[VKB_FFT_STAGES];
 
     memcpy(blocks, columns->line.radices, sizeof blocks);
@@ -168,7 +173,14 @@ void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis
     row->params.fft.row_b = (int)row_radices[1];
     row->params.fft.row_c = (int)row_radices[2];
     row->params.fft.row_d = (int)row_radices[3];
+    row->params.fft.row_last = (int)last;
     row->params.fft.block_a = (int)blocks[0];
     row->params.fft.block_b = (int)blocks[1];
     row->params.fft.block_c = (int)blocks[2];
+    if (grey)
+        return;
+    // Columns with frequencies of up to half the rows' length, which have the others in hand.
+    row->params.fft.across = (int)(rows->line.length / last * (last / 2 + 1));
+    row->groups_width =
+        groups((uint32_t)row->params.fft.across, (uint32_t)row->constants.group_width);
 }

@@ -117,6 +117,21 @@ struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_f
     return row;
 }
 
+struct vkb_pass_row vkb_scaled_down_row(const struct vkb_levels *levels, bool firefly_filter,
+                                        uint32_t from, uint32_t to)
+{
+    const struct vkb_values *values = &levels->settings->values;
+    struct vkb_pass_row row = vkb_down_row(levels, firefly_filter, from, to);
+
+    if (values->scale_x != 1.0 || values->scale_y != 1.0) {
+        // With these sizes the taps are not in the middle between texels.
+        row.constants.sampling = SAMPLING_FETCH;
+        row.params.pyramid.step_x = (float)values->scale_x;
+        row.params.pyramid.step_y = (float)values->scale_y;
+    }
+    return row;
+}
+
 bool vkb_halves(const struct vkb_pass_row *pass)
 {
     return pass->shader == VKB_SHADER_pyramid_down_frag

@@ -63,6 +63,10 @@ void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *ro
 struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
                                  uint32_t from, uint32_t to);
 
+// The same with the settings' scale of the taps' distances.
+struct vkb_pass_row vkb_scaled_down_row(const struct vkb_levels *levels, bool firefly_filter,
+                                        uint32_t from, uint32_t to);
+
 // Whether a row is such a downsampling from exactly twice the size, or an upsampling to exactly
 // twice the size. Then its taps are on integer texels. (Not with a firefly filter, which weights
 // groups of taps.)

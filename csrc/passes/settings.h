@@ -47,7 +47,10 @@ struct vkb_kernel_data {
 
 // Every stage of glare: STAGE(name in C, name in Python, of its framebuffer and of its vkb_add_
 // function).
-#define VKB_STAGES(STAGE) STAGE(STREAKS, streaks)
+#define VKB_STAGES(STAGE) \
+    STAGE(STREAKS, streaks) \
+    STAGE(GHOSTS, ghosts) \
+    STAGE(HALO, halo)
 
 enum vkb_stage_kind {
 #define VKB_STAGE_ENUM(constant, name) VKB_STAGE_##constant,
@@ -59,6 +62,8 @@ enum vkb_stage_kind {
 struct vkb_stage {
     enum vkb_stage_kind kind;
     struct vkb_glare_values values;  // at the offsets of vkb_glare_rows
+    float ghosts[MOST_GHOSTS][4];    // tint and scale of each
+    uint32_t ghost_count;
 };
 
 struct vkb_settings {

@@ -39,12 +39,56 @@ static bool read_kind(PyObject *object, enum vkb_stage_kind *kind)
     return false;
 }
 
+static bool is_within(float number, double limit)
+{
+    return number >= -limit && number <= limit;
+}
+
+// A ghost: (scale, (red, green, blue)).
+static bool read_ghost(PyObject *tuple, float ghost[4])
+{
+    if (!vkb_require_tuple(tuple, "ghosts")
+        || !PyArg_ParseTuple(tuple, "f(fff);ghosts must hold (scale, (red, green, blue))",
+                             &ghost[3], &ghost[0], &ghost[1], &ghost[2]))
+        return false;
+    for (int i = 0; i < 4; ++i)
+        if (!is_within(ghost[i], i == 3 ? GHOST_LIMIT : HALF_LIMIT))
+            return vkb_out_of_range("ghosts", tuple, -GHOST_LIMIT, GHOST_LIMIT);
+    return true;
+}
+
+static bool read_ghost_tuple(PyObject *tuple, struct vkb_stage *stage)
+{
+    if (!vkb_require_tuple(tuple, "ghosts"))
+        return false;
+    const Py_ssize_t count = PyTuple_Size(tuple);
+    if (count > MOST_GHOSTS) {
+        PyErr_Format(PyExc_ValueError, "ghosts: %zd are out of range, 0 to %d", count, MOST_GHOSTS);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i)
+        if (!read_ghost(PyTuple_GetItem(tuple, i), stage->ghosts[i]))
+            return false;
+    stage->ghost_count = (uint32_t)count;
+    return true;
+}
+
+static bool read_ghosts(PyObject *object, struct vkb_stage *stage)
+{
+    PyObject *tuple = PyObject_GetAttrString(object, "ghosts");
+    const bool done = tuple && read_ghost_tuple(tuple, stage);
+
+    Py_XDECREF(tuple);
+    return done;
+}
+
 static bool read_stage(PyObject *object, struct vkb_stage *stage)
 {
     for (size_t i = 0; i < vkb_glare_row_count; ++i)
         if (!read_number(object, &vkb_glare_rows[i], &stage->values))
             return false;
-    return read_kind(object, &stage->kind);
+    return read_kind(object, &stage->kind)
+        && (stage->kind != VKB_STAGE_GHOSTS || read_ghosts(object, stage));
 }
 
 static bool read_stages(PyObject *tuple, struct vkb_settings *settings)

@@ -393,6 +393,20 @@ static PyObject *shares_images(PyObject *object, PyObject *other)
                                                  &((struct vkb_plan_object *)other)->plan.graph));
 }
 
+static PyObject *is_of_image(PyObject *object, PyObject *other)
+{
+    const struct vkb_plan_object *self = (const struct vkb_plan_object *)object;
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+
+    if ((PyObject *)Py_TYPE(other) != state->source_type) {
+        PyErr_Format(PyExc_TypeError, "is_of_image: a Source is needed, not %R", other);
+        return NULL;
+    }
+    const struct vkb_source *source = &((struct vkb_source_object *)other)->source;
+    return PyBool_FromLong(source->kind == VKB_SOURCE_IMAGE
+                           && vkb_source_fits(&self->source, source));
+}
+
 // The names that the passes are timed under, without those that come again.
 static PyObject *names_of(const struct vkb_graph *graph, const bool *ran)
 {
@@ -475,6 +489,9 @@ static PyMethodDef methods[] = {
     {"shares_images", shares_images, METH_O,
      "shares_images(plan) -> bool. Whether both have the same images, so that they can be run "
      "together."},
+    {"is_of_image", is_of_image, METH_O,
+     "is_of_image(source) -> bool. Whether the source is an image of which this is the plan, with "
+     "the same settings. (The plan of a scene depends on its camera.)"},
     {0},
 };
 

@@ -116,8 +116,8 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     row.constants.radix_2 = (int32_t)group.radices[1];
     row.constants.radix_3 = (int32_t)group.radices[2];
     row.constants.radix_4 = (int32_t)group.radices[3];
-    row.constants.group_lines = (int32_t)group.lines;
-    row.constants.group_size = (int32_t)group.size;
+    row.constants.group_width = (int32_t)group.lines;
+    row.constants.group_height = (int32_t)group.size;
     row.constants.exchanged = (int32_t)group.exchanged;
     row.groups_width = ((uint32_t)row.params.fft.across + group.lines - 1) / group.lines;
     row.groups_height = 1;

@@ -13,12 +13,37 @@ static void yield(void)
 
 #else
 
+#include <pthread.h>
 #include <sched.h>
+#include <stdbool.h>
 #include <unistd.h>
 
+static atomic_long current;  // 0: not known
+static bool forgets;         // whether a fork's child forgets it
+
+static void forget(void)
+{
+    atomic_store(&current, 0);
+}
+
+static void forget_in_children(void)
+{
+    forgets = pthread_atfork(NULL, NULL, forget) == 0;
+}
+
+// Kept, since getpid() is a system call, and each call of a renderer asks several times.
 long vkb_current_process(void)
 {
-    return (long)getpid();
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    long process = atomic_load(&current);
+
+    if (process != 0)
+        return process;
+    pthread_once(&once, forget_in_children);
+    process = (long)getpid();
+    if (forgets)
+        atomic_store(&current, process);
+    return process;
 }
 
 static void yield(void)

@@ -37,7 +37,9 @@ static bool create_headless(const struct vkb_device *device, VkSurfaceKHR *surfa
 {
     const struct vkb_instance *instance = device->instance;
 
-    if (!instance->vk.vkCreateHeadlessSurfaceEXT)
+    // The loader offers the extension if any installed driver has it. It gives the others a surface
+    // that they do not know, with which NVIDIA's driver 580 ends the process.
+    if (!instance->vk.vkCreateHeadlessSurfaceEXT || !strstr(device->adapter.driver_info, "Mesa"))
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "a surface without a window needs VK_EXT_headless_surface, which the "
                         "driver of %s lacks; Mesa's lavapipe 25 has it",

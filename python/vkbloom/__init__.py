@@ -32,7 +32,7 @@ from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.convolution import Convolution
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
-from vkbloom.glare import Glare, Streaks
+from vkbloom.glare import Ghosts, Glare, Halo, Streaks
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
 from vkbloom.image import Image
 from vkbloom.plans import Pass, Plan
@@ -94,9 +94,11 @@ __all__ = [
     "FilamentBloom",
     "FitResult",
     "Frames",
+    "Ghosts",
     "Glare",
     "GodotBloom",
     "GridReport",
+    "Halo",
     "HdrpBloom",
     "Image",
     "KinoBloom",

@@ -10,6 +10,7 @@ CHOICES: dict[str, tuple[str, ...]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
 MAX_STAGES: int
+MOST_GHOSTS: int
 
 AdapterTuple = tuple[str, str, str, str, str, bytes, bool]
 _Array = NDArray[Any]
@@ -132,6 +133,7 @@ class Plan:
     @property
     def size(self) -> int: ...
     def shares_images(self, other: Plan, /) -> bool: ...
+    def is_of_image(self, source: Source, /) -> bool: ...
 
 class Submission:
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, int]]: ...

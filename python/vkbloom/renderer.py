@@ -200,6 +200,7 @@ class Renderer:
         if self.info.bundled and (sha256 := bundled_hash()):
             self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
+        self._planned: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
 
     @property
     def closed(self) -> bool:
@@ -898,9 +899,21 @@ class Renderer:
         names: tuple[str, ...] | None,
         out: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
-        plan = self._core.plan(source, settings, names)
+        plan = self._plan_of(source, settings, names)
         arrays = _arrays_for(self._core, plan, out)
         return self._frames(settings, requests.run_one(self._core, source, plan, arrays))
+
+    def _plan_of(
+        self, source: _core.Source, settings: Settings, names: tuple[str, ...] | None
+    ) -> _core.Plan:
+        """Return a plan: the last one, if it is the same. In small images it takes most time."""
+        if (planned := self._planned) is not None:
+            last, last_names, plan = planned
+            if last is settings and last_names == names and plan.is_of_image(source):
+                return plan
+        plan = self._core.plan(source, settings, names)
+        self._planned = settings, names, plan
+        return plan
 
     def _run_many(
         self,

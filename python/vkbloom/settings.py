@@ -490,6 +490,9 @@ class Pyramid(Settings):
     level_weights : sequence of float or None
         As many finite numbers w_0, w_1, ... as `levels`; they may be negative. If the chain ends
         early, only the first ones are used. None: the mean of the levels.
+    scale_x, scale_y : float
+        Factors of the distances of all taps, 0 to 16. scale_x=4 stretches the bloom along x, as an
+        anamorphic lens does.
     **settings
         The fields of `Settings`.
 
@@ -531,6 +534,8 @@ class Pyramid(Settings):
     radius: float = number_field("radius", unit="texel")
     firefly_filter: bool = flag_field("firefly_filter")
     level_weights: tuple[float, ...] | None = None
+    scale_x: float = number_field("scale_x")
+    scale_y: float = number_field("scale_y")
 
     def __post_init__(self) -> None:
         super().__post_init__()

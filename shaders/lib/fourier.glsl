@@ -1,6 +1,9 @@
 // Discrete Fourier transforms of up to FFT_MOST_RADIX elements in named registers: of `held`, whose
 // elements are two complex numbers each. All loops are unrolled, so that no index is known only at run
 // time.
+#ifndef FFT_HELD
+#define FFT_HELD FFT_MOST_RADIX
+#endif
 
 vec2 conjugate(vec2 value)
 {
@@ -9,7 +12,7 @@ vec2 conjugate(vec2 value)
 
 vec2 product(vec2 a, vec2 b)
 {
-    return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x);
+    return vec2(fma(a.x, b.x, -a.y * b.y), fma(a.x, b.y, a.y * b.x));
 }
 
 vec4 rotated(vec4 value, vec2 angle)
@@ -98,7 +101,7 @@ void transform_8(inout vec4 v[8], bool inverse)
     }
 }
 
-vec4 held[FFT_MOST_RADIX];
+vec4 held[FFT_HELD];
 
 // Of `count` elements, `step` apart.
 void transform_few(int count, int first, int step, bool inverse)

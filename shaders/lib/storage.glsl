@@ -83,8 +83,9 @@ vec3 storable(vec3 value)
 #else
     if (STORED == STORED_UFLOAT)
         return nearest_ufloat(value);
+    // The device converts it back, so the error of one bit does not matter.
     if (STORED == STORED_UNORM8)
-        return from_level(nearest_level(value), STORED_UNORM8);
+        return nearest_level(value) * (1.0 / 255.0);
     return STORED == STORED_HALF ? nearest_half(value) : limited(value, params.limit);
 #endif
 }

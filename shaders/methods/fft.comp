@@ -20,7 +20,7 @@ UNIFORM_BLOCK(FFT_BLOCK);
 #include "variants/pixels.glsl"
 #include "lib/fourier.glsl"
 
-layout(local_size_x = FFT_COLUMNS, local_size_y = FFT_ROWS) in;
+layout(local_size_x_id = 34, local_size_y_id = 35) in;
 READ_IMAGE(1, source);
 READ_IMAGE(2, factor);
 #ifndef WORDS
@@ -165,20 +165,23 @@ vec4 channels(vec4 value, vec4 mirror, vec4 kernel, vec4 kernel_mirror)
 }
 
 // By a kernel with colours. The product at a frequency needs the spectra at the frequency of the other
-// sign, so that an invocation has the lines of both. The other invocation, which has the same two lines,
-// does nothing.
-void multiply_colours(int number, int across)
+// sign, so that an invocation has the lines of both. The dispatch has no invocations for most of those
+// lines; the rest of them do nothing.
+void multiply_colours(int number, int index)
 {
     ivec4 rows = ivec4(params.row_a, params.row_b, params.row_c, params.row_d);
     // The blocks before this last stage are places, too, in lines of their own length.
     ivec4 blocks =
         ivec4(params.block_a, params.block_b, params.block_c, 1);
+    int run = params.row_last / 2 + 1;
+    int across = index / run * params.row_last + index % run;
     int other_across = mirrored(across, rows, params.row_length);
     int other_number = mirrored(number, blocks, params.count);
+    int frequency = frequency_at(across, rows), other = (params.row_length - frequency) % params.row_length;
     bool own = number == 0;
     vec4 values[FFT_MOST_RADIX], others[FFT_MOST_RADIX];
 
-    if (across > other_across || (across == other_across && number > other_number))
+    if (frequency > other || (frequency == other && number > other_number))
         return;
     load_line(number * RADIX, across);
     transform_held(false);
@@ -186,24 +189,22 @@ void multiply_colours(int number, int across)
         values[i] = held[place_of(i)];
     load_line(other_number * RADIX, other_across);
     transform_held(false);
-    [[unroll]] for (int i = 0; i < RADIX; ++i)
-        others[i] = held[place_of(i)];
     // In the block of frequency 0 the sign turns within it.
     [[unroll]] for (int i = 0; i < RADIX; ++i) {
         int j = RADIX - 1 - i, own_j = (RADIX - i) % RADIX;
+        vec4 mirror = own ? held[place_of(own_j)] : held[place_of(j)];
         vec4 kernel = load_factor(texel_at(number * RADIX + i, across));
         vec4 kernel_mirror =
             load_factor(texel_at(other_number * RADIX + (own ? own_j : j), other_across));
-        held[i] = channels(values[i], own ? others[own_j] : others[j], kernel, kernel_mirror);
+        others[i] = channels(mirror, values[i], kernel_mirror, kernel);
+        values[i] = channels(values[i], mirror, kernel, kernel_mirror);
     }
+    [[unroll]] for (int i = 0; i < RADIX; ++i)
+        held[i] = values[i];
     transform_held(true);
     store_line(number * RADIX, across);
-    [[unroll]] for (int i = 0; i < RADIX; ++i) {
-        int j = RADIX - 1 - i, own_j = (RADIX - i) % RADIX;
-        vec4 kernel = load_factor(texel_at(other_number * RADIX + i, other_across));
-        vec4 kernel_mirror = load_factor(texel_at(number * RADIX + (own ? own_j : j), across));
-        held[i] = channels(others[i], own ? values[own_j] : values[j], kernel, kernel_mirror);
-    }
+    [[unroll]] for (int i = 0; i < RADIX; ++i)
+        held[i] = own ? others[(RADIX - i) % RADIX] : others[RADIX - 1 - i];
     transform_held(true);
     store_line(other_number * RADIX, other_across);
 }

@@ -16,14 +16,30 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
-// The position of a pixel of the target, or of one outside of its border.
+const ivec2 along = DIRECTION == DIRECTION_HORIZONTAL ? ivec2(1, 0) : ivec2(0, 1);
+
+// The position of a pixel of the target. SAMPLING_TEXEL: the source is twice as large along the
+// direction, which needs no division.
 Place place_of(ivec2 pixel, ivec2 size)
 {
-    if (FIRST != 0)
-        return Place(mix(pixel, pixel & 1, lessThan(pixel, ivec2(0))), vec2(0.0));
-    Place place = place_in(source, clamp(pixel, ivec2(0), size - 1), size);
+    if (SAMPLING == SAMPLING_TEXEL)
+        return Place(pixel * (1 + along), 0.5 * vec2(along));
+    return place_in(source, pixel, size);
+}
+
+// The source at a pixel of the target, or at one outside of its border.
+vec4 sample_pixel(ivec2 pixel, ivec2 size)
+{
     bvec2 before = lessThan(pixel, ivec2(0));
-    return Place(mix(place.texel, ivec2(0), before), mix(place.part, vec2(0.0), before));
+    if (FIRST != 0)
+        return fetch_clamped(source, mix(pixel, pixel & 1, before));
+    Place place = place_of(clamp(pixel, ivec2(0), size - 1), size);
+    place = Place(mix(place.texel, ivec2(0), before), mix(place.part, vec2(0.0), before));
+    if (SAMPLING == SAMPLING_FILTER)
+        return sample_at(source, place, vec2(0.0), SAMPLING);
+    // Across the direction, source and target have the same size.
+    return mix(fetch_clamped(source, place.texel), fetch_clamped(source, place.texel + along),
+               dot(place.part, vec2(along)));
 }
 
 vec4 shade()
@@ -31,11 +47,8 @@ vec4 shade()
     const float weights[9] = float[](0.00390625, 0.03125, 0.109375, 0.21875, 0.2734375, 0.21875,
                                      0.109375, 0.03125, 0.00390625);
     ivec2 size = ivec2(params.target_width, params.target_height);
-    ivec2 along = DIRECTION == DIRECTION_HORIZONTAL ? ivec2(1, 0) : ivec2(0, 1);
     vec4 sum = vec4(0.0);
-    for (int tap = 0; tap < 9; ++tap) {
-        Place place = place_of(PIXEL + (tap - 4) * along, size);
-        sum += weights[tap] * sample_at(source, place, vec2(0.0), SAMPLING);
-    }
+    for (int tap = 0; tap < 9; ++tap)
+        sum += weights[tap] * sample_pixel(PIXEL + (tap - 4) * along, size);
     return stored(sum);
 }

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// A Fourier transform of complete lines, in shared memory: each workgroup has GROUP_LINES lines, and
+// A Fourier transform of complete lines, in shared memory: each workgroup has GROUP_WIDTH lines, and
 // each of its invocations the elements of one butterfly. Frequencies end in their natural order.
 //
 // A line of pixels holds four real channels as two complex numbers: i times green is added to red, i
@@ -17,6 +17,7 @@
 
 UNIFORM_BLOCK(FFT_BLOCK);
 #include "lib/storage.glsl"
+#define FFT_HELD FFT_MOST_GROUP_RADIX
 #include "lib/fourier.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
@@ -33,7 +34,7 @@ const bool IS_ROW = DIRECTION == DIRECTION_HORIZONTAL;
 const bool MULTIPLIES = STAGE == STAGE_GREY || STAGE == STAGE_COLOURS;
 
 // Invocations without a butterfly read beyond the line.
-shared float exchanged[GROUP_LINES * EXCHANGED * PITCH + GROUP_SIZE + 1];
+shared float exchanged[GROUP_WIDTH * EXCHANGED * PITCH + GROUP_HEIGHT + 1];
 
 // A radix is the product of two that transform_held has.
 int first_factor(int radix)
@@ -72,14 +73,14 @@ int slot(int component, int place)
 // Those without one do all but store: a condition about many values costs more than it saves.
 bool has_butterfly(int radix)
 {
-    return GROUP_SIZE * radix == LENGTH || number < LENGTH / radix;
+    return GROUP_HEIGHT * radix == LENGTH || number < LENGTH / radix;
 }
 
 // The place of element i before a butterfly, and of result i after the last one.
 int place_at(int i, int radix)
 {
     int place = number + i * (LENGTH / radix);
-    return GROUP_SIZE * radix == LENGTH ? place : min(place, LENGTH - 1);
+    return GROUP_HEIGHT * radix == LENGTH ? place : min(place, LENGTH - 1);
 }
 
 // Results of a butterfly are `before` elements apart.
@@ -261,7 +262,7 @@ void multiply(int radix)
 
 void main()
 {
-    across = int(gl_WorkGroupID.x) * GROUP_LINES + int(gl_LocalInvocationID.x);
+    across = int(gl_WorkGroupID.x) * GROUP_WIDTH + int(gl_LocalInvocationID.x);
     number = int(gl_LocalInvocationID.y);
     load_line(INVERSE != 0 ? LAST_RADIX : RADIX_1);
     if (INVERSE == 0)

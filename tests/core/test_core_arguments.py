@@ -71,6 +71,21 @@ def stage_with(**fields: Any) -> object:
         ({"glare": (stage_with(stage="rain"),)}, "glare: there is no stage 'rain'"),
         ({"glare": (stage_with(stage=5),)}, "glare: there is no stage 5"),
         ({"glare": (stage_with(fade="1"),)}, "real number"),
+        ({"glare": (stage_with(stage="ghosts"),)}, "no attribute 'ghosts'"),
+        ({"glare": (stage_with(stage="ghosts", ghosts=5),)}, "ghosts: a tuple is needed"),
+        ({"glare": (stage_with(stage="ghosts", ghosts=(1,)),)}, "ghosts: a tuple is needed"),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((17.0, (1, 1, 1)),)),)},
+            r"ghosts: .* is out of range, -16.0 to 16.0",
+        ),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((1.0, (1, float("nan"), 1)),)),)},
+            "ghosts: .* is out of range",
+        ),
+        (
+            {"glare": (stage_with(stage="ghosts", ghosts=((1.0, (1, 1, 1)),) * 17),)},
+            "ghosts: 17 are out of range, 0 to 16",
+        ),
         ({"glare": (stage_with(),) * 6}, "glare: 6 stages are out of range, 0 to 5"),
     ],
 )
@@ -284,6 +299,18 @@ def test_plans_with_other_images(renderer: Renderer) -> None:
         renderer._core.run(source, plans, arrays_for(*plans))
     with pytest.raises(TypeError, match="a Plan is needed"):
         plans[0].shares_images(source)  # type: ignore[arg-type]
+
+
+def test_plans_of_an_image(renderer: Renderer, scene: Scene) -> None:
+    source, (plan,) = planned(renderer, Separable())
+    assert plan.is_of_image(source)
+    assert not plan.is_of_image(_core.image_source(np.zeros((4, 5, 3), np.uint8)))
+    # The camera is part of a scene's plan.
+    of_scene = _core.scene_source(*scene_arguments(scene, (4, 4), "forward", 0.0))
+    plan = renderer._core.plan(of_scene, Separable(), None)
+    assert not plan.is_of_image(of_scene)
+    with pytest.raises(TypeError, match="a Source is needed"):
+        plan.is_of_image(plan)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("names", [["final"], "final", 5], ids=str)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tests.framebuffers import assert_same
 from tests.images import picture
-from vkbloom import Pyramid, Renderer, Separable, _core, requests
+from vkbloom import AdapterInfo, Pyramid, Renderer, Separable, _core, requests
 
 #: Changes of size, dtype and channels, and sizes above 1 MiB, which are copied in another way.
 IMAGES: list[tuple[int, int, int, str]] = [
@@ -251,7 +251,11 @@ def test_an_image_in_use_is_not_taken_over(renderer: Renderer) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_the_memory_of_a_handle_goes_with_it(new_renderer: Callable[[], Renderer]) -> None:
+def test_the_memory_of_a_handle_goes_with_it(
+    monkeypatch: pytest.MonkeyPatch, software: AdapterInfo, new_renderer: Callable[[], Renderer]
+) -> None:
+    # Only a software adapter has its images in the memory of the process.
+    monkeypatch.setenv("VKBLOOM_ADAPTER", software.name)
     renderer = new_renderer()
     image = np.full((2048, 2048, 4), 0.5, np.float32)
     settings = Separable(bloom=False)

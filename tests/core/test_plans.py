@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,34 @@ def assert_planned(plan: Plan, frames: Any) -> None:
         assert set(one.reads) <= made
         made |= set(one.writes)
     assert set(plan.outputs) <= made
+
+
+def test_the_last_plan_is_used_again_only_for_the_same_call() -> None:
+    """Calls that differ from the one before in one thing return what a new renderer returns."""
+    image, mask = picture(16, 12, 4, dtype="float32"), picture(16, 12, 4, dtype="float32")[..., 0]
+    scene = Scene.ufo()
+    first, second = (Pyramid(levels=2, threshold=threshold) for threshold in (0.1, 0.9))
+    calls: list[Callable[[Renderer], Mapping[str, Any]]] = [
+        lambda renderer: renderer.apply(image, first),
+        lambda renderer: renderer.apply(image[::-1], first),
+        lambda renderer: renderer.apply(image, second),
+        lambda renderer: renderer.apply(image[:8], second),
+        lambda renderer: renderer.apply(image[:8, :, :3], second),
+        lambda renderer: renderer.apply(image[:8, :, :3].astype(np.float16), second),
+        lambda renderer: renderer.apply(image, second, mask=mask),
+        lambda renderer: renderer.apply(image, second, mask=mask, emission=image),
+        lambda renderer: renderer.apply(image, second, attachments="bloom"),
+        lambda renderer: renderer.render(scene, second, (16, 12), attachments="bloom"),
+        lambda renderer: renderer.render(scene, second, (16, 12), time=0.3, attachments="bloom"),
+    ]
+    with Renderer() as renderer:
+        for call in calls:
+            frames = call(renderer)
+            with Renderer() as other:
+                alone = call(other)
+            assert list(frames) == list(alone)
+            for name, array in alone.items():
+                assert np.array_equal(frames[name], array)
 
 
 @pytest.mark.parametrize("attachments", ["all", ("final",)], ids=["all", "final"])

@@ -312,6 +312,8 @@ class TestViewer:
         assert (facts["framebuffer"], facts["size"], facts["dtype"]) == ("final", [80, 45], "uint8")
         assert facts["code"] == "vkbloom.Separable(blur_scale=1.5)"
         assert set(facts["passes"]) <= {"glow", "blur_vertical", "bloom", "scene", "final"}
+        plan = renderer.plan(scene, settings, (80, 45), attachments="final")
+        assert facts["plan"] == [json.loads(json.dumps(one._asdict())) for one in plan.passes]
         assert viewer.settings["a"] == settings
         assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
         # Without a size, the scene's own.

@@ -213,6 +213,32 @@ def test_every_framebuffer(page: Page, renderer: Renderer, scene: Scene, tmp_pat
     assert "down_3" in picker.locator("option").all_inner_texts()
 
 
+def test_the_plan_has_the_times_of_its_passes(
+    page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
+) -> None:
+    page.get_by_text("Plan", exact=True).click()
+    plan = renderer.plan(scene, None, size_of(see(page, tmp_path)), attachments="final")
+    rows = page.locator(".vkb-plan tbody tr")
+
+    def times() -> dict[str, str]:
+        found = zip(
+            rows.locator("th").all_inner_texts(), rows.locator("th + td").all(), strict=True
+        )
+        return {name: cell.inner_text() for name, cell in found}
+
+    for row, one in zip(rows.all(), plan.passes, strict=True):
+        reads, writes = ", ".join(one.reads), ", ".join(one.writes)
+        cells = row.locator("td").all_inner_texts()
+        assert cells[-4:] == [one.shader, one.variant, reads, writes]
+    # Skybox and saucer are one render pass with one time.
+    assert list(times()) == list(dict.fromkeys(one.name for one in plan.passes))
+    assert len(plan.passes) > len(times())
+    field(page, "intensity").fill("1.5")
+    wait_for_code(page, "vkbloom.Separable(intensity=1.5)")
+    assert times()["final"].endswith(" ms")
+    assert times()["scene"] == "up to date"
+
+
 def test_the_pointer_reads_values(
     page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
 ) -> None:
@@ -485,6 +511,7 @@ def test_no_rule_of_accessibility_is_broken(browser: Browser, scene_url: str, th
     with opened(browser, scene_url, color_scheme=theme) as page:
         page.get_by_label("wipe A | B").check()
         page.get_by_text("More").click()
+        page.get_by_text("Plan", exact=True).click()
         for width in (980, 390):
             page.set_viewport_size({"width": width, "height": 844})
             page.wait_for_timeout(300)

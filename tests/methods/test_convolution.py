@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, cast
 from unittest.mock import patch
 
@@ -11,7 +11,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom import Convolution, OutOfMemoryError, Renderer, Scene, Settings, psf, reference
+from vkbloom import (
+    AdapterInfo,
+    Convolution,
+    OutOfMemoryError,
+    Renderer,
+    Scene,
+    Settings,
+    psf,
+    reference,
+)
 from vkbloom.reference.convolution import convolve, prefiltered
 
 BOUNDARIES = ("zero", "edge", "wrap", "wrap_x")
@@ -270,8 +279,16 @@ def test_a_kernel_without_a_sum(renderer: Renderer) -> None:
     assert_close(renderer, image_of(4, 4), settings.replace(normalize=False))
 
 
-def test_too_large(renderer: Renderer, scene: Scene) -> None:
+def test_too_large(
+    monkeypatch: pytest.MonkeyPatch,
+    software: AdapterInfo,
+    new_renderer: Callable[[], Renderer],
+    scene: Scene,
+) -> None:
     """An error of the plan, with the memory that is needed, before any work."""
+    # GPUs may have the memory that lavapipe refuses.
+    monkeypatch.setenv("VKBLOOM_ADAPTER", software.name)
+    renderer = new_renderer()
     size = (8000, 8000)
     # Three images of 8192 x 8192 or less, 16 bytes a texel.
     with pytest.raises(OutOfMemoryError, match=r"[34]\d{3} MiB of images are needed"):

@@ -14,8 +14,10 @@ from tests.tolerance import assert_close, tolerance
 from vkbloom import (
     BevyBloom,
     FilamentBloom,
+    Ghosts,
     Glare,
     GodotBloom,
+    Halo,
     Pyramid,
     Renderer,
     Scene,
@@ -27,6 +29,7 @@ from vkbloom import (
 
 Image = NDArray[Any]
 
+TINTS = ((1.0, 0.5, 0.25), (0.0, 1.0, 0.0), (2.0, 0.0, 1.0))
 SHORT = Streaks(directions=3, angle=20, fade=0.8, base=3, iterations=2)
 
 
@@ -68,6 +71,38 @@ CASES: dict[str, Case] = {
             alpha="blur",
         )
     ),
+    "ghosts": Case(
+        Pyramid(
+            glare=(
+                Ghosts(scales=(-1, 2.5, 0.4), tints=TINTS, threshold=0.2, maximum=2, halvings=0),
+            )
+        )
+    ),
+    "ghosts-uint8": Case(
+        Separable(glare=(Ghosts(aberration=0.02, falloff=25, radius=1, halvings=1),)), "uint8"
+    ),
+    "ghosts-float16": Case(
+        Separable(glare=(Ghosts(falloff=0, vignette=0.7),), bloom_scale=0.5), "float16", (75, 32)
+    ),
+    "ghosts-alpha": Case(
+        Pyramid(glare=(Ghosts(tints=TINTS, scales=(-2, 0, 1), threshold=0.1),), alpha="blur")
+    ),
+    "halo": Case(Pyramid(glare=(Halo(halvings=0, threshold=0.3, maximum=1.5),)), given=("mask",)),
+    "halo-uint8": Case(
+        Separable(glare=(Halo(radius=0.2, width=0.5, aberration=0.01, halvings=1),)), "uint8"
+    ),
+    "halo-alpha": Case(Pyramid(glare=(Halo(halvings=0),), alpha="blur"), "float32", (16, 33)),
+    "all": Case(
+        BevyBloom(
+            glare=(SHORT, Ghosts(), Halo(), Ghosts(scales=(-1.5,), intensity=0.5)),
+            threshold=0.5,
+            max_mip_dimension=32,
+            format="rgba32float",
+        ),
+        given=("mask", "emission"),
+    ),
+    "pyramid-scale": Case(Pyramid(glare=(SHORT,), scale_x=3, scale_y=0.5, firefly_filter=True)),
+    "one-pixel-flare": Case(Separable(glare=(Ghosts(), Halo(radius=0.01))), size=(1, 1)),
     "one-pixel": Case(Separable(glare=(SHORT,)), size=(1, 1)),
     "bevy": Case(
         BevyBloom(
@@ -124,7 +159,8 @@ def test_variants(monkeypatch: pytest.MonkeyPatch, form: str) -> None:
     """What is final does not depend on the framebuffers, with all variants."""
     monkeypatch.setenv("VKBLOOM_FORM", form)
     image = hdr_picture(96, 64, 3, "float16")
-    for settings in (Separable(glare=(SHORT,)), Pyramid(glare=(SHORT,), levels=3)):
+    every = (SHORT, Ghosts(), Halo())
+    for settings in (Separable(glare=(SHORT,)), Pyramid(glare=every, levels=3)):
         with Renderer(validation=True) as own:
             alone = own.apply(image, settings, attachments="final")["final"]
         with Renderer(validation=True) as own:
@@ -135,7 +171,7 @@ def test_variants(monkeypatch: pytest.MonkeyPatch, form: str) -> None:
         assert_close("final", frames["final"], expected["final"], limit)
 
 
-@pytest.mark.parametrize("stage", [SHORT], ids=lambda stage: stage.stage)
+@pytest.mark.parametrize("stage", [SHORT, Ghosts(), Halo()], ids=lambda stage: stage.stage)
 def test_nan_and_infinity(renderer: Renderer, stage: Glare) -> None:
     """They count as 0 in the light, and stay in their pixels of the picture."""
     image = hdr_picture(33, 21, 3, "float32")
@@ -164,6 +200,28 @@ def test_energy_of_streaks(renderer: Renderer) -> None:
     first = 1000 * (1 - 0.8) / (1 - 0.8**27)
     corner = spread(renderer, streaks, 0, 0).sum()
     assert corner == pytest.approx(500 + 2 * first / 4, rel=1e-5)
+
+
+def test_energy_of_ghosts(renderer: Renderer) -> None:
+    """A ghost has the light of its tint over the square of its scale, if it is in the picture."""
+    tints = ((1.0, 0.0, 0.0), (0.5, 0.0, 0.0))
+    ghosts = Ghosts(scales=(-0.5, 0.25), tints=tints, falloff=0, halvings=0)
+    assert spread(renderer, ghosts, 32, 32).sum() == pytest.approx(1000 * (4 + 8), rel=1e-4)
+    # From a corner, the ghosts lie outside, but for one of the picture's own size.
+    mirrored = spread(renderer, Ghosts(scales=(-1.0,), falloff=0, halvings=0), 0, 0)
+    assert mirrored[64, 64] == mirrored.sum() == 1000
+    assert spread(renderer, ghosts, 0, 0).sum() == 0
+    # A falloff leaves nothing of the corner.
+    assert spread(renderer, Ghosts(radius=0.6, halvings=0), 0, 0).sum() == 0
+
+
+def test_energy_of_the_halo(renderer: Renderer) -> None:
+    """A point in the centre becomes a ring of the halo's radius; one in a corner gives nothing."""
+    ring = spread(renderer, Halo(radius=0.25, width=0.05, halvings=0), 32, 32)
+    y, x = np.nonzero(ring > 1)
+    assert np.abs(np.hypot(x - 32, y - 32) / 65 - 0.25).max() < 0.05
+    assert len(x) > 60
+    assert spread(renderer, Halo(radius=0.25, width=0.05, halvings=0), 0, 0).sum() == 0
 
 
 def test_directions_of_streaks(renderer: Renderer) -> None:
@@ -215,8 +273,10 @@ def test_without_bloom_there_is_no_glare(renderer: Renderer) -> None:
 
 
 def test_settings() -> None:
+    settings = Pyramid(glare=(SHORT, Ghosts(tints=TINTS[:1]), Halo()))
+    assert settings.glare[0] == SHORT
+    assert Ghosts.from_dict(settings.glare[1].to_dict()) == settings.glare[1]
     settings = Pyramid(glare=(SHORT,))
-    assert settings.glare == (SHORT,)
     assert settings == Pyramid(glare=cast("Any", [SHORT]))
     assert hash(settings) == hash(Pyramid(glare=cast("Any", SHORT.to_dict())))
     assert settings != Pyramid()
@@ -252,6 +312,7 @@ def test_wrong_values(make: Callable[[], object], message: str) -> None:
     ("make", "message"),
     [
         (Glare, "Glare is abstract"),
+        (lambda: Ghosts(tints=cast("Any", (1.0,))), "tints: .* is not a sequence"),
         (lambda: Pyramid(glare=cast("Any", "streaks")), "'streaks' is not a sequence of stages"),
         (lambda: Pyramid(glare=cast("Any", [1])), "1 is not a stage"),
     ],

@@ -169,7 +169,14 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   const readout = make("output", { className: "vkb-readout" });
   const bar = make("div", { className: "vkb-bar" });
   const status = make("div", { className: "vkb-status" });
-  const below = make("div", { className: "vkb-below" }, readout, bar, status);
+  const passes = make("table");
+  const plan = make(
+    "details",
+    { className: "vkb-plan", on: { toggle: () => showPlan() } },
+    make("summary", { textContent: "Plan" }),
+    make("div", { tabIndex: 0, role: "region", ariaLabel: "plan" }, passes),
+  );
+  const below = make("div", { className: "vkb-below" }, readout, bar, status, plan);
   const head = make("div", { className: "vkb-head" });
   const fields = make("div", { className: "vkb-fields" });
   const complaint = make("div", { className: "vkb-error", role: "alert" });
@@ -438,6 +445,31 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     complaint.textContent = errors[editing] ?? "";
     code.textContent = shown[editing]?.code ?? "";
     showReadout();
+    showPlan();
+  }
+
+  // The passes of the settings that are edited, each with its time. Passes with the same name have
+  // one time together.
+  function showPlan() {
+    if (!plan.open || !shown[editing]) return;
+    const rows = shown[editing].plan;
+    const head = ["pass", "time", "shader", "variant", "reads", "writes"];
+    const cell = (tag, textContent, more = {}) => make(tag, { textContent, ...more });
+    passes.replaceChildren(
+      make("thead", {}, make("tr", {}, ...head.map((text) => cell("th", text, { scope: "col" })))),
+      make("tbody", {}, ...rows.map((row, place) => {
+        const texts = [row.shader, row.variant, row.reads.join(", "), row.writes.join(", ")];
+        const cells = texts.map((text) => cell("td", text));
+        if (rows[place - 1]?.name !== row.name) {
+          const others = rows.slice(place).findIndex(({ name }) => name !== row.name);
+          const rowSpan = others < 0 ? rows.length - place : others;
+          const seconds = shown[editing].passes[row.name];
+          const time = seconds === undefined ? "up to date" : `${(1e3 * seconds).toFixed(2)} ms`;
+          cells.unshift(cell("th", row.name, { scope: "rowgroup", rowSpan }), cell("td", time, { rowSpan }));
+        }
+        return make("tr", {}, ...cells);
+      })),
+    );
   }
 
   function showReadout() {
@@ -862,6 +894,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     buildFields();
     complaint.textContent = errors[side] ?? "";
     code.textContent = shown[side]?.code ?? "";
+    showPlan();
   }
 
   function buildFields({ keepPreset = false } = {}) {

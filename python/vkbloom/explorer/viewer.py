@@ -8,8 +8,10 @@ kind     asked                                         answered
 ======== ============================================= =========================================
 setup                                                  controls, both sides' settings, source
 frame    sides: settings of "a", "b" or both;          of each side: a picture (a buffer), the
-         framebuffer, size, time, stops; at; of a      framebuffer's facts, settings as code, the
-         scene shading, glow                           values under the pointer; or an error
+         framebuffer, size, time, stops; at; of a      framebuffer's facts, the plan's passes and
+         scene shading, glow                           the times of those that ran, settings as
+                                                       code, the values under the pointer; or an
+                                                       error
 probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
 open     name; the content of a file as a buffer;      source, and the settings to begin with
          as: "image", "mask" or "emission"; without a
@@ -38,9 +40,11 @@ from vkbloom.checks import check_emission, check_image, check_mask, check_number
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.io.glows import alike, grey_mask
+from vkbloom.plans import Pass
 from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
 from vkbloom.settings import SHADINGS, check_settings, check_shading
+from vkbloom.sources import image_source, scene_source
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
@@ -247,7 +251,7 @@ class Viewer:
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
         stops = check_number("stops", message.get("stops", 0.0), -32, 32)
-        frames, _ = self._render(settings, self._own_size, message)
+        frames, *_ = self._render(settings, self._own_size, message)
         (name,) = frames
         is_encoded = settings.encoding != "none"
         picture = picture_of(frames[name], name, is_encoded=is_encoded, stops=stops)
@@ -271,7 +275,7 @@ class Viewer:
                 continue
             try:
                 settings = settings_from(asked[side])
-                frames, names = self._render(settings, size, message)
+                frames, names, plan = self._render(settings, size, message)
                 (shown,) = frames
                 picture = picture_of(
                     frames[shown],
@@ -291,6 +295,7 @@ class Viewer:
                 "size": [frames[shown].shape[1], frames[shown].shape[0]],
                 "dtype": str(frames[shown].dtype),
                 "code": as_code(settings),
+                "plan": [one._asdict() for one in plan],
                 "passes": _finite(frames.timings),
                 "picture": len(buffers),
             }
@@ -317,8 +322,8 @@ class Viewer:
 
     def _render(
         self, settings: Settings, size: tuple[int, int], message: Mapping[str, Any]
-    ) -> tuple[Frames, list[str]]:
-        """Return the named framebuffer (`final` if there is none of this name), and all names."""
+    ) -> tuple[Frames, list[str], list[Pass]]:
+        """Return the named framebuffer, or `final`; the names of all; the planned passes."""
         name = message.get("framebuffer", "final")
         time, self._shading, glow = self._looked_at(message)
         if self._scene is None:
@@ -329,7 +334,9 @@ class Viewer:
                 given["mask"] = given["mask"][..., 0].clip(0, 1)
             names = list(self.renderer.plan(image, settings).outputs)
             chosen = str(name) if name in names else "final"
-            return self.renderer.apply(image, settings, attachments=[chosen], **given), names
+            frames = self.renderer.apply(image, settings, attachments=[chosen], **given)
+            source = image_source(image, **given)
+            return frames, names, self._passes(source, settings, chosen)
         if glow != self._scene.glow_intensity:
             self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
         plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
@@ -343,7 +350,13 @@ class Viewer:
             time=time,
             attachments=[chosen],
         )
-        return frames, names
+        source = scene_source(self._scene, size, self._shading, time)
+        return frames, names, self._passes(source, settings, chosen)
+
+    def _passes(self, source: _core.Source, settings: Settings, name: str) -> list[Pass]:
+        """Return the passes of a framebuffer; of an image with its mask and emission."""
+        plan = self.renderer._core.plan(source, settings, (name,))
+        return [Pass(*row[:-1]) for row in plan.passes]
 
     def _image_of(self, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
         """Return the image, and its mask and emission, at the size at which it is shown."""

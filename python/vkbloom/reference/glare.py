@@ -129,4 +129,70 @@ def _colours(tap: int, less: float, channels: int) -> Array:
     return factors
 
 
-_STAGES: dict[str, Callable[[Array, Any, Storage], Array]] = {"streaks": _streaks}
+def _places(image: Array) -> tuple[Array, Array]:
+    """Return the places of the pixels along x and y less the centre's, as shares of the sides."""
+    height, width, _ = image.shape
+    x, y = ((np.arange(side) + 0.5) / side - 0.5 for side in (width, height))
+    return np.meshgrid(x, y)
+
+
+def _read(image: Array, x: Array, y: Array) -> Array:
+    """Return the image at places, bilinearly, with 0 outside of it."""
+    height, width, _ = image.shape
+    total = np.zeros_like(image)
+    column, row = (x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5
+    left, top = np.floor(column), np.floor(row)
+    for rows, row_share in ((top, top + 1 - row), (top + 1, row - top)):
+        for columns, share in ((left, left + 1 - column), (left + 1, column - left)):
+            inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+            texels = image[
+                rows.clip(0, height - 1).astype(int), columns.clip(0, width - 1).astype(int)
+            ]
+            total += (row_share * share * inside)[..., np.newaxis] * texels
+    return total
+
+
+def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
+    """Return what a ghost or the halo sees at places: red and blue apart, above the threshold."""
+    length = np.hypot(x, y)
+    moved = stage.aberration / np.where(length > 0, length, np.inf)
+    light = _read(image, x, y)
+    light[..., 0] = _read(image, x - moved * x, y - moved * y)[..., 0]
+    light[..., 2] = _read(image, x + moved * x, y + moved * y)[..., 2]
+    above = _above(light, stage.threshold)
+    above[..., :3] = np.minimum(above[..., :3], stage.maximum)
+    return above
+
+
+def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
+    """Return the sum of the pictures read at 1/2 + s (p - 1/2)."""
+    x, y = _places(image)
+    total = np.zeros_like(image)
+    for scale, tint in stage.ghosts:
+        distance = np.abs(scale) * np.hypot(x, y)
+        weight = np.maximum(0, 1 - distance / stage.radius) ** stage.falloff
+        factors = np.append(tint, [np.mean(tint)] * (image.shape[2] - 3))
+        total += weight[..., np.newaxis] * factors * _seen(image, stage, scale * x, scale * y)
+    corner = np.minimum(((2 * x) ** 2 + (2 * y) ** 2) ** 2, 1)
+    total *= (1 + stage.vignette * (corner - 1))[..., np.newaxis]
+    return total
+
+
+def _halo(image: Array, stage: Any, store: Storage) -> Array:
+    """Return what lies `radius` further towards the centre, weighted by a ring of that radius."""
+    height, width, _ = image.shape
+    x, y = _places(image)
+    across, down = x * width / height, y
+    distance = np.hypot(across, down)
+    step = stage.radius / np.where(distance > 0, distance, np.inf)
+    light = _seen(image, stage, x - step * x, y - step * y)
+    part = np.minimum(np.abs(distance - stage.radius) / stage.width, 1)
+    light *= (1 - part * part * (3 - 2 * part))[..., np.newaxis]
+    return light
+
+
+_STAGES: dict[str, Callable[[Array, Any, Storage], Array]] = {
+    "streaks": _streaks,
+    "ghosts": _ghosts,
+    "halo": _halo,
+}

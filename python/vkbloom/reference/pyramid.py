@@ -38,7 +38,7 @@ def passes(
     The bloom is the sum of all levels, each enlarged through those above it by the tent, divided
     by their number N: up_N-1 = down_N-1, up_k = down_k + tent(up_k+1), and the bloom is
     tent(up_0) / N. With level weights, up_N-1 = w_N-1 down_N-1, up_k = w_k down_k + tent(up_k+1),
-    and the bloom is tent(up_0).
+    and the bloom is tent(up_0). The scale multiplies the distances of all taps.
 
     Raises
     ------
@@ -48,11 +48,12 @@ def passes(
     height, width, _ = glow.shape
     downs: list[Array] = []
     image = glow
+    scale = (settings.scale_x, settings.scale_y)
     for k, level in enumerate(level_sizes((width, height), settings.levels)):
-        image = store(downsample(image, level, settings.firefly_filter and k == 0))
+        image = store(downsample(image, level, settings.firefly_filter and k == 0, scale))
         downs.append(image)
     count, weights = len(downs), settings.level_weights
-    up = partial(tent, x_step=settings.radius, y_step=settings.radius)
+    up = partial(tent, x_step=settings.radius * scale[0], y_step=settings.radius * scale[1])
     shares = [1.0] * count if weights is None else [float(w) for w in weights[:count]]
     return combine(
         downs,
