@@ -36,28 +36,7 @@ static uint32_t common_divisor(uint32_t a, uint32_t b)
     return a;
 }
 
-// How many rows of the images that it reads a pass may need beyond those at its target's place: its
-// taps, and what is between them.
-static double own_reach(const struct vkb_pass_row *pass)
-{
-    // Nine taps a pixel of the target apart, whose source may be twice as large.
-    if (pass->shader == VKB_SHADER_hdrp_blur_frag || pass->shader == VKB_SHADER_godot_blur_frag)
-        return 12.0;
-    switch (pass->block) {
-    case VKB_BLOCK_blur:
-        return 2.0 + pass->constants.radius * fabs(pass->params.blur.step_y);
-    case VKB_BLOCK_pyramid:
-        return 4.0 + 2.0 * fabs(pass->params.pyramid.step_y);
-    case VKB_BLOCK_prefilter:
-        return 4.0 + 2.0 * fabs(pass->params.prefilter.step_y);
-    case VKB_BLOCK_kawase:
-        return 4.0 + fabs(pass->params.kawase.offset);
-    default:
-        return 4.0;
-    }
-}
-
-// The same in rows of the source.
+// The reach of a pass in rows of the source.
 static double reach_of(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                        uint32_t height)
 {
@@ -66,13 +45,10 @@ static double reach_of(const struct vkb_graph *graph, const struct vkb_pass_row 
     for (uint32_t i = 0; i < pass->read_count; ++i)
         if (graph->images[pass->reads[i]].height < least)
             least = graph->images[pass->reads[i]].height;
-    return own_reach(pass) * height / least;
+    return (double)pass->reach * height / least;
 }
 
-// Whether the images of a pass may begin at any of their rows: it finds its place in its source
-// from row_offset (SAMPLING_ROWS). Other passes need rows that begin at the same place in all
-// images. These are passes that read levels of several sizes, have variants for other sizes
-// (blurs), or take rows in pairs.
+// Whether the images of a pass may begin at any of their rows.
 static bool places_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     const uint32_t height = graph->images[pass->targets[0]].height;
@@ -80,11 +56,8 @@ static bool places_rows(const struct vkb_graph *graph, const struct vkb_pass_row
 
     for (uint32_t i = 0; i < pass->read_count; ++i)
         same = same && graph->images[pass->reads[i]].height == height;
-    if (pass->shader == VKB_SHADER_hdrp_blur_frag || pass->shader == VKB_SHADER_godot_blur_frag)
-        return false;
-    return same
-        || (pass->constants.sampling == SAMPLING_FETCH && pass->block != VKB_BLOCK_blur
-            && pass->block != VKB_BLOCK_gather);
+    return (same && pass->band_rows != VKB_BAND_EVEN_ROW)
+        || (pass->band_rows == VKB_BAND_ANY_ROW && pass->constants.sampling == SAMPLING_FETCH);
 }
 
 // Makes the first row of a band that of a row of an image, an even one.
@@ -112,12 +85,10 @@ static bool include(const struct vkb_graph *graph, const struct vkb_pass_row *pa
     return fits && align(bands, graph->images[pass->targets[0]].height, height);
 }
 
-// Stages of glare read far from a target's place, and levels of their own beside the bloom's.
-static bool has_glare(const struct vkb_graph *graph)
+static bool reaches_everywhere(const struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].block == VKB_BLOCK_streaks
-            || graph->passes[i].block == VKB_BLOCK_flare)
+        if (isinf(graph->passes[i].reach))
             return true;
     return false;
 }
@@ -128,7 +99,7 @@ bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t he
     double before = 0.0, after = 0.0;
 
     *bands = (struct vkb_bands){.head = VKB_NO_IMAGE, .step = 1};
-    if (has_glare(graph))
+    if (reaches_everywhere(graph))
         return false;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (!is_tall(graph, graph->passes[i].targets[0], height)
@@ -165,10 +136,9 @@ bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t he
 static bool find_image(const struct vkb_graph *graph, const char *name, uint32_t *image,
                        struct vkb_error *error)
 {
-    for (*image = 0; *image < graph->image_count; ++*image)
-        if (strcmp(graph->images[*image].name, name) == 0)
-            return true;
-    return vkb_fail(error, VKB_ERROR_VALUE, "part: there is no image %s", name);
+    *image = vkb_graph_find(graph, name);
+    return *image != VKB_NO_IMAGE
+        || vkb_fail(error, VKB_ERROR_VALUE, "part: there is no image %s", name);
 }
 
 static bool mark_images(struct vkb_graph *graph, const struct vkb_part *part, bool *wanted,

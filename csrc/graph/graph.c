@@ -209,7 +209,7 @@ uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, ui
 uint32_t vkb_graph_find(const struct vkb_graph *graph, const char *name)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        if (graph->images[i].framebuffer && strcmp(graph->images[i].name, name) == 0)
+        if (strcmp(graph->images[i].name, name) == 0)
             return i;
     return VKB_NO_IMAGE;
 }

@@ -73,6 +73,13 @@ enum vkb_reading {
     VKB_READING_WORDS,   // as buffers of 16-byte words, on devices that share images with the host
 };
 
+// Where the rows of a band may begin in the images of a pass (bands.h).
+enum vkb_band_rows {
+    VKB_BAND_SAME_PLACE,  // at the same place in all: at any row if they have the same height
+    VKB_BAND_ANY_ROW,     // at any row: the pass finds its place by row_offset (SAMPLING_ROWS)
+    VKB_BAND_EVEN_ROW,    // at the same place in all, at an even row
+};
+
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
 enum vkb_blend {
     VKB_BLEND_NONE,
@@ -103,6 +110,9 @@ struct vkb_pass_row {
     uint32_t depth;  // VKB_NO_IMAGE: none
     enum vkb_load load;
     enum vkb_blend blend;
+    // How far from its target's place the pass reads, in rows of what it reads; INFINITY: anywhere.
+    float reach;
+    enum vkb_band_rows band_rows;
     enum vkb_block block;
     union vkb_params params;
 };
@@ -175,7 +185,7 @@ uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, ui
 // The channels of the image that are read back.
 uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image);
 
-// The framebuffer of that name; VKB_NO_IMAGE if there is none.
+// The image of that name; VKB_NO_IMAGE if there is none.
 uint32_t vkb_graph_find(const struct vkb_graph *graph, const char *name);
 
 #endif

@@ -39,6 +39,7 @@ static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t f
 
     row.params.prefilter.step_x = (float)levels->settings->values.scale_x;
     row.params.prefilter.step_y = (float)levels->settings->values.scale_y;
+    row.reach += 2.0f * row.params.prefilter.step_y;
     vkb_mask_prefilter(levels, &row);
     return row;
 }

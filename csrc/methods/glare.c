@@ -37,6 +37,16 @@ static struct vkb_size size_of(const struct stage *stage, uint32_t image)
     return (struct vkb_size){row->width, row->height};
 }
 
+// Its taps may be anywhere, and its images are beside the bloom's levels.
+static struct vkb_pass_row glare_row(const struct stage *stage, enum vkb_shader fragment,
+                                     uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, fragment, from, to);
+
+    row.reach = INFINITY;
+    return row;
+}
+
 // The weights of iteration i: f^(k base^i) for tap k, all divided by their sum, times a gain. Of
 // each tap but the first two channels, which alternate, are less.
 static void set_weights(const struct vkb_glare_values *values, int iteration, double gain,
@@ -72,7 +82,7 @@ static bool add_iteration(const struct stage *stage, int ray, int rays, int iter
     const double angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays);
     const double step = values->length * pow(values->base, iteration);
     const bool last = iteration == values->iterations - 1;
-    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, VKB_SHADER_streaks_frag, from, to);
+    struct vkb_pass_row row = glare_row(stage, VKB_SHADER_streaks_frag, from, to);
     struct vkb_streaks_params *params = &row.params.streaks;
 
     // Every binding of the shader must be filled, also one that this variant does not read.
@@ -133,7 +143,7 @@ static bool add_flare(const struct stage *stage, enum vkb_shader fragment, uint3
     if (!vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
                           error))
         return false;
-    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, fragment, stage->from, *image);
+    struct vkb_pass_row row = glare_row(stage, fragment, stage->from, *image);
     row.block = VKB_BLOCK_flare;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,

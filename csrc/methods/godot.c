@@ -13,6 +13,7 @@ static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, b
 {
     struct vkb_pass_row row = vkb_prefilter_row(levels, VKB_SHADER_godot_blur_frag, from, to);
 
+    vkb_reach_nine(&row);
     row.constants.direction = direction;
     row.constants.first = first;
     if (first && direction == DIRECTION_VERTICAL)

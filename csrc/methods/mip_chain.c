@@ -49,6 +49,7 @@ static bool add_kawase(const struct vkb_levels *levels, enum vkb_shader fragment
     row.params.kawase.target_width = sampling.width;
     row.params.kawase.target_height = sampling.height;
     row.params.kawase.limit = sampling.limit;
+    row.reach += row.params.kawase.offset;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

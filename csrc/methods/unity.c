@@ -68,6 +68,7 @@ static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode directi
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
+    vkb_reach_nine(&row);
     row.constants.direction = direction;
     row.constants.first = first;
     if (direction == DIRECTION_HORIZONTAL ? source->width == 2 * target->width

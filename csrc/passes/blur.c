@@ -62,6 +62,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
         const double gain = blur->direction == DIRECTION_BOTH ? 1.0 : blur->gain;
         params->weights[i / 4][i % 4] = (float)(gain * moved.weights[i]);
     }
+    row.reach += (moved.count - 1) * fabsf(params->step_y);
     row.constants.direction = blur->direction;
     row.constants.radius = (int32_t)moved.count - 1;
     row.constants.sampling = same_size && is_integer(params->step_x) && is_integer(params->step_y)

@@ -83,6 +83,7 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_s
     // Filtered in the shader: lavapipe's sampler keeps 8 bits of the position, and the errors of a
     // chain add up.
     row.constants.sampling = SAMPLING_FETCH;
+    row.band_rows = VKB_BAND_ANY_ROW;
     return row;
 }
 
@@ -99,6 +100,19 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_sh
     return row;
 }
 
+void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
+{
+    row->params.pyramid.step_x = (float)step_x;
+    row->params.pyramid.step_y = (float)step_y;
+    row->reach = (float)(VKB_FILTER_REACH + 2.0 * fabs(step_y));
+}
+
+void vkb_reach_nine(struct vkb_pass_row *row)
+{
+    row->reach = VKB_FILTER_REACH + 2 * 4;
+    row->band_rows = VKB_BAND_EVEN_ROW;
+}
+
 static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t small)
 {
     return graph->images[large].width == 2 * graph->images[small].width
@@ -113,7 +127,7 @@ struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_f
     if (!firefly_filter && is_twice(levels->graph, from, to))
         row.constants.sampling = SAMPLING_TEXEL;
     row.constants.firefly_filter = firefly_filter;
-    row.params.pyramid.step_x = row.params.pyramid.step_y = 1.0f;
+    vkb_set_steps(&row, 1.0, 1.0);
     return row;
 }
 
@@ -126,8 +140,7 @@ struct vkb_pass_row vkb_scaled_down_row(const struct vkb_levels *levels, bool fi
     if (values->scale_x != 1.0 || values->scale_y != 1.0) {
         // With these sizes the taps are not in the middle between texels.
         row.constants.sampling = SAMPLING_FETCH;
-        row.params.pyramid.step_x = (float)values->scale_x;
-        row.params.pyramid.step_y = (float)values->scale_y;
+        vkb_set_steps(&row, values->scale_x, values->scale_y);
     }
     return row;
 }
@@ -237,12 +250,11 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     row.reads[1] = own != VKB_NO_IMAGE ? own : from;
     row.read_count = 2;
     const double unit = combination->width_step ? smaller->width : 1;
-    params->step_x = (float)(combination->radius_x * unit);
-    params->step_y = (float)(combination->radius_y * unit);
-    if (combination->target_step) {
-        params->step_x = (float)((double)smaller->width / larger->width);
-        params->step_y = (float)((double)smaller->height / larger->height);
-    }
+    if (combination->target_step)
+        vkb_set_steps(&row, (double)smaller->width / larger->width,
+                      (double)smaller->height / larger->height);
+    else
+        vkb_set_steps(&row, combination->radius_x * unit, combination->radius_y * unit);
     if (is_twice(levels->graph, to, from)
         && (kernel == UPSAMPLE_LINEAR
             || (kernel == UPSAMPLE_TENT && params->step_x == params->step_y
@@ -304,6 +316,7 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
     for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)
         row.reads[level] = levels->downs[level < levels->count ? level : 0];
     row.block = VKB_BLOCK_gather;
+    row.band_rows = VKB_BAND_SAME_PLACE;
     for (uint32_t level = 0; level < levels->count; ++level)
         row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
     row.params.gather.target_width = sampling.width;

@@ -56,6 +56,14 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_sh
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
                                       uint32_t from, uint32_t to);
 
+// Sets the distances of the taps of a row with the pyramid's block, in texels of what it reads. The
+// outer ones are two steps away.
+void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y);
+
+// For a blur of nine taps, a pixel of the target apart, whose source may be twice as large. Borders
+// and pairs of samples are counted from the first row.
+void vkb_reach_nine(struct vkb_pass_row *row);
+
 // Makes a prefilter multiply its result by the mask of the source, if there is one.
 void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row);
 

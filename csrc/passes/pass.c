@@ -16,6 +16,7 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragmen
     row.targets[0] = target;
     row.target_count = 1;
     row.depth = VKB_NO_IMAGE;
+    row.reach = VKB_FILTER_REACH;
     return row;
 }
 

@@ -46,6 +46,9 @@ struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t ta
 
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
+// The reach of a bicubic filter, and of the rounding of places. Passes with taps add theirs.
+enum { VKB_FILTER_REACH = 4 };
+
 // A row with the defaults of a fullscreen pass; the caller fills in the rest.
 struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target);
 

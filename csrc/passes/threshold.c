@@ -43,6 +43,7 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
     row.constants.threshold_mode = mode;
     // Not the sampler's filter: it would spread NaN, and a threshold magnifies its rounding errors.
     row.constants.sampling = vkb_same_size(graph, image, glow) ? SAMPLING_TEXEL : SAMPLING_FETCH;
+    row.band_rows = VKB_BAND_ANY_ROW;
     row.reads[0] = image;
     vkb_apply_mask(&row, mask);
     row.block = VKB_BLOCK_threshold;

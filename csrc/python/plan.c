@@ -51,14 +51,15 @@ static bool check_names(const struct vkb_graph *graph, PyObject *names)
     for (Py_ssize_t i = 0, count = names == Py_None ? 0 : PyTuple_Size(names); i < count; ++i) {
         PyObject *name = PyTuple_GetItem(names, i);
         PyObject *text = PyUnicode_Check(name) ? PyUnicode_AsUTF8String(name) : NULL;
-        bool found = text && vkb_graph_find(graph, PyBytes_AsString(text)) != VKB_NO_IMAGE;
+        uint32_t image = text ? vkb_graph_find(graph, PyBytes_AsString(text)) : VKB_NO_IMAGE;
+        bool found = image != VKB_NO_IMAGE && graph->images[image].framebuffer;
         Py_XDECREF(text);
         if (found)
             continue;
         if (PyErr_Occurred())
             return false;
         char list[1024] = "";
-        for (uint32_t image = 0; image < graph->image_count; ++image)
+        for (image = 0; image < graph->image_count; ++image)
             if (graph->images[image].framebuffer && strlen(list) + VKB_NAME_SIZE + 2 < sizeof list)
                 strcat(strcat(list, *list ? ", " : ""), graph->images[image].name);
         PyErr_Format(PyExc_ValueError, "attachments: there is no %R here, only %s", name, list);
