@@ -10,6 +10,7 @@ static const enum vkb_shader double_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(do
 static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
     VKB_BY_FORMAT(double_final_comp);
 static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
+static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
 static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
@@ -81,6 +82,41 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
     make_halving(choice, &row, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error)
         && add_halved_image(choice, pass, &row, error);
+}
+
+// Whether the pass weights the taps of a downsampling, which are one and two texels apart.
+static bool weights_taps(const struct vkb_pass_row *pass)
+{
+    switch (pass->shader) {
+    case VKB_SHADER_pyramid_down_frag:
+        return pass->params.pyramid.step_x == 1.0f && pass->params.pyramid.step_y == 1.0f;
+    case VKB_SHADER_pygfx_down_frag:
+    case VKB_SHADER_blender_down_frag:
+    case VKB_SHADER_box_down_frag:
+        return !pass->constants.masked;
+    default:
+        return false;
+    }
+}
+
+bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         bool *fits, struct vkb_error *error)
+{
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    struct vkb_pass_row row;
+
+    *fits = weights_taps(pass) && source->width == 2 * target->width
+         && source->height == 2 * target->height
+         && vkb_formats[source->format].vk == vkb_formats[target->format].vk
+         && vkb_fits_words(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.sampling = 0;
+    vkb_drop_reads(&row, 1);
+    vkb_make_words(&row, halve_taps_words[source->format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
