@@ -257,6 +257,32 @@ def test_an_interruption_is_raised_before_what_validation_says(layer: Path, name
     ]
 
 
+RENEWED = """
+import os
+import glfw
+import vkbloom
+from tests.core.windows import open_window
+
+window = open_window((64, 36))
+with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as renderer:
+    with vkbloom.Surface(renderer, window) as surface:
+        for side in (64, 80, 64, 96):
+            glfw.set_window_size(window, side, side)
+            glfw.poll_events()
+            for _ in range(3):
+                surface.present(vkbloom.Scene.ufo(), size=(32, 18))
+glfw.terminate()
+"""
+
+
+def test_a_renewed_swapchain_waits_for_presentations(
+    layer: Path, name: str, display: dict[str, str]
+) -> None:
+    """The validation layer does not know of them; the layer of these tests does."""
+    done = run(layer, name, "", ("-c", RENEWED), **display)
+    assert done.returncode == 0, done.stderr
+
+
 def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
     done = run(layer, name, "bindings")
     assert "ValidationError" in done.stderr

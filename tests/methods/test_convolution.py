@@ -152,6 +152,21 @@ def test_alpha_and_mask(renderer: Renderer) -> None:
         np.testing.assert_allclose(frames[name], expected[name], atol=1e-5)
 
 
+def test_emission_and_the_largest_alpha(renderer: Renderer) -> None:
+    """The bloom is that of the emission, and covers where the image is transparent."""
+    image, emission = np.clip(image_of(31, 22, 4), 0, 1), image_of(31, 22, 4)[::-1]
+    settings = Convolution(kernel_of(5, 7), alpha="max")
+    frames = renderer.apply(image, settings, emission=emission)
+    expected = reference.apply(image, settings, emission=emission)
+    assert list(frames) == list(expected)
+    for name, array in frames.items():
+        np.testing.assert_allclose(array, expected[name], atol=1e-5, err_msg=name)
+    # The emission and the alpha count.
+    assert np.abs(frames["final"] - renderer.apply(image, settings)["final"]).max() > 0.1
+    kept = renderer.apply(image, settings.replace(alpha="keep"), emission=emission)["final"]
+    assert (frames["final"][..., 3] - kept[..., 3]).max() > 0.1
+
+
 def test_prefilter(renderer: Renderer) -> None:
     """Of Unreal Engine: luminances above 7 become 15 (L - 7) + 7."""
     image = np.full((8, 8, 3), 8.0, np.float32)
