@@ -136,4 +136,4 @@ def test_memory_that_python_does_not_get(
     printed = run(faulty, "memory_walk")
     with capsys.disabled():
         print(f"\n\nPython: {printed.strip()}")
-    assert int(done.stdout.split()[4]) > 10
+    assert int(printed.split()[4]) > 10
