@@ -27,6 +27,11 @@ WORDS_ALONE = {
     "filter_rows.comp",
     "filter_columns.comp",
     "gather_columns.comp",
+    "kawase_columns.comp",
+    "halve_taps.comp",
+    "kino_bright.comp",
+    "highlights.comp",
+    "scale.comp",
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}

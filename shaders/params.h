@@ -377,11 +377,11 @@
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
 // applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
-// first level. LEVELS is the number of levels that a pass adds up. RADIX_A to STAGE are of Fourier
-// transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete
-// lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
-// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines, and they exchange EXCHANGED floats of
-// each element at once.
+// first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
+// makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
+// GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are
+// the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of GROUP_WIDTH
+// lines, and they exchange EXCHANGED floats of each element at once.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -402,7 +402,7 @@
     CONSTANT(16, EMITTERS, emitters) \
     CONSTANT(17, FIRST, first) \
     CONSTANT(18, LEVELS, levels) \
-    CONSTANT(19, KARIS_AVERAGE, karis_average) \
+    CONSTANT(19, GROUPS, groups) \
     CONSTANT(20, NODE, node) \
     CONSTANT(21, ALPHA, alpha) \
     CONSTANT(22, MASKED, masked) \
@@ -490,6 +490,13 @@
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
+    NAME(UPSAMPLE_UNIT_TENT, 5, unit_tent) \
+    NAME(UPSAMPLE_PAIR, 6, pair) \
+    NAME(GROUPS_PYRAMID, 0, pyramid) \
+    NAME(GROUPS_PYGFX, 1, pygfx) \
+    NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
+    NAME(GROUPS_BLENDER, 3, blender) \
+    NAME(GROUPS_BOX, 4, box) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

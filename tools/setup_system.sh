@@ -83,6 +83,7 @@ check() {
         test)
             need "the Khronos validation layer" vulkan-validationlayers has_validation
             want chromium has_chromium
+            want xvfb command -v Xvfb
             ;;
         esac
     done

@@ -30,6 +30,8 @@ bool vkb_add_blender(const struct vkb_settings *settings, const struct vkb_bloom
             level == 0   ? vkb_prefilter_row(&levels, VKB_SHADER_blender_prefilter_frag, from, *to)
             : level == 1 ? vkb_pyramid_row(&levels, VKB_SHADER_blender_down_frag, from, *to)
                          : vkb_down_row(&levels, false, from, *to);
+        if (level == 1)
+            row.constants.groups = GROUPS_BLENDER;
         if (level == 0)
             vkb_mask_prefilter(&levels, &row);
         if (!vkb_graph_add_pass(graph, &row, error))

@@ -41,6 +41,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
             return false;
         struct vkb_pass_row row =
             vkb_pyramid_row(&levels, VKB_SHADER_box_down_frag, from, levels.downs[level]);
+        row.constants.groups = GROUPS_BOX;
         row.constants.firefly_filter = settings->values.anti_flicker && level == 0;
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;

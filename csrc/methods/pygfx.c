@@ -32,7 +32,8 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
             level ? vkb_down_row(&levels, false, from, levels.downs[level])
                   : vkb_pyramid_row(&levels, VKB_SHADER_pygfx_down_frag, from, levels.downs[0]);
         if (level == 0) {
-            row.constants.karis_average = settings->values.karis_average;
+            row.constants.groups =
+                settings->values.karis_average ? GROUPS_PYGFX_KARIS : GROUPS_PYGFX;
             vkb_mask_prefilter(&levels, &row);
         }
         if (!vkb_graph_add_pass(graph, &row, error))

@@ -262,6 +262,8 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
         row.constants.sampling = SAMPLING_TEXEL;
         find_up_taps(kernel == UPSAMPLE_TENT ? params->step_x : 0.0, params->taps[0]);
     }
+    if (kernel == UPSAMPLE_TENT && params->step_x == 1.0f && params->step_y == 1.0f)
+        row.constants.upsample = UPSAMPLE_UNIT_TENT;
     params->own = (float)own_share;
     params->coarse = (float)coarse_share;
     return vkb_graph_add_pass(levels->graph, &row, error);

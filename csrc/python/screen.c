@@ -15,10 +15,10 @@ PyObject *vkb_new_screen(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     unsigned long long surface;
-    const char *mode;
+    int mailbox;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "Ks:screen", &surface, &mode))
+    if (!PyArg_ParseTuple(arguments, "Kp:screen", &surface, &mailbox))
         return NULL;
     struct vkb_screen_object *self = vkb_new_object(state_of(object)->screen_type);
     if (!self)
@@ -28,7 +28,7 @@ PyObject *vkb_new_screen(PyObject *object, PyObject *arguments)
     if (done) {
         if (vkb_require_open(renderer, &error))
             self->screen = vkb_screen_create(&renderer->device, &renderer->frame,
-                                             (VkSurfaceKHR)surface, mode, &error);
+                                             (VkSurfaceKHR)surface, mailbox, &error);
         done = vkb_renderer_check_messages(renderer, self->screen != NULL, &error);
         vkb_renderer_leave(renderer);
     }

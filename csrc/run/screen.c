@@ -4,12 +4,11 @@
 #include "vulkan/labels.h"
 
 struct vkb_screen *vkb_screen_create(const struct vkb_device *device, struct vkb_frame *frame,
-                                     VkSurfaceKHR surface, const char *mode,
-                                     struct vkb_error *error)
+                                     VkSurfaceKHR surface, bool mailbox, struct vkb_error *error)
 {
     struct vkb_swapchain swapchain;
 
-    if (!vkb_swapchain_create(device, surface, mode, &swapchain, error))
+    if (!vkb_swapchain_create(device, surface, mailbox, &swapchain, error))
         return NULL;
     struct vkb_screen *screen = vkb_alloc(error, 1, sizeof *screen);
     if (!screen) {
@@ -165,8 +164,7 @@ static bool acquire(struct vkb_device *device, struct vkb_frame *frame, struct v
         if (swapchain->stale || swapchain->spec.linear != spec->linear
             || swapchain->spec.extent.width != spec->extent.width
             || swapchain->spec.extent.height != spec->extent.height) {
-            if (!vkb_submissions_wait(device, &frame->submissions, error)
-                || !vkb_swapchain_renew(device, swapchain, spec, error))
+            if (!vkb_swapchain_renew(device, swapchain, spec, error))
                 return false;
             if (swapchain->stale)
                 return true;

@@ -20,8 +20,7 @@ struct vkb_screen {
 
 // Makes a screen of a surface, as vkb_swapchain_create does; NULL on failure. The frame owns it.
 struct vkb_screen *vkb_screen_create(const struct vkb_device *device, struct vkb_frame *frame,
-                                     VkSurfaceKHR surface, const char *mode,
-                                     struct vkb_error *error);
+                                     VkSurfaceKHR surface, bool mailbox, struct vkb_error *error);
 // After vkb_submissions_wait or vkb_frame_end.
 void vkb_screen_destroy(const struct vkb_device *device, struct vkb_frame *frame,
                         struct vkb_screen *screen);

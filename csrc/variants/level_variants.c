@@ -10,6 +10,7 @@ static const enum vkb_shader double_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(do
 static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
     VKB_BY_FORMAT(double_final_comp);
 static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
+static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
 static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
@@ -83,6 +84,41 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
         && add_halved_image(choice, pass, &row, error);
 }
 
+// Whether the pass weights the taps of a downsampling, which are one and two texels apart.
+static bool weights_taps(const struct vkb_pass_row *pass)
+{
+    switch (pass->shader) {
+    case VKB_SHADER_pyramid_down_frag:
+        return pass->params.pyramid.step_x == 1.0f && pass->params.pyramid.step_y == 1.0f;
+    case VKB_SHADER_pygfx_down_frag:
+    case VKB_SHADER_blender_down_frag:
+    case VKB_SHADER_box_down_frag:
+        return !pass->constants.masked;
+    default:
+        return false;
+    }
+}
+
+bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         bool *fits, struct vkb_error *error)
+{
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    struct vkb_pass_row row;
+
+    *fits = weights_taps(pass) && source->width == 2 * target->width
+         && source->height == 2 * target->height
+         && vkb_formats[source->format].vk == vkb_formats[target->format].vk
+         && vkb_fits_words(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.sampling = 0;
+    vkb_drop_reads(&row, 1);
+    vkb_make_words(&row, halve_taps_words[source->format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                      bool *fits, struct vkb_error *error)
 {
@@ -109,18 +145,21 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     const struct vkb_pass_row *up = NULL;
     struct vkb_pass_row row;
     struct vkb_double_final_params *params = &row.params.double_final;
+    const enum vkb_format format = plain->images[pass->targets[0]].format;
 
     if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
+    // The shader is compiled for one format. The levels of a published method may have their own.
     *fits = up && vkb_doubles(up) && !up->constants.add_own && !pass->constants.masked
-         && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format
+         && plain->images[pass->reads[0]].format == format
+         && plain->images[pass->reads[1]].format == format
+         && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
          && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    make_doubling(choice, &row, double_final_shaders, double_final_words,
-                  plain->images[up->reads[0]].format);
+    make_doubling(choice, &row, double_final_shaders, double_final_words, format);
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];

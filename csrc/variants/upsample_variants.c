@@ -10,6 +10,7 @@ static const enum vkb_shader rows_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMA
 static const enum vkb_shader columns_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(filter_columns);
 static const enum vkb_shader gather_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(gather_columns);
+static const enum vkb_shader kawase_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(kawase_columns);
 
 // Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
 static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
@@ -40,12 +41,21 @@ static bool fits_rows(const struct vkb_variant_choice *choice, const struct vkb_
     return fits;
 }
 
-// Adds an image and the pass that filters `from` along rows into it, at the positions of the pixels
-// of the target of `pass`.
+// A filter along rows: the image that it reads, its kind of UPSAMPLE_*, and the distance of its
+// taps in texels.
+struct row_filter {
+    uint32_t from;
+    enum vkb_mode kind;
+    float step;
+};
+
+// Adds an image and the pass that filters along rows into it, at the positions of the pixels of the
+// target of `pass`.
 static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                     uint32_t from, uint32_t number, float step, uint32_t *rows,
+                     const struct row_filter *filter, uint32_t number, uint32_t *rows,
                      struct vkb_error *error)
 {
+    const uint32_t from = filter->from;
     const struct vkb_size size = rows_size(choice, pass, from);
     const enum vkb_format format = choice->graph->images[from].format;
     char name[VKB_NAME_SIZE];
@@ -55,10 +65,10 @@ static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_p
     if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, rows, error))
         return false;
     memcpy(&row, pass, sizeof row);
-    row.constants = (struct vkb_constants){.upsample = pass->constants.upsample};
+    row.constants = (struct vkb_constants){.upsample = (int32_t)filter->kind};
     memset(&row.params, 0, sizeof row.params);
     row.block = VKB_BLOCK_pyramid;
-    row.params.pyramid.step_x = step;
+    row.params.pyramid.step_x = filter->step;
     row.reads[0] = from;
     vkb_drop_reads(&row, 1);
     row.targets[0] = *rows;
@@ -76,20 +86,30 @@ static void make_columns(const struct vkb_variant_choice *choice, struct vkb_pas
                    FILTER_ROWS);
 }
 
+bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return pass->constants.upsample == UPSAMPLE_LINEAR && !pass->constants.add_own
+        && vkb_same_size(graph, pass->reads[0], pass->targets[0]);
+}
+
 bool vkb_add_upsampled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        bool *fits, struct vkb_error *error)
 {
     struct vkb_pass_row row;
 
     *fits = pass->shader == VKB_SHADER_pyramid_up_frag && !vkb_doubles(pass)
-         && fits_rows(choice, pass, 1)
+         && !vkb_only_scales(&choice->plain, pass) && fits_rows(choice, pass, 1)
          && (!pass->constants.add_own
              || has_format_of(&choice->plain, pass->reads[1], pass->targets[0]));
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    if (!add_rows(choice, pass, pass->reads[0], 0, pass->params.pyramid.step_x, &row.reads[0],
-                  error))
+    const struct row_filter filter = {
+        .from = pass->reads[0],
+        .kind = (enum vkb_mode)pass->constants.upsample,
+        .step = pass->params.pyramid.step_x,
+    };
+    if (!add_rows(choice, pass, &filter, 0, &row.reads[0], error))
         return false;
     if (!pass->constants.add_own)
         row.reads[1] = row.reads[0];
@@ -107,11 +127,39 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    for (uint32_t level = 0; level < levels; ++level)
-        if (!add_rows(choice, pass, pass->reads[level], level, 0.0f, &row.reads[level], error))
+    for (uint32_t level = 0; level < levels; ++level) {
+        const struct row_filter filter = {
+            .from = pass->reads[level],
+            .kind = (enum vkb_mode)pass->constants.upsample,
+        };
+        if (!add_rows(choice, pass, &filter, level, &row.reads[level], error))
             return false;
+    }
     for (uint32_t level = levels; level < row.read_count; ++level)
         row.reads[level] = row.reads[0];
     make_columns(choice, &row, gather_shaders);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+bool vkb_add_kawase_up(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == VKB_SHADER_kawase_up_frag && fits_rows(choice, pass, 1);
+    if (!*fits)
+        return true;
+    const float offset = pass->params.kawase.offset;
+    const struct row_filter filters[] = {
+        {pass->reads[0], UPSAMPLE_LINEAR, 0.0f},
+        {pass->reads[0], UPSAMPLE_PAIR, 0.5f * offset},
+        {pass->reads[0], UPSAMPLE_PAIR, offset},
+    };
+    memcpy(&row, pass, sizeof row);
+    row.read_count = sizeof filters / sizeof filters[0];
+    for (uint32_t i = 0; i < row.read_count; ++i)
+        if (!add_rows(choice, pass, &filters[i], i, &row.reads[i], error))
+            return false;
+    make_columns(choice, &row, kawase_shaders);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

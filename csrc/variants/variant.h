@@ -26,9 +26,11 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
 // Levels of exactly half and exactly twice the size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
+// The first of these with taps that are weighted by brightness.
+vkb_variant_add vkb_add_halved_taps;
 // Upsampling by any factor as two passes, along rows and along columns; the sum of several levels
 // that are upsampled so.
-vkb_variant_add vkb_add_upsampled, vkb_add_gathered;
+vkb_variant_add vkb_add_upsampled, vkb_add_gathered, vkb_add_kawase_up;
 // Transforms of complete lines in shared memory.
 vkb_variant_add vkb_add_lines;
 
@@ -44,6 +46,9 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
 // The threshold pass that writes `image` from an image of the same size and format; NULL: no such
 // pass.
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
+
+// Whether an upsampling by a linear filter reads an image of the target's size.
+bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass);
 
 // Removes all images after the first `read_count` from the images that the pass reads.
 void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);

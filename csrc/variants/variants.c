@@ -106,6 +106,9 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 
 static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
 static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(threshold);
+static const enum vkb_shader kino_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(kino_bright);
+static const enum vkb_shader highlights_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(highlights);
+static const enum vkb_shader scale_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(scale);
 
 // Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
 static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
@@ -129,6 +132,26 @@ static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass
     return vkb_is_threshold(pass) && has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
+// The shaders for a pass from an image of the target's size and format; NULL: it is none of those
+// that need no filter then.
+static const enum vkb_shader *unfiltered_shaders(const struct vkb_graph *graph,
+                                                 const struct vkb_pass_row *pass)
+{
+    if (pass->constants.masked || !vkb_same_size(graph, pass->reads[0], pass->targets[0])
+        || !has_format_of(graph, pass->reads[0], pass->targets[0]))
+        return NULL;
+    switch (pass->shader) {
+    case VKB_SHADER_kino_prefilter_frag:
+        return kino_shaders;
+    case VKB_SHADER_blender_prefilter_frag:
+        return highlights_shaders;
+    case VKB_SHADER_pyramid_up_frag:
+        return vkb_only_scales(graph, pass) ? scale_shaders : NULL;
+    default:
+        return NULL;
+    }
+}
+
 // Turns a pass that reads only the pixel at its own position into one that loads it, from the first
 // `read_count` images.
 static void load_pixels(struct vkb_pass_row *row, enum vkb_shader shader, enum vkb_format format,
@@ -143,6 +166,7 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
 {
     const struct vkb_graph *graph = choice->graph;
     const enum vkb_format format = graph->images[pass->reads[0]].format;
+    const enum vkb_shader *unfiltered = unfiltered_shaders(graph, pass);
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
@@ -153,6 +177,8 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
         load_pixels(&row, blend_shaders[format], format, 2);
     else if (vkb_fits_words(choice, pass) && loads_threshold(graph, pass))
         load_pixels(&row, threshold_shaders[format], format, 1);
+    else if (vkb_fits_words(choice, pass) && unfiltered)
+        load_pixels(&row, unfiltered[format], format, 1);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -215,10 +241,12 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "strips", vkb_add_strips, 0},
     {VKB_VARIANTS_CPU, "from_lines", vkb_add_from_lines, 0},
     {VKB_VARIANTS_CPU, "halved", vkb_add_halved, 0},
+    {VKB_VARIANTS_CPU, "halved", vkb_add_halved_taps, 0},
     {VKB_VARIANTS_CPU, "doubled", vkb_add_doubled, 0},
     {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_upsampled, TWO_PASSES},
     {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered, TWO_PASSES},
+    {VKB_VARIANTS_CPU, "upsampled", vkb_add_kawase_up, TWO_PASSES},
     {VKB_VARIANTS_CPU, "words", add_transform, 0},
     {VKB_VARIANTS_CPU, "pixels", add_pixels, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},

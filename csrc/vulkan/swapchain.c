@@ -2,34 +2,24 @@
 
 #include <string.h>
 
-static const struct mode_row {
-    const char *name;
-    VkPresentModeKHR mode;
-} mode_rows[] = {
-    {"fifo", VK_PRESENT_MODE_FIFO_KHR},
-    {"mailbox", VK_PRESENT_MODE_MAILBOX_KHR},
-    {"immediate", VK_PRESENT_MODE_IMMEDIATE_KHR},
-};
-
-static bool find_mode(const struct vkb_device *device, const char *name,
+static bool find_mode(const struct vkb_device *device, bool mailbox,
                       struct vkb_swapchain *swapchain, struct vkb_error *error)
 {
     VkPresentModeKHR modes[16];
     uint32_t count = sizeof modes / sizeof modes[0];
-    VkResult result = VK_RESULT(device->instance->vk.vkGetPhysicalDeviceSurfacePresentModesKHR(
-        device->adapter.physical, swapchain->surface, &count, modes));
+    VkResult result;
 
+    swapchain->mode = mailbox ? VK_PRESENT_MODE_MAILBOX_KHR : VK_PRESENT_MODE_FIFO_KHR;
+    result = VK_RESULT(device->instance->vk.vkGetPhysicalDeviceSurfacePresentModesKHR(
+        device->adapter.physical, swapchain->surface, &count, modes));
     if (result != VK_INCOMPLETE
         && !vkb_check(error, result, "vkGetPhysicalDeviceSurfacePresentModesKHR"))
         return false;
-    for (size_t row = 0; row < sizeof mode_rows / sizeof mode_rows[0]; ++row)
-        for (uint32_t i = 0; i < count; ++i)
-            if (strcmp(name, mode_rows[row].name) == 0 && modes[i] == mode_rows[row].mode) {
-                swapchain->mode = modes[i];
-                return true;
-            }
+    for (uint32_t i = 0; i < count; ++i)
+        if (modes[i] == swapchain->mode)
+            return true;
     return vkb_fail(error, VKB_ERROR_VALUE,
-                    "mode: the surface has no \"%s\"; every surface has \"fifo\"", name);
+                    "mode: the surface has no \"mailbox\"; every surface has \"fifo\"");
 }
 
 static bool create_headless(const struct vkb_device *device, VkSurfaceKHR *surface,
@@ -52,7 +42,7 @@ static bool create_headless(const struct vkb_device *device, VkSurfaceKHR *surfa
                          NULL, surface));
 }
 
-bool vkb_swapchain_create(const struct vkb_device *device, VkSurfaceKHR surface, const char *mode,
+bool vkb_swapchain_create(const struct vkb_device *device, VkSurfaceKHR surface, bool mailbox,
                           struct vkb_swapchain *swapchain, struct vkb_error *error)
 {
     const struct vkb_adapter_info *adapter = &device->adapter;
@@ -69,7 +59,7 @@ bool vkb_swapchain_create(const struct vkb_device *device, VkSurfaceKHR surface,
     if (done && !supported)
         done =
             vkb_fail(error, VKB_ERROR_GENERAL, "%s cannot present on this surface", adapter->name);
-    done = done && find_mode(device, mode, swapchain, error);
+    done = done && find_mode(device, mailbox, swapchain, error);
     if (!done)
         vkb_swapchain_destroy(device, swapchain);
     return done;

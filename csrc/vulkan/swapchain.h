@@ -28,12 +28,10 @@ struct vkb_swapchain {
     bool stale;  // it must be renewed before an image is acquired
 };
 
-// Takes over the surface, also on failure; VK_NULL_HANDLE: one without a window. `mode` is "fifo",
-// "mailbox" or "immediate".
-bool vkb_swapchain_create(const struct vkb_device *device, VkSurfaceKHR surface, const char *mode,
+// Takes over the surface, also on failure; VK_NULL_HANDLE: one without a window.
+bool vkb_swapchain_create(const struct vkb_device *device, VkSurfaceKHR surface, bool mailbox,
                           struct vkb_swapchain *swapchain, struct vkb_error *error);
-// The device must have run all that uses it, here and in vkb_swapchain_renew. Destroying a zeroed
-// swapchain is safe.
+// This and vkb_swapchain_renew wait until the queue is idle. Destroying a zeroed swapchain is safe.
 void vkb_swapchain_destroy(const struct vkb_device *device, struct vkb_swapchain *swapchain);
 
 // Makes the images and semaphores anew, as large as the surface is now.

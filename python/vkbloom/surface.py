@@ -57,9 +57,9 @@ class Surface:
     size : (int, int), optional
         Width and height in pixels without a window of glfw, by default (1280, 720). A surface
         that has a size of its own keeps that.
-    mode : {"fifo", "mailbox", "immediate"}
+    mode : {"fifo", "mailbox"}
         When an image replaces the one before: at the next refresh of the screen, in order; at the
-        next refresh, the newest only; at once. Every surface has "fifo".
+        next refresh, the newest only. Every surface has "fifo".
 
     Attributes
     ----------
@@ -117,12 +117,12 @@ class Surface:
         window: object = None,
         *,
         size: tuple[int, int] | None = None,
-        mode: Literal["fifo", "mailbox", "immediate"] = "fifo",
+        mode: Literal["fifo", "mailbox"] = "fifo",
     ) -> None:
         if renderer.closed:
             raise ValueError("renderer: it is closed")
-        if not isinstance(mode, str):
-            raise TypeError(f"mode: {mode!r} is not a name")
+        if mode not in ("fifo", "mailbox"):
+            raise ValueError(f'mode: {mode!r} is not "fifo" or "mailbox"')
         self._renderer = renderer
         self._pending: deque[_core.Submission] = deque()
         self._size = check_size("size", (1280, 720) if size is None else size)
@@ -137,7 +137,7 @@ class Surface:
             handle = int(cast("Callable[[int], int]", window)(renderer._core.instance))
         elif window is not None:
             raise TypeError(f"window: {window!r} is not a window of glfw, a function or None")
-        self._core = renderer._core.screen(handle, mode)
+        self._core = renderer._core.screen(handle, mode == "mailbox")
         self.timings: dict[str, float] = {}
 
     @property

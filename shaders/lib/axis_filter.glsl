@@ -1,4 +1,4 @@
-// Defines the filter UPSAMPLE of an image along one axis. Each is a product of two such filters: all
+// Defines the filter of an image along one axis. Each filter is a product of two such filters: all
 // variants of a pass first filter along rows, then the results along columns. Define before each
 // inclusion:
 //
@@ -10,7 +10,7 @@ vec4 AXIS_LINEAR(AXIS_IMAGE, Axis axis, float offset, int line)
 {
     float moved = axis.part + offset, integer = floor(moved), part = moved - integer;
     int at = axis.texel + int(integer);
-    return (1.0 - part) * AXIS_TEXEL(at) + part * AXIS_TEXEL(at + 1);
+    return blended(AXIS_TEXEL(at), AXIS_TEXEL(at + 1), part);
 }
 
 // The cubic filter as two linear taps, neither of them further from the texel than 1 - 1 / size of the
@@ -28,14 +28,19 @@ vec4 AXIS_INSET_CUBIC(AXIS_IMAGE, Axis axis, int line)
 
 vec4 AXIS_FILTER(AXIS_IMAGE, Axis axis, int line)
 {
-    if (UPSAMPLE == UPSAMPLE_LINEAR)
+    if (axis.kind == UPSAMPLE_LINEAR)
         return AXIS_LINEAR(AXIS_ARGUMENT, axis, 0.0, line);
-    if (UPSAMPLE == UPSAMPLE_INSET_LINEAR)
+    if (axis.kind == UPSAMPLE_INSET_LINEAR)
         return AXIS_LINEAR(AXIS_ARGUMENT, inset(axis), 0.0, line);
-    if (UPSAMPLE == UPSAMPLE_INSET_CUBIC)
+    if (axis.kind == UPSAMPLE_INSET_CUBIC)
         return AXIS_INSET_CUBIC(AXIS_ARGUMENT, inset(axis), line);
-    if (UPSAMPLE == UPSAMPLE_CUBIC) {
-        vec4 weights = cubic_weights(axis.part);
+    // Two taps at the same distance before and after the position.
+    if (axis.kind == UPSAMPLE_PAIR)
+        return AXIS_LINEAR(AXIS_ARGUMENT, axis, -axis.tap_step, line)
+             + AXIS_LINEAR(AXIS_ARGUMENT, axis, axis.tap_step, line);
+    if (axis.kind == UPSAMPLE_CUBIC || axis.kind == UPSAMPLE_UNIT_TENT) {
+        vec4 weights =
+            axis.kind == UPSAMPLE_CUBIC ? cubic_weights(axis.part) : unit_tent_weights(axis.part);
         return weights.x * AXIS_TEXEL(axis.texel - 1) + weights.y * AXIS_TEXEL(axis.texel)
              + weights.z * AXIS_TEXEL(axis.texel + 1) + weights.w * AXIS_TEXEL(axis.texel + 2);
     }

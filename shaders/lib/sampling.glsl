@@ -61,10 +61,16 @@ vec4[4] fetch_four(sampler2D source, ivec2 texel)
                    fetch_clamped(source, texel + ivec2(1, 1)));
 }
 
+// Like mix(), for which compilers have several formulas that round differently.
+vec4 blended(vec4 a, vec4 b, float part)
+{
+    return (1.0 - part) * a + part * b;
+}
+
 // Bilinear filter in float precision. Hardware filters use 8 bits of the position, or fewer.
 vec4 bilinear(vec4 four[4], vec2 part)
 {
-    return mix(mix(four[0], four[1], part.x), mix(four[2], four[3], part.x), part.y);
+    return blended(blended(four[0], four[1], part.x), blended(four[2], four[3], part.x), part.y);
 }
 
 vec4 fetch_bilinear(sampler2D source, ivec2 texel, vec2 part)

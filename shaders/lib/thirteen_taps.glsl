@@ -1,8 +1,7 @@
-// The 13 taps of a downsample as five 2 x 2 groups; the middle one has half of the weight (Jimenez,
-// "Next Generation Post Processing in Call of Duty: Advanced Warfare", SIGGRAPH 2014). The including
-// shader defines `source` and SAMPLING.
-
-const float GROUP_SHARES[5] = float[](0.5, 0.125, 0.125, 0.125, 0.125);
+// The 13 taps of a downsample: nine in three rows, and four around the centre (Jimenez, "Next Generation
+// Post Processing in Call of Duty: Advanced Warfare", SIGGRAPH 2014). The including shader defines
+// `source` and SAMPLING.
+#include "lib/groups.glsl"
 
 vec4 tap(Place place, float x, float y)
 {
@@ -10,15 +9,14 @@ vec4 tap(Place place, float x, float y)
 }
 
 // `apart` is the distance of the inner taps from the centre, in texels of the source.
-vec4[5] group_means(Place place, vec2 apart)
+Taps thirteen_taps(Place place, vec2 apart)
 {
     float x = 2.0 * apart.x, y = 2.0 * apart.y;
-    // Rows of taps, left to right. Then the four inner taps.
-    vec4 a = tap(place, -x, -y), b = tap(place, 0.0, -y), c = tap(place, x, -y);
-    vec4 d = tap(place, -x, 0.0), e = tap(place, 0.0, 0.0), f = tap(place, x, 0.0);
-    vec4 g = tap(place, -x, y), h = tap(place, 0.0, y), i = tap(place, x, y);
-    vec4 inner = tap(place, -apart.x, -apart.y) + tap(place, apart.x, -apart.y)
-               + tap(place, -apart.x, apart.y) + tap(place, apart.x, apart.y);
-    return vec4[](0.25 * inner, 0.25 * (a + b + d + e), 0.25 * (b + c + e + f),
-                  0.25 * (d + e + g + h), 0.25 * (e + f + h + i));
+    Taps taps;
+    taps.outer = vec4[](tap(place, -x, -y), tap(place, 0.0, -y), tap(place, x, -y),
+                        tap(place, -x, 0.0), tap(place, 0.0, 0.0), tap(place, x, 0.0),
+                        tap(place, -x, y), tap(place, 0.0, y), tap(place, x, y));
+    taps.inner = vec4[](tap(place, -apart.x, -apart.y), tap(place, apart.x, -apart.y),
+                        tap(place, -apart.x, apart.y), tap(place, apart.x, apart.y));
+    return taps;
 }

@@ -1,5 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // Bevy's first downsample: 13 taps, the groups weighted by brightness but not renormalized, a
 // floor, then the threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
 #include "lib/block.glsl"
@@ -19,7 +20,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 vec4 shade()
 {
-    vec4 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
+    vec4 means[5] = group_means(thirteen_taps(PLACE_IN(source), vec2(params.step_x, params.step_y)));
     vec4 sum = vec4(0.0);
     for (int group = 0; group < 5; ++group) {
         vec4 part = GROUP_SHARES[group] * means[group];

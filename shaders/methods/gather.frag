@@ -24,7 +24,7 @@ vec4 share(sampler2D image, int level)
     if (level >= LEVELS)
         return vec4(0.0);
     float weight = params.shares[level >> 2][level & 3];
-    return weight * upsample(image, vec2(0.0));
+    return weight * upsample(image, ivec2(UPSAMPLE), vec2(0.0));
 }
 
 vec4 shade()

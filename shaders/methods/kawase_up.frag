@@ -13,19 +13,13 @@ layout(set = 0, binding = 1) uniform sampler2D smaller;
 
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
+#include "lib/upsample.glsl"
 
 vec4 shade()
 {
-    Place place = PLACE_IN(smaller);
-    vec2 axial = vec2(params.offset, 0.0);
-    vec2 diagonal = vec2(0.5, -0.5) * params.offset;
-    vec4 sum = sample_at(smaller, place, axial.xy, SAMPLING);
-    sum += sample_at(smaller, place, -axial.xy, SAMPLING);
-    sum += sample_at(smaller, place, axial.yx, SAMPLING);
-    sum += sample_at(smaller, place, -axial.yx, SAMPLING);
-    vec4 diagonals = sample_at(smaller, place, diagonal.xx, SAMPLING);
-    diagonals += sample_at(smaller, place, diagonal.xy, SAMPLING);
-    diagonals += sample_at(smaller, place, diagonal.yx, SAMPLING);
-    diagonals += sample_at(smaller, place, diagonal.yy, SAMPLING);
-    return stored((sum + 2.0 * diagonals) / 12.0);
+    const ivec2 rows = ivec2(UPSAMPLE_PAIR, UPSAMPLE_LINEAR), columns = rows.yx;
+    vec4 axial = upsample(smaller, rows, vec2(params.offset, 0.0))
+               + upsample(smaller, columns, vec2(0.0, params.offset));
+    vec4 diagonal = upsample(smaller, ivec2(UPSAMPLE_PAIR), vec2(0.5 * params.offset));
+    return stored((axial + 2.0 * diagonal) / 12.0);
 }

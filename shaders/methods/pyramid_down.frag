@@ -1,5 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // Downsamples a level of the pyramid with 13 taps.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
@@ -13,14 +14,6 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #include "lib/fullscreen.glsl"
 
 #include "lib/thirteen_taps.glsl"
-
-// The weight of a group. With the firefly filter, brighter groups weigh less (Karis 2013).
-float group_share(vec4 mean, float share)
-{
-    if (FIREFLY_FILTER == 0)
-        return share;
-    return share / (1.0 + max(dot(mean.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0));
-}
 
 // The 13 taps from a level of exactly twice the size, where all taps are between texels. They are
 // added as two separable kernels, as in all variants of this pass (variants/halve.comp).
@@ -44,13 +37,6 @@ vec4 shade()
 {
     if (SAMPLING == SAMPLING_TEXEL)
         return stored(halved());
-    vec4 means[5] = group_means(PLACE_IN(source), vec2(params.step_x, params.step_y));
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    for (int group = 0; group < 5; ++group) {
-        float share = group_share(means[group], GROUP_SHARES[group]);
-        sum += share * means[group];
-        shares += share;
-    }
-    return stored(sum / shares);
+    vec2 tap_step = vec2(params.step_x, params.step_y);
+    return stored(pyramid_groups(thirteen_taps(PLACE_IN(source), tap_step)));
 }

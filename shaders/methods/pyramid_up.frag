@@ -34,7 +34,7 @@ vec4 shade()
 {
     vec4 level = SAMPLING == SAMPLING_TEXEL
                    ? doubled()
-                   : upsample(smaller, vec2(params.step_x, params.step_y));
+                   : upsample(smaller, ivec2(UPSAMPLE), vec2(params.step_x, params.step_y));
     vec4 sum = params.coarse * level;
     if (ADD_OWN != 0)
         sum += params.own * texelFetch(own, PIXEL, 0);

@@ -52,7 +52,7 @@ void main()
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         raw[i] = uvec4(0);
     for (int y = first.y; y < end; ++y) {
-        Axis axis = row_axis(rows_size, y, params.step_y);
+        Axis axis = row_axis(rows_size, y, UPSAMPLE, params.step_y);
         if (ADD_OWN != 0)
             load_own(first.x, y, raw);
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {

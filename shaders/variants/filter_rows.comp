@@ -42,8 +42,8 @@ void main()
     if (any(greaterThanEqual(first, size)))
         return;
     [[unroll]] for (int i = 0; i < FILTER_COLUMNS; ++i)
-        axes[i] = axis_x(place_in_size(source_size, ivec2(first.x + i, 0), size), params.step_x,
-                         source_size, vec2(source_size) / vec2(size));
+        axes[i] = axis_x(place_in_size(source_size, ivec2(first.x + i, 0), size), UPSAMPLE,
+                         params.step_x, source_size, vec2(source_size) / vec2(size));
     for (int y = first.y; y < end; ++y) {
         vec4 sums[FILTER_COLUMNS];
         [[unroll]] for (int i = 0; i < FILTER_COLUMNS; ++i)

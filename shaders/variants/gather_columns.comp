@@ -43,7 +43,7 @@ void add(usamplerBuffer image, int level, int first, int y)
     if (level >= LEVELS)
         return;
     ivec4 shape = read_shapes[level];
-    Axis axis = row_axis(shape.xy, y, 0.0);
+    Axis axis = row_axis(shape.xy, y, UPSAMPLE, 0.0);
     float weight = params.shares[level >> 2][level & 3];
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         sums[i] += weight * filter_column(image, shape, axis, first + i);

@@ -26,7 +26,10 @@
     FUNCTION(vkGetImageMemoryRequirements) \
     FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
     FUNCTION(vkAllocateMemory) \
-    FUNCTION(vkWaitForFences)
+    FUNCTION(vkWaitForFences) \
+    FUNCTION(vkQueuePresentKHR) \
+    FUNCTION(vkQueueWaitIdle) \
+    FUNCTION(vkDestroySemaphore)
 
 // What is below. Of the first instance and its first device, and good for all: these functions go
 // by their handles. Messages go to the instance that was created last.
@@ -241,6 +244,8 @@ static void change_memory(VkPhysicalDeviceMemoryProperties *memory)
         [CACHED_TYPE] = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT,
     };
 
+    for (uint32_t i = 0; lacks("heap") && i < memory->memoryHeapCount; ++i)
+        memory->memoryHeaps[i].size = 256 << 20;
     if (!lacks("memory"))
         return;
     memory->memoryTypeCount = TYPE_COUNT;
@@ -306,6 +311,47 @@ static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAl
     return below.vkAllocateMemory(handle, &changed, callbacks, memory);
 }
 
+static void object(const char *text)
+{
+    below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
+                  VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
+                  &(VkDebugUtilsMessengerCallbackDataEXT){
+                      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
+                      .pMessage = text,
+                  });
+}
+
+// Semaphores that presentations wait for. Only a wait for the queue tells that they have waited: a
+// semaphore must not be destroyed before, which the validation layer does not see.
+static struct {
+    VkSemaphore semaphores[256];
+    uint32_t count;
+} presented;
+
+static VKAPI_ATTR VkResult VKAPI_CALL present(VkQueue queue, const VkPresentInfoKHR *info)
+{
+    for (uint32_t i = 0; i < info->waitSemaphoreCount; ++i)
+        presented.semaphores[presented.count++ % 256] = info->pWaitSemaphores[i];
+    return below.vkQueuePresentKHR(queue, info);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL wait_idle(VkQueue queue)
+{
+    presented.count = 0;
+    return below.vkQueueWaitIdle(queue);
+}
+
+static VKAPI_ATTR void VKAPI_CALL destroy_semaphore(VkDevice handle, VkSemaphore semaphore,
+                                                    const VkAllocationCallbacks *callbacks)
+{
+    for (uint32_t i = 0; semaphore && i < presented.count && i < 256; ++i)
+        if (presented.semaphores[i] == semaphore) {
+            object("a presentation may still wait for the semaphore");
+            break;
+        }
+    below.vkDestroySemaphore(handle, semaphore, callbacks);
+}
+
 // Without "patience", the user presses Ctrl-C during the wait, after the validation layer has
 // objected.
 static VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice handle, uint32_t count, const VkFence *fences,
@@ -313,12 +359,7 @@ static VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice handle, uint32_t count, cons
 {
     if (!lacks("patience"))
         return below.vkWaitForFences(handle, count, fences, all, timeout);
-    below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
-                  VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
-                  &(VkDebugUtilsMessengerCallbackDataEXT){
-                      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
-                      .pMessage = "an objection",
-                  });
+    object("an objection");
     // The work is over by then, so that the renderer may drop the submission at once.
     below.vkWaitForFences(handle, count, fences, all, UINT64_MAX);
     raise(SIGINT);
@@ -407,6 +448,9 @@ static const struct entry {
     ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
     ENTRY(vkAllocateMemory, allocate, true),
     ENTRY(vkWaitForFences, wait, true),
+    ENTRY(vkQueuePresentKHR, present, true),
+    ENTRY(vkQueueWaitIdle, wait_idle, true),
+    ENTRY(vkDestroySemaphore, destroy_semaphore, true),
 };
 
 static PFN_vkVoidFunction find(const char *name, bool of_device)

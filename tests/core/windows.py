@@ -61,7 +61,7 @@ def difference(expected: NDArray[np.uint8], most: int = 0) -> int:
 def pixels(renderer: Renderer) -> None:
     """Every framebuffer that has colours, in every mode that there is."""
     window = open_window()
-    modes: tuple[Any, ...] = ("fifo", "mailbox", "immediate")
+    modes: tuple[Any, ...] = ("fifo", "mailbox")
     for mode in modes:
         with Surface(renderer, window, mode=mode) as surface:
             for step in range(4):

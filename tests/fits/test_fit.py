@@ -295,3 +295,20 @@ class TestParts:
         assert small.dtype == np.uint8
         np.testing.assert_array_equal(small, [[[9, 10, 11], [15, 16, 17]]])
         assert reduced(image, 1) is image
+
+
+def test_blas_computes_in_one_thread(renderer: Renderer) -> None:
+    """Threads of BLAS wait in a loop, and take the cores from a device that is a CPU."""
+    threadpoolctl = pytest.importorskip("threadpoolctl")
+    found: set[int] = set()
+
+    def loss(a: Image, b: Image) -> float:
+        found.update(one["num_threads"] for one in threadpoolctl.threadpool_info())
+        return float(np.abs(a - b).sum())
+
+    with threadpoolctl.threadpool_limits(2, user_api="blas"):
+        target = target_of(Separable(blur_scale=2.0))
+        vkbloom.fit(
+            IMAGE, target, Separable(), ["blur_scale"], loss=loss, renderer=renderer, max_calls=3
+        )
+    assert found == {1}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.fields import SIZE, Command
+from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.live_options import live_options
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.explorer.viewer import GLOW, Viewer
@@ -41,11 +42,13 @@ _LARGEST_PORT: Final = 65535
     help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred", show_default=True)
+@glow_options
 @live_options(image_has_size=False)
 def command(
     *,
     image: NDArray[Any] | None,
-    glow: dict[str, Any],
+    mask: str | None,
+    emission: str | None,
     port: int,
     opens: bool,
     size: tuple[int, int],
@@ -65,9 +68,12 @@ def command(
     import_extra("tornado", "notebook", "explore")
     looked_at: vkbloom.Scene | NDArray[Any]
     begun: vkbloom.Settings | None = settings
+    glow: dict[str, Any] = {}
     if image is not None:
         looked_at = image
+        glow = accompanying(mask, emission)(image)
     else:
+        refuse_glow_of_scene(mask, emission)
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)

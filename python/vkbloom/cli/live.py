@@ -20,7 +20,6 @@ P              the next preset
 Space          pauses the animation
 drag, wheel    turn the scene, zoom
 S              writes all framebuffers to files
-H              this help
 Q, Escape      close\
 """
 
@@ -48,8 +47,8 @@ class Live:
     time : float
         Of the animation, in turns.
     paused, closed : bool
-    wishes : set of str
-        What the window's owner is asked for: "screenshot", "help".
+    screenshot : bool
+        Whether one is asked for.
     """
 
     settings: Settings
@@ -58,10 +57,13 @@ class Live:
     time: float = 0.0
     paused: bool = False
     closed: bool = False
-    wishes: set[str] = dataclasses.field(default_factory=set)
+    screenshot: bool = False
 
     def press(self, key: str, names: list[str]) -> None:
         """Do what a key stands for; `names` are the framebuffers that there are."""
+        if key in "bmp":
+            # The next settings may lack the framebuffer.
+            self.framebuffer = "final"
         if key == "b":
             self.settings = self.settings.replace(bloom=not self.settings.bloom)
         elif key in ("up", "down"):
@@ -73,34 +75,29 @@ class Live:
         elif key == "m":
             classes = list(methods().values())
             at = classes.index(type(self.settings))
-            self.settings = self._displayed(classes[(at + 1) % len(classes)]())
+            shown = {name: getattr(self.settings, name) for name in ("tonemap", "encoding")}
+            self.settings = classes[(at + 1) % len(classes)](**shown)
         elif key == "p":
             presets = list(vkbloom.presets.values())
             at = presets.index(self.settings) if self.settings in presets else -1
             self.settings = presets[(at + 1) % len(presets)]
         elif key == "space":
             self.paused = not self.paused
-        elif key in ("s", "h"):
-            self.wishes.add("screenshot" if key == "s" else "help")
+        elif key == "s":
+            self.screenshot = True
         elif key in ("q", "escape"):
             self.closed = True
-
-    def _displayed(self, settings: Settings) -> Settings:
-        """Return settings with the tone map and the encoding of those before."""
-        before = self.settings
-        return settings.replace(tonemap=before.tonemap, encoding=before.encoding)
 
     def _step(
         self, fields: tuple[str, ...], step: float, limits: tuple[float, float] | None = None
     ) -> None:
-        for field in dataclasses.fields(self.settings):
-            if field.name == next((name for name in fields if hasattr(self.settings, name)), None):
-                low, high = field_range(field)
-                if limits:
-                    low, high = max(low, limits[0]), min(high, limits[1])
-                value = getattr(self.settings, field.name)
-                value = min(max(round(value + step, 4), low), high)
-                self.settings = self.settings.replace(**{field.name: value})
+        for name in [name for name in fields if hasattr(self.settings, name)][:1]:
+            (field,) = (one for one in dataclasses.fields(self.settings) if one.name == name)
+            low, high = field_range(field)
+            if limits:
+                low, high = max(low, limits[0]), min(high, limits[1])
+            value = round(getattr(self.settings, name) + step, 4)
+            self.settings = self.settings.replace(**{name: min(max(value, low), high)})
 
     def drag(self, x: float, y: float) -> None:
         """Turn the scene by pixels of the mouse."""
@@ -137,6 +134,5 @@ class Live:
             *(values if settings.bloom else ["no bloom"]),
             *(["paused"] if self.paused else []),
             *([f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s"] if seconds else []),
-            "H: help",
         ]
         return " | ".join(parts)

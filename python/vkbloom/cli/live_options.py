@@ -9,7 +9,6 @@ from typing import Any, Final
 import click
 
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
 from vkbloom.cli.program import given
 from vkbloom.cli.scene_options import scene_options
@@ -24,15 +23,14 @@ _OF_SCENE: Final = {"base": "--scene", "shading": "--shading", "size": "--size"}
 def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add IMAGE and its options, and those of the device, the scene and the settings.
 
-    The command gets the pixels of IMAGE as `image`, which is None for a scene, and its arguments
-    `mask` and `emission` as the dict `glow`. `image_has_size`: ``--size`` is also for an IMAGE.
+    The command gets the pixels of IMAGE as `image`, which is None for a scene. `image_has_size`:
+    ``--size`` is also for an IMAGE.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
         @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
         @subimage_option
         @layer_option
-        @glow_options
         @device_options
         @scene_options
         @settings_options
@@ -42,18 +40,15 @@ def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Call
             source: str | None,
             subimage: int,
             layer: str | None,
-            mask: str | None,
-            emission: str | None,
             **arguments: Any,
         ) -> Any:
             if source is None:
-                refuse_glow_of_scene(mask, emission)
-                return command(image=None, glow={}, **arguments)
+                return command(image=None, **arguments)
             for name, option in _OF_SCENE.items():
                 if given(name) and not (name == "size" and image_has_size):
                     raise click.UsageError(f"{option} is for a scene; leave it out with an IMAGE")
             image = read_picture(source, subimage, None, layer=layer).pixels
-            return command(image=image, glow=accompanying(mask, emission)(image), **arguments)
+            return command(image=image, **arguments)
 
         return run
 

@@ -24,7 +24,7 @@ from vkbloom.settings import SHADINGS, Shading
 _LARGEST: Final = (1600, 900)  # of the window that an image opens
 _TITLE_SECONDS: Final = 0.5  # between two lines of values
 _WAIT_SECONDS: Final = 0.1  # while nothing can be seen
-_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSHQ", *"123456789")
+_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"123456789")
 
 
 @click.command(cls=Command, epilog=f"\b\n{HELP}")
@@ -38,18 +38,17 @@ _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSHQ", *"1
 @click.option("--shading", type=click.Choice(SHADINGS), default="forward", show_default=True)
 @click.option(
     "--mode",
-    type=click.Choice(("fifo", "mailbox", "immediate")),
+    type=click.Choice(("fifo", "mailbox")),
     default="fifo",
     show_default=True,
-    help="fifo: a frame for each refresh of the screen; mailbox: the newest frame at each refresh; "
-    "immediate: each frame at once.",
+    help="fifo: a frame for each refresh of the screen; mailbox: the newest frame at each refresh.",
 )
 @click.option(
     "--frames",
     "count",
     metavar="N",
-    type=click.IntRange(min=1),
-    help="Close after N frames and print how many there were in a second.",
+    type=click.IntRange(min=2),
+    help="Close after N frames, and print how many there were in a second after the first one.",
 )
 @click.option(
     "-o",
@@ -63,10 +62,9 @@ _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSHQ", *"1
 def command(
     *,
     image: NDArray[Any] | None,
-    glow: dict[str, Any],
     size: tuple[int, int],
     shading: Shading,
-    mode: Literal["fifo", "mailbox", "immediate"],
+    mode: Literal["fifo", "mailbox"],
     count: int | None,
     out: Path,
     adapter: str,
@@ -86,17 +84,18 @@ def command(
         vkbloom.Renderer(adapter, validation=validation) as renderer,
         vkbloom.Surface(renderer, window, mode=mode) as surface,
     ):
-        uploaded = None if image is None else renderer.upload(image, **glow)
+        uploaded = None if image is None else renderer.upload(image)
         view = _View(renderer, uploaded, live, shading)
         view.listen(glfw, window)
-        begin = time.perf_counter()
-        done = 0
-        for done in view.frames(glfw, window, surface, out):
-            if done == count:
+        begin = 0.0
+        for number in view.frames(glfw, window, surface, out):
+            if number == 1:
+                # Until here, shaders were compiled.
+                begin = time.perf_counter()
+            elif number == count:
+                rate = (number - 1) / (time.perf_counter() - begin)
+                click.echo(f"{number} frames: {rate:.1f} frames a second after the first one")
                 break
-        if count is not None:
-            elapsed = time.perf_counter() - begin
-            click.echo(f"{done} frames in {elapsed:.2f} s: {done / elapsed:.1f} frames a second")
 
 
 @contextlib.contextmanager
@@ -126,19 +125,20 @@ class _View:
         live: Live,
         shading: Shading,
     ) -> None:
-        self._renderer, self._image, self._live, self._shading = renderer, image, live, shading
+        self._renderer, self._image, self._live = renderer, image, live
+        self._shading: dict[str, Any] = {} if image is not None else {"shading": shading}
 
+    @property
     def _source(self) -> Any:
         return self._live.scene if self._image is None else self._image
 
+    @property
     def _options(self) -> dict[str, Any]:
-        is_scene = self._image is None
-        return {"shading": self._shading, "time": self._live.time} if is_scene else {}
+        return {**self._shading, "time": self._live.time} if self._shading else {}
 
     def _names(self) -> list[str]:
         """Return the framebuffers that can be shown."""
-        shading: Shading = self._shading if self._image is None else "forward"
-        plan = self._renderer.plan(self._source(), self._live.settings, shading=shading)
+        plan = self._renderer.plan(self._source, self._live.settings, **self._shading)
         return [name for name, (shape, _) in plan.outputs.items() if len(shape) == 3]
 
     def _screenshot(self, folder: Path, size: tuple[int, int]) -> None:
@@ -146,7 +146,7 @@ class _View:
         if self._image is not None:
             frames = self._renderer.apply(self._image, settings)
         else:
-            frames = self._renderer.render(self._source(), settings, size, **self._options())
+            frames = self._renderer.render(self._source, settings, size, **self._options)
         for path in frames.save(folder):
             note(f"Wrote {path}")
 
@@ -172,15 +172,13 @@ class _View:
     def frames(self, glfw: Any, window: Any, surface: vkbloom.Surface, out: Path) -> Iterator[int]:
         """Show frames until the window is closed; yield how many there were."""
         live = self._live
-        numbers = itertools.count(1)
+        pictures = itertools.count(1)
         since = before = time.perf_counter()
         shown = counted = 0
         glfw.set_window_title(window, live.title(0.0))
         while not (live.closed or glfw.window_should_close(window)):
-            if live.framebuffer not in self._names():
-                live.framebuffer = "final"
             if surface.present(
-                self._source(), live.settings, attachment=live.framebuffer, **self._options()
+                self._source, live.settings, attachment=live.framebuffer, **self._options
             ):
                 shown += 1
                 yield shown
@@ -193,8 +191,6 @@ class _View:
             if now - since >= _TITLE_SECONDS and shown > counted:
                 glfw.set_window_title(window, live.title((now - since) / (shown - counted)))
                 since, counted = now, shown
-            if "screenshot" in live.wishes:
-                self._screenshot(out / f"{next(numbers):04}", surface.size)
-            if "help" in live.wishes:
-                click.echo(HELP)
-            live.wishes.clear()
+            if live.screenshot:
+                self._screenshot(out / f"{next(pictures):04}", surface.size)
+                live.screenshot = False

@@ -258,6 +258,22 @@ def _costs(renderer: Renderer, stage: _Stage, space: Space, framebuffer: str) ->
     return np.array(costs)
 
 
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let BLAS compute in one thread.
+
+    Its other threads wait for work in a loop after each call. These are small here, and on a CPU
+    such threads take the cores from the device.
+    """
+    try:
+        import threadpoolctl  # noqa: PLC0415  an extra
+    except ModuleNotFoundError:  # only time is lost
+        yield
+        return
+    with threadpoolctl.threadpool_limits(1, user_api="blas"):
+        yield
+
+
 def _fitted(
     renderer: Renderer,
     stages: list[_Stage],
@@ -290,10 +306,11 @@ def _fitted(
             costs=costs,
             told=told,
         )
-        if number:
-            search.refine(points)
-        else:
-            search.run(points)
+        with _one_thread():
+            if number:
+                search.refine(points)
+            else:
+                search.run(points)
         history += search.history
         points.append(search.best)
         searches.append(search)
