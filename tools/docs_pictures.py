@@ -132,11 +132,18 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
     labels = []
     for index, (name, settings) in enumerate(every.items()):
         row, column = divmod(index, columns)
-        frames = renderer.render(
-            scene, settings.replace(**look), size, shading="deferred", attachments=["final"]
-        )
+        changed = settings.replace(**look)
+        if settings.composite == "mix" and settings.intensity == 1:
+            # Such a bloom stands for the whole picture, not for its lights alone.
+            lit = renderer.render(scene, None, size, shading="deferred", attachments=["scene"])
+            final = renderer.apply(lit["scene"], changed, attachments=["final"])["final"]
+            final = np.rint(255 * np.clip(final.astype(np.float32), 0, 1)).astype(np.uint8)
+        else:
+            final = renderer.render(
+                scene, changed, size, shading="deferred", attachments=["final"]
+            )["final"]
         top, left = row * (size[1] + label), column * size[0]
-        sheet[top : top + size[1], left : left + size[0]] = frames["final"][:, :, :3]
+        sheet[top : top + size[1], left : left + size[0]] = final[:, :, :3]
         labels.append((left + 6, top + size[1] + 16, name))
     sheet = pictures.labelled(sheet, labels, 15)
     image = oiio.ImageBuf(sheet)

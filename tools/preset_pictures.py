@@ -40,7 +40,7 @@ def spread(renderer: vkbloom.Renderer, settings: vkbloom.Settings) -> NDArray[np
 def grey(bloom: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the bloom on the logarithmic scale, as 0..1."""
     with np.errstate(divide="ignore"):
-        decades = np.log10(bloom / bloom.max())
+        decades = np.log10(np.maximum(bloom, 0) / bloom.max())
     return np.clip(1 + decades / DECADES, 0, 1).astype(np.float32)
 
 

@@ -174,18 +174,21 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     const struct vkb_pass_row *up = NULL;
     struct vkb_pass_row row;
     struct vkb_double_final_params *params = &row.params.double_final;
+    const enum vkb_format format = plain->images[pass->targets[0]].format;
 
     if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
+    // The shader is compiled for one format. The levels of a published method may have their own.
     *fits = up && vkb_doubles(up) && !up->constants.add_own && !pass->constants.masked
-         && plain->images[pass->reads[0]].format == plain->images[pass->reads[1]].format
+         && plain->images[pass->reads[0]].format == format
+         && plain->images[pass->reads[1]].format == format
+         && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
          && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    make_doubling(choice, &row, double_final_shaders, double_final_words,
-                  plain->images[up->reads[0]].format);
+    make_doubling(choice, &row, double_final_shaders, double_final_words, format);
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];

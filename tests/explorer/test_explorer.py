@@ -72,7 +72,7 @@ class TestControls:
                 "separable": {"weights", "layers"},
                 "unreal": {"knee"},
             }
-            assert without == {"method", "bloom_size", "glare"} | refused.get(name, set())
+            assert without == {"method", "bloom_size"} | refused.get(name, set())
             assert method["fields"][0]["name"] == "bloom"
             for field in fields.values():
                 value = defaults[field["name"]]

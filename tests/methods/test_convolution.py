@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, cast
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom import (
-    AdapterInfo,
-    Convolution,
-    OutOfMemoryError,
-    Renderer,
-    Scene,
-    Settings,
-    psf,
-    reference,
-)
+from vkbloom import Convolution, Renderer, Settings, psf, reference
 from vkbloom.reference.convolution import convolve, prefiltered
 
 BOUNDARIES = ("zero", "edge", "wrap", "wrap_x")
@@ -162,6 +152,21 @@ def test_alpha_and_mask(renderer: Renderer) -> None:
         np.testing.assert_allclose(frames[name], expected[name], atol=1e-5)
 
 
+def test_emission_and_the_largest_alpha(renderer: Renderer) -> None:
+    """The bloom is that of the emission, and covers where the image is transparent."""
+    image, emission = np.clip(image_of(31, 22, 4), 0, 1), image_of(31, 22, 4)[::-1]
+    settings = Convolution(kernel_of(5, 7), alpha="max")
+    frames = renderer.apply(image, settings, emission=emission)
+    expected = reference.apply(image, settings, emission=emission)
+    assert list(frames) == list(expected)
+    for name, array in frames.items():
+        np.testing.assert_allclose(array, expected[name], atol=1e-5, err_msg=name)
+    # The emission and the alpha count.
+    assert np.abs(frames["final"] - renderer.apply(image, settings)["final"]).max() > 0.1
+    kept = renderer.apply(image, settings.replace(alpha="keep"), emission=emission)["final"]
+    assert (frames["final"][..., 3] - kept[..., 3]).max() > 0.1
+
+
 def test_prefilter(renderer: Renderer) -> None:
     """Of Unreal Engine: luminances above 7 become 15 (L - 7) + 7."""
     image = np.full((8, 8, 3), 8.0, np.float32)
@@ -277,26 +282,3 @@ def test_a_kernel_without_a_sum(renderer: Renderer) -> None:
     with pytest.raises(ValueError, match="psf: the sum of its red is 0, not above 0; use norm"):
         renderer.apply(image_of(4, 4), settings)
     assert_close(renderer, image_of(4, 4), settings.replace(normalize=False))
-
-
-def test_too_large(
-    monkeypatch: pytest.MonkeyPatch,
-    software: AdapterInfo,
-    new_renderer: Callable[[], Renderer],
-    scene: Scene,
-) -> None:
-    """An error of the plan, with the memory that is needed, before any work."""
-    # GPUs may have the memory that lavapipe refuses.
-    monkeypatch.setenv("VKBLOOM_ADAPTER", software.name)
-    renderer = new_renderer()
-    size = (8000, 8000)
-    # Three images of 8192 x 8192 or less, 16 bytes a texel.
-    with pytest.raises(OutOfMemoryError, match=r"[34]\d{3} MiB of images are needed"):
-        renderer.plan(scene, Convolution(kernel_of(3, 3), bloom_size=size), size)
-    # It does not first compute a kernel of four times the size.
-    convolution = Convolution(kernel_size=(15999, 15999), bloom_size=size)
-    with (
-        patch.object(Convolution, "core_kernel", side_effect=AssertionError),
-        pytest.raises(OutOfMemoryError, match="MiB of images are needed"),
-    ):
-        renderer.plan(scene, convolution, size)

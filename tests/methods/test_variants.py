@@ -195,6 +195,17 @@ def test_final_alone_has_the_bits_of_the_final_of_all(varied: Renderer, name: st
         np.testing.assert_array_equal(alone, varied.apply(image, presets[name])["final"])
 
 
+@pytest.mark.parametrize("name", ["pygfx", "blender_bloom"])
+def test_levels_of_another_format_than_the_frame(varied: Renderer, scene: Scene, name: str) -> None:
+    """Half floats, where a deferred frame has 8 bits: the fused last pass is for one format."""
+    alone = varied.render(
+        scene, presets[name], (128, 96), shading="deferred", attachments=("final",)
+    )
+    frames = varied.render(scene, presets[name], (128, 96), shading="deferred", time=0.5)
+    frames = varied.render(scene, presets[name], (128, 96), shading="deferred")
+    np.testing.assert_array_equal(alone["final"], frames["final"])
+
+
 def test_values_that_are_not_finite(varied: Renderer) -> None:
     image = hdr_picture(70, 50, 4, "float32")
     image[20, 30, 1] = np.nan

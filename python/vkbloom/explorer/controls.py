@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal
 
 from vkbloom import _core
+from vkbloom.glare import Glare
+from vkbloom.glares import glares
 from vkbloom.presets import presets
 from vkbloom.psf.base import PSF
 from vkbloom.settings import Settings, field_range, methods
@@ -62,7 +64,8 @@ def controls() -> dict[str, Any]:
         "methods": for each method its "defaults", and for each field with a control its "name",
         "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
         "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
-        range from "low" to "high", and "integer"; choices have "choices". "presets": settings by
+        range from "low" to "high", and "integer"; choices have "choices", and may have a name for
+        "none" of them. "presets": settings by
         name, as from `Settings.to_dict`. "look": the fields that keep their values when another
         preset or method is selected.
     """
@@ -103,6 +106,8 @@ def _control(
     kind: type[Settings], field: dataclasses.Field[Any], annotation: Any
 ) -> dict[str, Any] | None:
     """Return the control of a field; None for tuples, sizes, and fields that a method rejects."""
+    if field.name == "glare":
+        return {"kind": "choice", "choices": list(glares), "optional": True, "none": "none"}
     parts = typing.get_args(annotation)
     optional = type(None) in parts
     if optional:
@@ -203,6 +208,8 @@ def _arguments(settings: Settings, begun: Settings) -> str:
 
 
 def _literal(value: object) -> str:
+    if isinstance(value, tuple) and value and all(isinstance(one, Glare) for one in value):
+        return f"({', '.join(f'vkbloom.{one!r}' for one in value)},)"
     if isinstance(value, PSF):
         return f"vkbloom.psf.{value!r}"
     # Names of choices need no escapes.
