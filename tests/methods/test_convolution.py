@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterator
 from typing import Any, cast
 from unittest.mock import patch
@@ -305,9 +306,14 @@ def test_too_large(
     monkeypatch.setenv("VKBLOOM_ADAPTER", software.name)
     renderer = new_renderer()
     size = (8000, 8000)
-    # Three images of 8192 x 8192 or less, 16 bytes a texel.
-    with pytest.raises(OutOfMemoryError, match=r"[34]\d{3} MiB of images are needed"):
+    # Three images of 8192 x 8192 or less, 16 bytes a texel. Newer versions of lavapipe
+    # have all memory of the machine.
+    try:
         renderer.plan(scene, Convolution(kernel_of(3, 3), bloom_size=size), size)
+    except OutOfMemoryError as error:
+        assert re.search(r"[34]\d{3} MiB of images are needed", str(error))  # noqa: PT017
+    else:
+        pytest.skip("this device has the memory")
     # It does not first compute a kernel of four times the size.
     convolution = Convolution(kernel_size=(15999, 15999), bloom_size=size)
     with (
