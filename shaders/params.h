@@ -168,6 +168,12 @@
     INPUT(B, int, count) \
     VEC4S(B, ghosts, MOST_GHOSTS)
 
+// What a picture of dirt leaves of the light: base + share * dirt (dirt.frag).
+#define DIRT_BLOCK(B, READS, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    INPUT(B, float, base) \
+    INPUT(B, float, share)
+
 // The light of the deferred system.
 #define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
 
@@ -238,6 +244,7 @@
     BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(streaks, STREAKS_BLOCK) \
     BLOCK(flare, FLARE_BLOCK) \
+    BLOCK(dirt, DIRT_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
@@ -292,13 +299,16 @@
     SETTING(radius, 1.0, 0.001, 4.0) \
     SETTING(falloff, 0.0, 0.0, 64.0) \
     SETTING(vignette, 0.0, 0.0, 1.0) \
-    SETTING(width, 0.1, 0.001, 4.0)
+    SETTING(width, 0.1, 0.001, 4.0) \
+    SETTING(strength, 1.0, 0.0, 16.0)
 
 #define GLARE_COUNT_ROWS(COUNT) \
     COUNT(halvings, 1, 0, MOST_HALVINGS) \
     COUNT(directions, 6, 1, 16) \
     COUNT(base, 4, 2, MOST_TAPS) \
-    COUNT(iterations, 4, 1, 6)
+    COUNT(iterations, 4, 1, 6) \
+    COUNT(lerp, 0, 0, 1) \
+    COUNT(seed, 0, 0, 65535)
 
 // The largest values of 8 bits, of half floats and of floats.
 #define UNORM_LIMIT  1.0
@@ -352,6 +362,7 @@
 #define TEXEL_ROWS                    16
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
+#define GODOT_COLUMNS                 8
 #define TILE_LOADED                   64
 #define TILE_ROWS                     32
 #define TILE_RUNS                     4

@@ -20,7 +20,7 @@ struct stage {
 };
 
 typedef bool add_stage(const struct stage *stage, uint32_t *image, struct vkb_error *error);
-static add_stage vkb_add_streaks, vkb_add_ghosts, vkb_add_halo;
+static add_stage vkb_add_streaks, vkb_add_ghosts, vkb_add_halo, vkb_add_dirt;
 
 static const struct {
     const char *name;
@@ -170,6 +170,15 @@ static bool vkb_add_halo(const struct stage *stage, uint32_t *image, struct vkb_
     return add_flare(stage, VKB_SHADER_halo_frag, image, error);
 }
 
+// Dirt has no image of its own.
+static bool vkb_add_dirt(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+{
+    (void)stage;
+    (void)error;
+    *image = VKB_NO_IMAGE;
+    return true;
+}
+
 bool vkb_has_glare(const struct vkb_settings *settings)
 {
     return settings->values.bloom && settings->stage_count > 0;
@@ -242,7 +251,8 @@ bool vkb_add_stages(const struct vkb_settings *settings, const struct vkb_bloom_
     for (uint32_t i = 0; i < settings->stage_count; ++i) {
         stage.settings = &settings->stages[i];
         name_stage(settings, i, stage.name);
-        const int halvings = stage.settings->values.halvings;
+        const bool is_dirt = stage.settings->kind == VKB_STAGE_DIRT;
+        const int halvings = is_dirt ? 0 : stage.settings->values.halvings;
         if (!add_halvings(&stage.levels, halvings, images, &count, error))
             return false;
         stage.from = images[halvings];
@@ -252,6 +262,41 @@ bool vkb_add_stages(const struct vkb_settings *settings, const struct vkb_bloom_
     return true;
 }
 
+// Adds the picture of dirt and the pass that multiplies the light by it; *light becomes its image.
+static bool add_dirty_light(const struct vkb_levels *levels, const struct vkb_glare_values *values,
+                            uint32_t *light, struct vkb_error *error)
+{
+    const struct vkb_kernel_data *data = &levels->settings->dirt;
+    const struct vkb_image_row picture = {
+        .name = "dirt",
+        .format = VKB_FORMAT_RGBA32_FLOAT,
+        .width = data->width,
+        .height = data->height,
+        .pixels = data->pixels,
+        .serial = data->serial,
+    };
+    uint32_t dirt, dirty;
+
+    if (!vkb_graph_add_image(levels->graph, &picture, &dirt, error)
+        || !vkb_levels_step(levels, "dirty_light", 0, levels->source->final, &dirty, error))
+        return false;
+    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, dirty);
+    struct vkb_pass_row row = vkb_fetching_row(levels, VKB_SHADER_dirt_frag, *light, dirty);
+    row.reach = INFINITY;  // the picture has no bands of rows
+    row.reads[1] = dirt;
+    row.read_count = 2;
+    row.block = VKB_BLOCK_dirt;
+    row.params.dirt = (struct vkb_dirt_params){
+        .target_width = sampling.width,
+        .target_height = sampling.height,
+        .limit = sampling.limit,
+        .base = values->lerp ? 1.0f - values->strength : 0.0f,
+        .share = values->strength,
+    };
+    *light = dirty;
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
 bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    const uint32_t *stages, struct vkb_graph *graph, uint32_t *bloom,
                    struct vkb_error *error)
@@ -259,6 +304,7 @@ bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_s
     struct vkb_bloom_source floats = *source;
     struct vkb_levels levels = {.settings = settings, .source = &floats, .graph = graph};
     double shares[MAX_STAGES + 1] = {settings->values.intensity};
+    const struct vkb_glare_values *dirt = NULL;
     uint32_t light;
 
     // Not rounded where the bloom's buffers are coarse: the composite rounds.
@@ -266,11 +312,16 @@ bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_s
         floats.format = VKB_FORMAT_RGBA32_FLOAT;
     levels.downs[levels.count++] = *bloom;
     for (uint32_t i = 0; i < settings->stage_count; ++i) {
+        if (settings->stages[i].kind == VKB_STAGE_DIRT) {
+            dirt = &settings->stages[i].values;
+            continue;
+        }
         shares[levels.count] = settings->stages[i].values.intensity;
         levels.downs[levels.count++] = stages[i];
     }
     if (!vkb_levels_step(&levels, "light", 0, source->final, &light, error))
         return false;
     *bloom = light;
-    return vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, light, error);
+    return vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, light, error)
+        && (!dirt || add_dirty_light(&levels, dirt, bloom, error));
 }

@@ -46,11 +46,12 @@ struct vkb_kernel_data {
 };
 
 // Every stage of glare: STAGE(name in C, name in Python, of its framebuffer and of its vkb_add_
-// function).
+// function). Dirt is a stage without a framebuffer: it changes the sum of the others.
 #define VKB_STAGES(STAGE) \
     STAGE(STREAKS, streaks) \
     STAGE(GHOSTS, ghosts) \
-    STAGE(HALO, halo)
+    STAGE(HALO, halo) \
+    STAGE(DIRT, dirt)
 
 enum vkb_stage_kind {
 #define VKB_STAGE_ENUM(constant, name) VKB_STAGE_##constant,
@@ -82,6 +83,7 @@ struct vkb_settings {
     struct vkb_kernel_data kernel;
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;
+    struct vkb_kernel_data dirt;  // the picture of the stage of dirt
 };
 
 static inline bool vkb_is_published(const struct vkb_settings *settings)

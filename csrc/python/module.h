@@ -102,8 +102,13 @@ bool vkb_make_attributes(struct vkb_module_state *state);
 bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
                        struct vkb_settings *settings);
 
+struct vkb_held_kernel;
+
 // Reads the stages of glare of a settings object; without the attribute there are none.
 bool vkb_read_glare(PyObject *object, struct vkb_settings *settings);
+
+// Asks the stage of dirt, if there is one, for its picture.
+bool vkb_read_dirt(PyObject *object, struct vkb_held_kernel *held, struct vkb_settings *settings);
 
 // Sets the ValueError of a number that is out of its range; returns false.
 bool vkb_out_of_range(const char *name, PyObject *value, double low, double high);
@@ -198,7 +203,7 @@ struct vkb_plan_object {
     struct vkb_plan plan;
     uint64_t renderer;  // serial of its renderer; 0: none, for inspection only
     PyObject *outputs;  // ((name, shape, dtype), ...)
-    struct vkb_held_kernel kernel;
+    struct vkb_held_kernel kernel, dirt;
 };
 
 // Size in bytes of an output in the caller's array.

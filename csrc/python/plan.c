@@ -174,7 +174,8 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         return NULL;
     self->source = ((struct vkb_source_object *)source)->source;
     self->renderer = renderer;
-    if (!hold_kernel(state, device, settings_object, settings, self)) {
+    if ((settings->values.bloom && !vkb_read_dirt(settings_object, &self->dirt, settings))
+        || !hold_kernel(state, device, settings_object, settings, self)) {
         Py_DECREF(self);
         return NULL;
     }
@@ -468,10 +469,14 @@ PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps)
 
 static int traverse(PyObject *object, visitproc visit, void *arg)
 {
+    const struct vkb_plan_object *self = (struct vkb_plan_object *)object;
+
     Py_VISIT(Py_TYPE(object));
-    Py_VISIT(((struct vkb_plan_object *)object)->outputs);
-    if (((struct vkb_plan_object *)object)->kernel.held)
-        Py_VISIT(((struct vkb_plan_object *)object)->kernel.view.obj);
+    Py_VISIT(self->outputs);
+    if (self->kernel.held)
+        Py_VISIT(self->kernel.view.obj);
+    if (self->dirt.held)
+        Py_VISIT(self->dirt.view.obj);
     return 0;
 }
 
@@ -482,6 +487,7 @@ static void dealloc(PyObject *object)
     PyObject_GC_UnTrack(object);
     vkb_plan_destroy(&self->plan);
     vkb_release_kernel(&self->kernel);
+    vkb_release_kernel(&self->dirt);
     Py_XDECREF(self->outputs);
     vkb_free_object(object);
 }

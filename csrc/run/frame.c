@@ -194,47 +194,78 @@ static bool holds_constant(const struct vkb_cached_image *cached, const struct v
     return cached->content.valid && cached->content.version == row->serial;
 }
 
-// The first image of the graph that is filled once and does not hold its pixels; NULL: there is
-// none. A graph has one such image at most.
-static bool stage_constant(struct vkb_run *run, struct vkb_error *error)
+static size_t size_of_pixels(const struct vkb_image_row *row)
 {
+    return (size_t)row->width * row->height * vkb_pixel_size(row->format);
+}
+
+// Finds the images of the graph that are filled once and do not hold their pixels. Returns the size
+// of these in *size.
+static bool find_constants(struct vkb_run *run, const void **pixels, size_t *size,
+                           struct vkb_error *error)
+{
+    const size_t most = sizeof run->constants / sizeof run->constants[0];
+
+    *size = 0;
     for (uint32_t i = 0; i < run->graph->image_count; ++i) {
         const struct vkb_image_row *row = &run->graph->images[i];
-        const size_t size = (size_t)row->width * row->height * vkb_pixel_size(row->format);
         if (!row->serial)
             continue;
         if (!resolve(run, i, error))
             return false;
         if (holds_constant(run->images[i], row))
             continue;
+        if (run->constant_count == most)
+            return vkb_fail(error, VKB_ERROR_GENERAL, "graph: more than %zu images are filled once",
+                            most);
         run->images[i]->content.valid = false;
-        if (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
-            || !vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                                   size, &run->frame->constants, error))
-            return false;
-        memcpy(run->frame->constants.mapped, row->pixels, size);
-        if (!vkb_buffer_flush(run->device, &run->frame->constants, error))
-            return false;
-        run->constant = run->images[i];
-        run->constant->content.version = row->serial;
+        run->images[i]->content.version = row->serial;
+        pixels[run->constant_count] = row->pixels;
+        run->constant_starts[run->constant_count] = *size;
+        run->constants[run->constant_count++] = run->images[i];
+        *size += size_of_pixels(row);
     }
     return true;
 }
 
-static void record_constant(struct vkb_run *run)
+static bool stage_constants(struct vkb_run *run, struct vkb_error *error)
 {
-    struct vkb_image *image = &run->constant->image;
-    VkBufferImageCopy copy = {
-        .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
-        .imageExtent = {image->width, image->height, 1},
-    };
+    const void *pixels[sizeof run->constants / sizeof run->constants[0]];
+    struct vkb_buffer *staging = &run->frame->constants;
+    size_t size;
 
-    vkb_image_transition(run->device, run->submission->commands.buffer, image,
-                         VKB_ACCESS_COPY_TARGET);
-    run->device->vk.vkCmdCopyBufferToImage(
-        run->submission->commands.buffer, run->frame->constants.handle, image->handle,
-        vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1, &copy);
-    run->constant->content.valid = true;
+    if (!find_constants(run, pixels, &size, error))
+        return false;
+    if (size == 0)
+        return true;
+    if (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
+        || !vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                               size, staging, error))
+        return false;
+    for (uint32_t i = 0; i < run->constant_count; ++i) {
+        const size_t start = run->constant_starts[i];
+        const size_t end = i + 1 < run->constant_count ? run->constant_starts[i + 1] : size;
+        memcpy((char *)staging->mapped + start, pixels[i], end - start);
+    }
+    return vkb_buffer_flush(run->device, staging, error);
+}
+
+static void record_constants(struct vkb_run *run)
+{
+    for (uint32_t i = 0; i < run->constant_count; ++i) {
+        struct vkb_image *image = &run->constants[i]->image;
+        VkBufferImageCopy copy = {
+            .bufferOffset = run->constant_starts[i],
+            .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+            .imageExtent = {image->width, image->height, 1},
+        };
+        vkb_image_transition(run->device, run->submission->commands.buffer, image,
+                             VKB_ACCESS_COPY_TARGET);
+        run->device->vk.vkCmdCopyBufferToImage(
+            run->submission->commands.buffer, run->frame->constants.handle, image->handle,
+            vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1, &copy);
+        run->constants[i]->content.valid = true;
+    }
 }
 
 // The version of the scene, or of the input that was written last.
@@ -300,8 +331,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
     record_inputs(run);
-    if (run->constant)
-        record_constant(run);
+    record_constants(run);
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
                             error))
@@ -316,7 +346,7 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
 {
     run->graph = &requests[0].plan->graph;
     return (!source->scene || load_scene(run, source->scene, error))
-        && stage_inputs(run, source, error) && stage_constant(run, error)
+        && stage_inputs(run, source, error) && stage_constants(run, error)
         && reserve(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }

@@ -16,7 +16,11 @@ struct vkb_run {
     struct vkb_cached_image *inputs[VKB_INPUT_COUNT];   // by kind; NULL: none
     const struct vkb_upload *uploads[VKB_INPUT_COUNT];  // the sources of their pixels
     bool send_input[VKB_INPUT_COUNT];                   // the device does not have these pixels yet
-    struct vkb_cached_image *constant;  // to be filled by this submission; NULL: none
+    // Images to be filled by this submission, and where their pixels start in the staging memory: a
+    // kernel and a picture of dirt at most.
+    struct vkb_cached_image *constants[2];
+    size_t constant_starts[2];
+    uint32_t constant_count;
 };
 
 // The most descriptor sets that the graph's passes need, without those of surfaces.

@@ -32,7 +32,8 @@ from vkbloom.adapter import AdapterInfo, adapters
 from vkbloom.convolution import Convolution
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
-from vkbloom.glare import Ghosts, Glare, Halo, Streaks
+from vkbloom.glare import Dirt, Ghosts, Glare, GlareLight, Halo, Streaks
+from vkbloom.glares import glares
 from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
 from vkbloom.image import Image
 from vkbloom.plans import Pass, Plan
@@ -89,6 +90,7 @@ __all__ = [
     "Camera",
     "Convolution",
     "DeviceLostError",
+    "Dirt",
     "DualKawase",
     "Error",
     "FilamentBloom",
@@ -96,6 +98,7 @@ __all__ = [
     "Frames",
     "Ghosts",
     "Glare",
+    "GlareLight",
     "GodotBloom",
     "GridReport",
     "Halo",
@@ -124,6 +127,7 @@ __all__ = [
     "fit",
     "fit_pyramid",
     "gaussian_weights",
+    "glares",
     "grid_to_zarr",
     "presets",
     "psf",

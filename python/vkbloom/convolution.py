@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, NamedTuple, cast
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom.checks import check_size
+from vkbloom.glare import SERIALS
 from vkbloom.psf.base import PSF, check_above
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.resampling import box_resample
@@ -225,9 +225,6 @@ def _kernel(
     return kernel
 
 
-_serials = itertools.count(1)
-
-
 @functools.lru_cache(maxsize=8)
 def _core_kernel(
     settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
@@ -237,4 +234,4 @@ def _core_kernel(
     pixels[..., :3] = kernel
     pixels[..., 3] = kernel.mean(axis=2)
     first = pixels[..., :1]
-    return pixels, next(_serials), bool((pixels == first).all())
+    return pixels, next(SERIALS), bool((pixels == first).all())

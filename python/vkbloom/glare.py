@@ -7,13 +7,23 @@ Settings have a tuple of them, `Settings.glare`. The core declares their numbers
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Final, Literal, Self, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom.checks import check_floats, check_like, check_number
 
-__all__ = ["Ghosts", "Glare", "Halo", "Streaks", "check_glare", "stages"]
+__all__ = ["Dirt", "Ghosts", "Glare", "GlareLight", "Halo", "Streaks", "check_glare", "stages"]
+
+DirtMode = Literal["multiply", "lerp"]
+
+#: Numbers of images that the core fills once: no two of a process have the same.
+SERIALS: Final = itertools.count(1)
 
 
 def stage_field(name: str, default: float | None = None, unit: str = "1") -> Any:
@@ -30,19 +40,7 @@ class Glare:
 
     Stages are frozen and hashable. Their light is added to the bloom: with s the scene, b the
     bloom, i its intensity and g_k, i_k the framebuffer and the intensity of each stage, ``final``
-    is made of s and i b + sum of i_k g_k in place of i b.
-
-    Parameters
-    ----------
-    intensity : float
-        Factor of the stage's light, 0 to 65504.
-    threshold : float
-        What is subtracted from each channel of what the stage reads, 0 to 65504; negative
-        differences become 0. If alpha is blurred, it is multiplied by the factor of the brightest
-        channel.
-    halvings : int
-        How often the size of the bloom buffers is halved for the stage, 0 to 4, by the 13 taps of
-        `Pyramid`. Each halving makes the stage four times as fast, and its light coarser.
+    is made of s and i b + sum of i_k g_k in place of i b. `Dirt` multiplies this sum.
 
     Raises
     ------
@@ -53,15 +51,8 @@ class Glare:
 
     See Also
     --------
-    Ghosts, Halo, Streaks : The stages.
+    Ghosts, Halo, Streaks, Dirt : The stages.
     Settings : Takes stages as `glare`.
-
-    Notes
-    -----
-    A stage reads what glows: ``glow``, with threshold, mask and emission. Published methods apply
-    threshold and mask later than that, so that for the stages they are applied by themselves, by
-    the formulas of `Settings`. Outside of the picture there is no light. The framebuffers of stages
-    are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
 
     Examples
     --------
@@ -76,13 +67,9 @@ class Glare:
 
     stage: ClassVar[str]
 
-    intensity: float = stage_field("intensity")
-    threshold: float = stage_field("threshold")
-    halvings: int = stage_field("halvings")
-
     def __post_init__(self) -> None:
-        if type(self) is Glare:
-            raise TypeError("Glare is abstract; use a stage, such as Streaks")
+        if not hasattr(self, "stage"):
+            raise TypeError(f"{type(self).__name__} is abstract; use a stage, such as Streaks")
         for field in dataclasses.fields(self):
             if field.name in _core.GLARE_VALUES:
                 _, low, high = _core.GLARE_VALUES[field.name]
@@ -153,7 +140,45 @@ class Glare:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Streaks(Glare):
+class GlareLight(Glare):
+    """Base class of the stages that have light; use a stage's class, such as `Streaks`.
+
+    Parameters
+    ----------
+    intensity : float
+        Factor of the stage's light, 0 to 65504.
+    threshold : float
+        What is subtracted from each channel of what the stage reads, 0 to 65504; negative
+        differences become 0. If alpha is blurred, it is multiplied by the factor of the brightest
+        channel.
+    halvings : int
+        How often the size of the bloom buffers is halved for the stage, 0 to 4, by the 13 taps of
+        `Pyramid`. Each halving makes the stage four times as fast, and its light coarser.
+
+    See Also
+    --------
+    Ghosts, Halo, Streaks : The stages.
+
+    Notes
+    -----
+    A stage reads what glows: ``glow``, with threshold, mask and emission. Published methods apply
+    threshold and mask later than that, so that for the stages they are applied by themselves, by
+    the formulas of `Settings`. Outside of the picture there is no light. The framebuffers of stages
+    are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
+
+    Examples
+    --------
+    >>> vkbloom.Streaks(intensity=2, threshold=1).halvings
+    1
+    """
+
+    intensity: float = stage_field("intensity")
+    threshold: float = stage_field("threshold")
+    halvings: int = stage_field("halvings")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Streaks(GlareLight):
     """Rays from what glows, as of a star filter, or with one direction an anamorphic streak.
 
     Parameters
@@ -174,11 +199,11 @@ class Streaks(Glare):
     colour_shift : float
         How much less two channels of a tap are, 0 to 1, so that rays are coloured.
     **glare
-        The fields of `Glare`.
+        The fields of `GlareLight`.
 
     See Also
     --------
-    Glare : The fields of all stages.
+    GlareLight : The fields of all stages with light.
 
     Notes
     -----
@@ -218,7 +243,7 @@ class Streaks(Glare):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Ghosts(Glare):
+class Ghosts(GlareLight):
     """Pictures of what glows, mirrored and scaled about the centre, as reflections in a lens make.
 
     Parameters
@@ -238,7 +263,7 @@ class Ghosts(Glare):
     aberration : float
         How far red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
     **glare
-        The fields of `Glare`.
+        The fields of `GlareLight`.
 
     See Also
     --------
@@ -310,7 +335,7 @@ class Ghosts(Glare):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Halo(Glare):
+class Halo(GlareLight):
     """A ring around the centre of the picture, from what glows near the centre.
 
     Parameters
@@ -324,7 +349,7 @@ class Halo(Glare):
     aberration : float
         How far red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
     **glare
-        The fields of `Glare`.
+        The fields of `GlareLight`.
 
     See Also
     --------
@@ -361,9 +386,120 @@ class Halo(Glare):
     halvings: int = stage_field("halvings", default=2)
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Dirt(Glare):
+    """A picture of dirt on the lens, by which bloom and glare are multiplied.
+
+    Parameters
+    ----------
+    image : array-like, shape (H, W) or (H, W, 3), or None
+        Linear and finite; it is copied, as float32, and enlarged bilinearly to the frame. None: a
+        picture of 480 x 270 that is made from the seed.
+    seed : int
+        0 to 65535.
+    strength : float
+        The s of the formulas, 0 to 16; with "lerp" 0 to 1.
+    mode : {"multiply", "lerp"}
+        With the light L and the dirt D, L D s or L (1 + s (D - 1)).
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    Settings : Takes it among `glare`, once at the most.
+
+    Notes
+    -----
+    Source: "multiply" as in google/filament, colorGrading.mat @ 263d042924de; "lerp" as in
+    godotengine/godot, tonemap.glsl @ 001c8c9c24dc (the glow map).
+
+    Examples
+    --------
+    >>> image = np.ones((4, 4, 3), np.float32)
+    >>> dirt = vkbloom.Dirt(image=[[0.5, 1]], mode="lerp", strength=0.5)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     final = renderer.apply(image, vkbloom.Pyramid(glare=(dirt,)))["final"]
+    >>> final[0, :, 0]
+    array([1.75  , 1.8125, 1.9375, 2.    ], dtype=float32)
+    """
+
+    stage: ClassVar[str] = "dirt"
+
+    image: Any = None
+    seed: int = stage_field("seed")
+    strength: float = stage_field("strength")
+    mode: DirtMode = "multiply"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.mode not in get_args(DirtMode):
+            raise ValueError(f"mode: {self.mode!r} is not one of {', '.join(get_args(DirtMode))}")
+        if self.mode == "lerp":
+            check_number("strength", self.strength, 0, 1)
+        if self.image is not None:
+            # Imported here, since settings are used without point-spread functions, too.
+            from vkbloom.psf.sampled import check_values  # noqa: PLC0415
+
+            object.__setattr__(self, "image", check_values("image", self.image))
+
+    def to_dict(self) -> dict[str, Any]:  # noqa: D102  as of Glare
+        image = None if self.image is None else self.image.to_plain()
+        return {**super().to_dict(), "image": image}
+
+    @property
+    def lerp(self) -> int:
+        """Whether the mode is "lerp", for the core."""
+        return int(self.mode == "lerp")
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """The picture, shape (H, W) or (H, W, 3)."""
+        return _made_dirt(self.seed) if self.image is None else self.image.array
+
+    def core_kernel(self, frame: object, buffers: object) -> tuple[Any, ...]:
+        """Return the picture as the core reads a kernel."""
+        return (*_core_dirt(self.replace_look()), False, (1.0, 0.0, 1.0))
+
+    def replace_look(self) -> Dirt:
+        """Return the dirt with the defaults of all that its picture does not depend on."""
+        return Dirt(image=self.image, seed=self.seed)
+
+
+@functools.lru_cache(maxsize=4)
+def _core_dirt(dirt: Dirt) -> tuple[NDArray[np.float32], int]:
+    """Return (H, W, 4), the mean of the channels as alpha, and a number of its own."""
+    values = dirt.pixels
+    pixels = np.empty((*values.shape[:2], 4), np.float32)
+    pixels[..., :3] = values if values.ndim == 3 else values[..., np.newaxis]
+    pixels[..., 3] = pixels[..., :3].mean(axis=2)
+    return pixels, next(SERIALS)
+
+
+@functools.lru_cache(maxsize=4)
+def _made_dirt(seed: int) -> NDArray[np.float32]:
+    """Return soft discs and specks of 0 to 1, (270, 480)."""
+    random = np.random.default_rng(seed)
+    y, x = np.indices((270, 480), np.float32)
+    picture = np.full(x.shape, 0.1, np.float32)
+    for radius, light in ((20.0, 0.25), (8.0, 0.4), (2.5, 0.6)):
+        for _ in range(40):
+            size = radius * random.uniform(0.5, 1.5)
+            distance = np.hypot(x - random.uniform(0, 480), y - random.uniform(0, 270)) / size
+            picture += light * random.random() * np.clip(4 * (1 - distance), 0, 1)
+    made: NDArray[np.float32] = np.minimum(picture, 1).astype(np.float32)
+    made.flags.writeable = False
+    return made
+
+
 def stages() -> dict[str, type[Glare]]:
     """Return the class of each stage, by the stage's name."""
-    return {kind.stage: kind for kind in Glare.__subclasses__()}
+    kinds: list[type[Glare]] = [*GlareLight.__subclasses__(), Dirt]
+    return {kind.stage: kind for kind in kinds}
 
 
 def check_glare(glare: object) -> tuple[Glare, ...]:
@@ -371,16 +507,18 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
 
     Parameters
     ----------
-    glare : Glare, mapping, or a sequence of them
-        A mapping is what `Glare.to_dict` gave.
+    glare : Glare, mapping, a sequence of them, or None
+        A mapping is what `Glare.to_dict` gave; None is no stage.
 
     Raises
     ------
     ValueError
-        There are too many stages, or a mapping does not describe one.
+        There are too many stages, or a mapping does not describe a stage.
     TypeError
         Something else is among them.
     """
+    if glare is None:
+        return ()
     if isinstance(glare, Glare | Mapping):
         glare = (glare,)
     if isinstance(glare, str) or not isinstance(glare, Iterable):
@@ -391,6 +529,41 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
         if not isinstance(stage, Glare):
             raise TypeError(f"glare: {one!r} is not a stage, such as Streaks()")
         found.append(stage)
+    if sum(isinstance(stage, Dirt) for stage in found) > 1:
+        raise ValueError("glare: there is more than one stage of dirt")
     if len(found) > _core.MAX_STAGES:
         raise ValueError(f"glare: {len(found)} stages are out of range, 0 to {_core.MAX_STAGES}")
     return tuple(found)
+
+
+def stage_field_of(glare: tuple[Glare, ...], name: str) -> tuple[int, str]:
+    """Return the stage and the field of a name such as "glare.0.intensity".
+
+    Raises
+    ------
+    ValueError
+        There is no such stage, or it has no such field.
+    """
+    parts = name.split(".")
+    if len(parts) == 3 and parts[0] == "glare" and parts[1].isdecimal():
+        place = int(parts[1])
+        if place < len(glare) and parts[2] in glare[place].__dataclass_fields__:
+            return place, parts[2]
+    known = [
+        f"glare.{place}.{field.name}"
+        for place, stage in enumerate(glare)
+        for field in dataclasses.fields(stage)
+    ]
+    raise ValueError(
+        f"glare: {name!r} is not a field of a stage: {', '.join(known) or 'no stages'}"
+    )
+
+
+def replaced_stages(glare: tuple[Glare, ...], changes: Mapping[str, Any]) -> tuple[Glare, ...]:
+    """Return stages with some fields changed, by names such as "glare.0.intensity"."""
+    stages_now = list(glare)
+    for name, value in changes.items():
+        place, field = stage_field_of(glare, name)
+        changed: Any = dataclasses.replace(stages_now[place], **{field: value})
+        stages_now[place] = changed
+    return tuple(stages_now)

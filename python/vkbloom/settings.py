@@ -14,7 +14,8 @@ from typing import Any, ClassVar, Literal, Self, cast, get_args
 
 from vkbloom import _core
 from vkbloom.checks import as_float, check_floats, check_like, check_size
-from vkbloom.glare import Glare, check_glare
+from vkbloom.glare import Glare, replaced_stages, stage_field_of
+from vkbloom.glares import read_glare
 
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
@@ -126,7 +127,7 @@ class Settings:
         nearest one; negative values and NaN become 0; values above 65024 (64512 for blue) become
         this limit. Its arrays are float32. Published methods store only their levels in it:
         ``glow`` and ``bloom``, which are the frame before and after in an engine, are not rounded.
-    glare : sequence of Glare
+    glare : sequence of Glare, or a name of `vkbloom.glares`
         Up to 5 stages, such as `Streaks`, that read what glows and add light to the bloom. Each has
         a framebuffer of its name, with a number if there are several of a kind. In ``final``,
         i b + sum of i_k g_k stands in place of i b, with framebuffer g_k and intensity i_k of each.
@@ -190,7 +191,7 @@ class Settings:
             self._check_name("format", BLOOM_FORMATS)
         if self.bloom_size is not None:
             object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
-        object.__setattr__(self, "glare", check_glare(self.glare))
+        object.__setattr__(self, "glare", read_glare(self.glare))
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
         """Check a number and store it as a Python number; NumPy scalars print differently."""
@@ -212,7 +213,8 @@ class Settings:
         Parameters
         ----------
         **changes
-            New values by field.
+            New values by field. Those of a stage of `glare` have names such as
+            "glare.0.intensity": ``replace(**{"glare.0.intensity": 2})``.
 
         Returns
         -------
@@ -235,7 +237,27 @@ class Settings:
         >>> vkbloom.Separable(loops=2).replace(blur_scale=4).blur_scale
         4.0
         """
+        nested = {name: changes.pop(name) for name in [*changes] if "." in name}
+        if nested:
+            changes["glare"] = replaced_stages(read_glare(changes.get("glare", self.glare)), nested)
         return dataclasses.replace(self, **changes)
+
+    def value_of(self, name: str) -> Any:
+        """Return the value of a field, or of a stage's field, such as "glare.0.intensity".
+
+        See Also
+        --------
+        replace : Takes the same names.
+
+        Examples
+        --------
+        >>> vkbloom.Pyramid(glare=vkbloom.Streaks(fade=0.9)).value_of("glare.0.fade")
+        0.9
+        """
+        if "." not in name:
+            return getattr(self, name)
+        place, field = stage_field_of(self.glare, name)
+        return getattr(self.glare[place], field)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields by name, and ``method``.

@@ -44,6 +44,12 @@ def _window_surface(renderer: Renderer, window: object) -> int:
     return handle.value
 
 
+def _is_the_scene(settings: Settings) -> bool:
+    """Return whether a scene's `final` would be a copy of `scene`, for which a pass would run."""
+    shown = settings.tonemap, settings.encoding, settings.exposure, settings.dither
+    return not settings.bloom and shown == ("none", "none", 0.0, False)
+
+
 class Surface:
     """A window, or a display without one, on which a renderer presents framebuffers.
 
@@ -224,6 +230,8 @@ class Surface:
             given = image_source(source)
         else:
             frame = (width, height) if size is None else size
+            if attachment == "final" and _is_the_scene(settings):
+                names = ("scene",)
             given = scene_source(cast("Scene", source), frame, shading, time)
         core = self._renderer._core
         plan = core.plan(given, settings, names)

@@ -213,6 +213,19 @@ def test_the_default_is_the_renderers() -> None:
         ("--tonemap none", {"tonemap": "none"}),
         ("--tonemap agx --exposure -1.5", {"tonemap": "agx", "exposure": -1.5}),
         ("--loops 3 --first-tap 0 --texel x", {"loops": 3, "first_tap": 0, "texel": "x"}),
+        ("--glare none", {"glare": ()}),
+        ("--glare anamorphic+halo", {"glare": (*vkbloom.glares["anamorphic"], vkbloom.Halo())}),
+        (
+            "--glare streaks:directions=4,fade=0.5 --streaks 6 --ghosts --halo",
+            {
+                "glare": (
+                    vkbloom.Streaks(directions=4, fade=0.5),
+                    vkbloom.Streaks(directions=6),
+                    vkbloom.Ghosts(),
+                    vkbloom.Halo(),
+                )
+            },
+        ),
     ],
 )
 def test_options_become_settings(arguments: str, changes: dict[str, Any]) -> None:
@@ -237,6 +250,8 @@ def test_options_change_a_preset() -> None:
         ("--bloom-size 256", "'--bloom-size': '256' is not WxH|none"),
         ("--bloom-size 0x5", "bloom_size: (0, 5) is out of range"),
         ("--format rgba8", "'--format': 'rgba8' is not rgba8unorm|"),
+        ("--glare rain", "'--glare': 'rain' is not NAME[:A=1,...]+..."),
+        ("--streaks 17", "'--streaks': 17 is not in the range"),
         ("--tonemap filmic", "'--tonemap': 'filmic' is not one of 'none'"),
         ("--threshold high", "'--threshold': 'high' is not float|none"),
         ("--method box", "'--method': 'box'"),

@@ -244,6 +244,8 @@ static void change_memory(VkPhysicalDeviceMemoryProperties *memory)
         [CACHED_TYPE] = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT,
     };
 
+    for (uint32_t i = 0; lacks("heap") && i < memory->memoryHeapCount; ++i)
+        memory->memoryHeaps[i].size = 256 << 20;
     if (!lacks("memory"))
         return;
     memory->memoryTypeCount = TYPE_COUNT;

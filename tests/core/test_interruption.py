@@ -426,6 +426,8 @@ import vkbloom
 
 image = np.random.default_rng(3).random((16, 24, 3), dtype=np.float32)
 renderer = vkbloom.Renderer(validation=True)
+# Exit handlers of a GPU's driver may crash or hang in a child: docs/robustness.md, Forks.
+leaves = sys.argv[1] == "leave" or (renderer.info.type != "cpu" and sys.argv[1] != "exit")
 right = renderer.apply(image)["final"]
 batches = renderer.apply_many(image, [vkbloom.Separable()] * 9)
 next(batches); next(batches)
@@ -462,7 +464,7 @@ if child == 0:
         import traceback
         traceback.print_exc()
         os._exit(1)
-    if sys.argv[1] == "leave":
+    if leaves:
         os._exit(0)
     sys.exit(0)
 _, status = os.waitpid(child, 0)
@@ -477,7 +479,9 @@ print("parent done")
 @UNIX
 @LEAVES_BEHIND
 @pytest.mark.parametrize("how", ["close", "collect", "exit", "leave"])
-def test_a_forked_process(how: str, tmp_path: Path) -> None:
+def test_a_forked_process(how: str, renderer: Renderer) -> None:
+    if how == "exit" and renderer.info.type != "cpu":
+        pytest.skip("drivers of GPUs may not end in a child (docs/robustness.md, Forks)")
     done = subprocess.run(
         [sys.executable, "-c", CHILD, how], capture_output=True, text=True, timeout=120, check=False
     )

@@ -158,6 +158,37 @@ def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
     assert "whole uint8" not in wrong
 
 
+# Prints the errors of two plans that need more memory than the device has. The kernel of the second
+# one has four times the size of the image and must not be computed first.
+TOO_LARGE = """
+import os
+import numpy as np
+import vkbloom
+
+size = (2000, 2000)
+small = vkbloom.Convolution(np.ones((3, 3), np.float32), bloom_size=size)
+large = vkbloom.Convolution(kernel_size=(3999, 3999), bloom_size=size)
+with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as renderer:
+    for settings in (small, large):
+        if settings is large:
+            vkbloom.Convolution.core_kernel = None
+        try:
+            renderer.plan(vkbloom.Scene.ufo(), settings, size)
+        except vkbloom.OutOfMemoryError as error:
+            print(error)
+"""
+
+
+def test_a_convolution_of_too_much_memory(layer: Path, name: str) -> None:
+    """An error of the plan, with the memory that is needed, before any work."""
+    done = run(layer, name, "heap", ("-c", TOO_LARGE))
+    assert done.returncode == 0, done.stderr
+    words = r"\d+ MiB of images are needed, and the adapter .* has 256; use a smaller"
+    first, second = done.stdout.splitlines()
+    assert re.match(words, first), first
+    assert re.match(words, second), second
+
+
 def test_a_variant_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
     done = run(layer, name, "storage", VKBLOOM_FORM="tiles")
     assert "ValueError: VKBLOOM_FORM: tiles is not one of auto" in done.stderr

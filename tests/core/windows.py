@@ -73,6 +73,11 @@ def pixels(renderer: Renderer) -> None:
             frames = renderer.render(UFO, size=SIZE, shading="deferred", attachments=name)
             # The device's curve is not the exact one.
             assert difference(pictures.picture(frames[name], name), 1) <= 1, name
+        # `scene` is shown in place of a `final` that would be a copy of it.
+        for settings in (Separable(bloom=False), Separable(bloom=False, exposure=1.0)):
+            assert surface.present(UFO, settings)
+            expected = renderer.render(UFO, settings, SIZE)["final"]
+            assert difference(expected) == 0, settings
         settings = Separable(encoding="srgb", tonemap="aces")
         assert surface.present(UFO, settings, shading="deferred")
         frames = renderer.render(UFO, settings, SIZE, shading="deferred", attachments="final")

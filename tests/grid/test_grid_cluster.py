@@ -128,8 +128,9 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(client, "submit", counting)
     made = make(tmp_path / "a.zarr", client)
     assert made["done"].values.all()
-    # Two for each worker, one on its way out, the grid itself, and the layout's two.
-    assert most <= 2 * 2 + 4
+    # Of 96 points, two for each worker. As many that are done may not have left the scheduler yet,
+    # and there are the grid itself and the layout's two.
+    assert most <= 2 * (2 * 2) + 3
 
 
 def test_a_worker_that_is_killed(client: Any, tmp_path: Path, undisturbed: Path) -> None:

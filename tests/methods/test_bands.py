@@ -68,6 +68,7 @@ def test_bands_are_the_whole(renderer: Renderer, name: str, height: int, glows: 
         (vkbloom.Separable(bloom_scale=0.5), 511),
         (vkbloom.Pyramid(dither=True), 512),
         (vkbloom.Pyramid(glare=(vkbloom.Streaks(),)), 512),
+        (vkbloom.Pyramid(glare=(vkbloom.Dirt(),)), 512),
         (vkbloom.Pyramid(format="rg11b10ufloat"), 512),
         (vkbloom.PygfxBloom(filter_radius=1.0, intensity=0.5), 64),
     ],

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import itertools
-import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, cast
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom import (
-    AdapterInfo,
-    Convolution,
-    OutOfMemoryError,
-    Renderer,
-    Scene,
-    Settings,
-    psf,
-    reference,
-)
+from vkbloom import Convolution, Renderer, Settings, psf, reference
 from vkbloom.reference.convolution import convolve, prefiltered
 
 BOUNDARIES = ("zero", "edge", "wrap", "wrap_x")
@@ -293,31 +282,3 @@ def test_a_kernel_without_a_sum(renderer: Renderer) -> None:
     with pytest.raises(ValueError, match="psf: the sum of its red is 0, not above 0; use norm"):
         renderer.apply(image_of(4, 4), settings)
     assert_close(renderer, image_of(4, 4), settings.replace(normalize=False))
-
-
-def test_too_large(
-    monkeypatch: pytest.MonkeyPatch,
-    software: AdapterInfo,
-    new_renderer: Callable[[], Renderer],
-    scene: Scene,
-) -> None:
-    """An error of the plan, with the memory that is needed, before any work."""
-    # GPUs may have the memory that lavapipe refuses.
-    monkeypatch.setenv("VKBLOOM_ADAPTER", software.name)
-    renderer = new_renderer()
-    size = (8000, 8000)
-    # Three images of 8192 x 8192 or less, 16 bytes a texel. Newer versions of lavapipe
-    # have all memory of the machine.
-    try:
-        renderer.plan(scene, Convolution(kernel_of(3, 3), bloom_size=size), size)
-    except OutOfMemoryError as error:
-        assert re.search(r"[34]\d{3} MiB of images are needed", str(error))  # noqa: PT017
-    else:
-        pytest.skip("this device has the memory")
-    # It does not first compute a kernel of four times the size.
-    convolution = Convolution(kernel_size=(15999, 15999), bloom_size=size)
-    with (
-        patch.object(Convolution, "core_kernel", side_effect=AssertionError),
-        pytest.raises(OutOfMemoryError, match="MiB of images are needed"),
-    ):
-        renderer.plan(scene, convolution, size)

@@ -15,6 +15,7 @@ from vkbloom import reductions
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import read
 from vkbloom.cli.program import as_wrong_use
+from vkbloom.glare import stage_field_of
 
 __all__ = ["REDUCTIONS", "axis_bounds", "axis_values", "chunk_counts", "named_reductions"]
 
@@ -63,6 +64,8 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     for word in words:
         name, sign, text = word.partition("=")
         name = name.strip().replace("-", "_")
+        if name.startswith("glare."):
+            types[name] = _type_in_stage(settings, name)
         if not sign or not text:
             raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
         if name not in types:
@@ -70,6 +73,13 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
         room = _MOST_VALUES - sum(map(len, found.values()))
         found[name] = _values(word, text, types[name], room)
     return found
+
+
+def _type_in_stage(settings: vkbloom.Settings, name: str) -> Any:
+    """Return the type of a stage's field, such as glare.0.intensity."""
+    with as_wrong_use():
+        place, field = stage_field_of(settings.glare, name)
+    return typing.get_type_hints(type(settings.glare[place]))[field]
 
 
 def preset_named(name: str) -> vkbloom.Settings:

@@ -17,6 +17,7 @@ from vkbloom import psf
 from vkbloom.cli.program import given
 from vkbloom.convolution import PSFLike
 from vkbloom.glare import Glare
+from vkbloom.glares import glares
 from vkbloom.psf.base import PSF
 from vkbloom.views.descriptions import described_parameters
 
@@ -82,12 +83,15 @@ SIZE: Final = _Word("WxH", _read_size)
 
 
 def _read_glare(word: str) -> tuple[Glare, ...]:
-    """Read stages with their fields, such as streaks:directions=4,angle=45+streaks."""
+    """Read names of glares, and stages with their fields: streaks:directions=4,angle=45+halo."""
     if word.lower() in ("", "none"):
         return ()
-    found = []
+    found: list[Glare] = []
     for one in word.split("+"):
         name, _, rest = one.partition(":")
+        if name in glares:
+            found += glares[name]
+            continue
         fields = dict(part.split("=", 1) for part in rest.split(",") if part)
         found.append(Glare.from_dict({"stage": name} | {k: _plain(v) for k, v in fields.items()}))
     return tuple(found)
@@ -95,7 +99,7 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
 
 _OPTION_TYPES: Final[Mapping[object, _ParamType]] = {
     PSFLike: _Word("NAME[:A=1,...]|FILE", _read_psf),
-    tuple[Glare, ...]: _Word("STAGE[:A=1,...]+...", _read_glare),
+    tuple[Glare, ...]: _Word("NAME[:A=1,...]+...", _read_glare),
     float: click.FLOAT,
     int: click.INT,
     tuple[int, int]: SIZE,

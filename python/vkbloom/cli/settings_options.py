@@ -37,12 +37,14 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
         type=click.Choice(list(METHODS)),
         help="How the bloom is blurred, with that method's defaults [default the preset's]",
     )
+    @_glare_options
     @fields.options({"": vkbloom.Settings}, "shared")
     @fields.options(dict(METHODS), "own", base=vkbloom.Settings)
     @functools.wraps(command)
     def run(
         preset: str | None,
         method: str | None,
+        added: tuple[vkbloom.Glare, ...],
         shared: dict[str, Any],
         own: dict[str, Any],
         **rest: object,
@@ -50,7 +52,35 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
         if preset is None and method is None:
             preset = default_preset(any(rest.get(name) for name in _IMAGES))
         begun = _begun(preset, method)
+        if added:
+            shared["glare"] = (*shared.get("glare", begun.glare), *added)
         return command(settings=_changed(begun, {**shared, **own}), **rest)
+
+    return run
+
+
+def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add options for stages beside those of --glare; the argument `added` has them."""
+
+    @click.option("--streaks", type=click.IntRange(1, 16), help="Adds so many streaks to --glare")
+    @click.option("--ghosts", is_flag=True, help="Adds ghosts to --glare")
+    @click.option("--halo", is_flag=True, help="Adds a halo to --glare")
+    @click.option("--dirt", type=click.Path(), help="Adds dirt, the picture of a file, to --glare")
+    @functools.wraps(command)
+    def run(
+        streaks: int | None, ghosts: bool, halo: bool, dirt: str | None, **rest: object
+    ) -> object:
+        added: list[vkbloom.Glare] = []
+        if streaks is not None:
+            added.append(vkbloom.Streaks(directions=streaks))
+        if ghosts:
+            added.append(vkbloom.Ghosts())
+        if halo:
+            added.append(vkbloom.Halo())
+        if dirt is not None:
+            with as_wrong_use():
+                added.append(vkbloom.Dirt(image=vkbloom.read(dirt)[..., :3]))
+        return command(added=tuple(added), **rest)
 
     return run
 

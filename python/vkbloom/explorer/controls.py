@@ -10,6 +10,8 @@ from typing import Any, Final, Literal
 from vkbloom import _core
 from vkbloom.explorer.functions import functions
 from vkbloom.explorer.steps import slider_step
+from vkbloom.glare import Glare
+from vkbloom.glares import glares
 from vkbloom.presets import presets
 from vkbloom.psf.base import PSF
 from vkbloom.settings import Settings, field_range, methods
@@ -63,10 +65,10 @@ def controls() -> dict[str, Any]:
         "methods": for each method its "defaults", and for each field with a control its "name",
         "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
         "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
-        range from "low" to "high", and "integer"; choices have "choices". "functions": the
-        point-spread functions of a convolution, as from `functions`. "presets": settings by name,
-        as from `Settings.to_dict`. "look": the fields that keep their values when another
-        preset or method is selected.
+        range from "low" to "high", and "integer"; choices have "choices", and may have a name for
+        "none" of them. "functions": the point-spread functions of a convolution, as from
+        `functions`. "presets": settings by name, as from `Settings.to_dict`. "look": the fields
+        that keep their values when another preset or method is selected.
     """
     return {
         "methods": {
@@ -106,6 +108,8 @@ def _control(
     kind: type[Settings], field: dataclasses.Field[Any], annotation: Any
 ) -> dict[str, Any] | None:
     """Return the control of a field; None for tuples, sizes, and fields that a method rejects."""
+    if field.name == "glare":
+        return {"kind": "choice", "choices": list(glares), "optional": True, "none": "none"}
     parts = typing.get_args(annotation)
     optional = type(None) in parts
     if optional:
@@ -196,6 +200,8 @@ def _arguments(settings: Settings, begun: Settings) -> str:
 
 
 def _literal(value: object) -> str:
+    if isinstance(value, tuple) and value and all(isinstance(one, Glare) for one in value):
+        return f"({', '.join(f'vkbloom.{one!r}' for one in value)},)"
     if isinstance(value, PSF):
         return f"vkbloom.psf.{value!r}"
     # Names of choices need no escapes.

@@ -42,7 +42,7 @@ function control(field, changed) {
   }
   if (field.kind === "choice") {
     const names = plainly(field.choices);
-    if (field.optional) names.unshift(["", "automatic"]);
+    if (field.optional) names.unshift(["", field.none ?? "automatic"]);
     const select = choose(names, () => changed(select.value || null));
     return [[select], (value) => (select.value = value ?? ""), select];
   }

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_time
+from vkbloom.glare import stage_field_of
 from vkbloom.presets import presets
 from vkbloom.settings import Settings, check_settings
 from vkbloom.views.descriptions import described_parameters
@@ -126,11 +127,15 @@ def _whole_axis(name: str, values: object) -> Axis:
 
 def unit_and_description(settings: Settings, name: str) -> tuple[str, str]:
     """Return the unit of a settings field and the first sentence of its documentation."""
-    (field,) = (field for field in dataclasses.fields(settings) if field.name == name)
+    owner: Any = settings
+    if "." in name:
+        place, name = stage_field_of(settings.glare, name)
+        owner = settings.glare[place]
+    (field,) = (field for field in dataclasses.fields(owner) if field.name == name)
     texts: dict[str, str] = {}
-    for kind in reversed(type(settings).__mro__):
+    for kind in reversed(type(owner).__mro__):
         texts.update({key: text for key, text in described_parameters(kind).items() if text})
-    is_number = field.metadata or isinstance(getattr(settings, name), float)
+    is_number = field.metadata or isinstance(getattr(owner, name), float)
     return field.metadata.get("unit", "1") if is_number else "", texts.get(name, "")
 
 
@@ -191,7 +196,7 @@ def read_axes(
             continue
         for base in bases:
             fields = [field.name for field in dataclasses.fields(base)]
-            if name not in fields:
+            if name not in fields and not name.startswith("glare."):
                 raise ValueError(
                     f"axes: {name!r} is not a field of the method {base.method}"
                     f"{' or time' if has_time else ''}: {', '.join(fields)}"
@@ -199,7 +204,7 @@ def read_axes(
         # `replace` checks each value and converts it to the type that the settings store.
         listed = _sequence(name, values)
         own = [
-            tuple(getattr(base.replace(**{name: value}), name) for value in listed)
+            tuple(base.replace(**{name: value}).value_of(name) for value in listed)
             for base in bases
         ]
         found.append(Axis(name, own[0], "settings", *unit_and_description(bases[0], name)))

@@ -41,7 +41,7 @@ def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]
     counts = Counter(stage.stage for stage in glare)
     seen: Counter[str] = Counter()
     found = {}
-    for stage in glare:
+    for stage in _lights(glare):
         name = stage.stage
         number = f"_{seen[name]}" if counts[name] > 1 else ""
         seen[name] += 1
@@ -51,12 +51,28 @@ def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]
 
 
 def light(bloom: Array, intensity: float, images: Sequence[Array], glare: Sequence[Any]) -> Array:
-    """Return intensity * bloom + the images of the stages, each times its own intensity."""
-    height, width, _ = bloom.shape
+    """Return intensity * bloom + the images of the stages, each times its own intensity.
+
+    Dirt D of strength s, enlarged bilinearly, multiplies this by s D, or with "lerp" by
+    1 - s + s D; alpha by the mean of the channels of D.
+    """
+    height, width, channels = bloom.shape
     total = intensity * bloom
-    for image, stage in zip(images, glare, strict=True):
+    for image, stage in zip(images, _lights(glare), strict=True):
         total = total + stage.intensity * sample(image, (width, height))
+    for stage in glare:
+        if stage.stage == "dirt":
+            dirt = np.atleast_3d(stage.pixels.astype(np.float64))
+            dirt = np.broadcast_to(dirt, (*dirt.shape[:2], 3))
+            dirt = np.concatenate([dirt, dirt.mean(axis=2, keepdims=True)], axis=2)[..., :channels]
+            share = stage.strength * sample(np.ascontiguousarray(dirt), (width, height))
+            total = total * (share + (1 - stage.strength if stage.mode == "lerp" else 0))
     return total
+
+
+def _lights(glare: Sequence[Any]) -> list[Any]:
+    """Return the stages that have light of their own."""
+    return [stage for stage in glare if stage.stage != "dirt"]
 
 
 def _reduced(image: Array, halvings: int, store: Storage) -> Array:

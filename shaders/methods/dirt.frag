@@ -1,0 +1,20 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Dirt on the lens: the light of bloom and glare, multiplied by a picture.
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(DIRT_BLOCK);
+#include "lib/storage.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D light;
+layout(set = 0, binding = 2) uniform sampler2D dirt;
+
+#define TARGET_BINDING 3
+#include "lib/fullscreen.glsl"
+
+vec4 shade()
+{
+    vec4 left = params.base + params.share * sample_at(dirt, PLACE_IN(dirt), vec2(0.0), SAMPLING);
+    return stored(left * texelFetch(light, PIXEL, 0));
+}
