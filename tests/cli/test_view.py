@@ -133,4 +133,4 @@ def test_a_scene_s_options_are_refused_with_an_image() -> None:
     pytest.importorskip("glfw")
     done = view("vkbloom.cli", "view", "x.png", "--shading", "forward", env=dict(os.environ))
     assert done.returncode == 2
-    assert "leave them out with an IMAGE" in done.stderr
+    assert "leave it out with an IMAGE" in done.stderr

@@ -31,9 +31,10 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(package), "VKBLOOM_CACHE_DIR": ""}
 
 
-def walk(faulty: dict[str, str], stride: int) -> dict[str, dict[str, Any]]:
+def run(faulty: dict[str, str], walk: str, *arguments: str) -> str:
+    """Return what a walk of this folder prints."""
     done = subprocess.run(
-        [sys.executable, "-m", "tests.core.fault_walk", str(stride)],
+        [sys.executable, "-m", f"tests.core.{walk}", *arguments],
         cwd=ROOT,
         env=faulty,
         capture_output=True,
@@ -41,7 +42,11 @@ def walk(faulty: dict[str, str], stride: int) -> dict[str, dict[str, Any]]:
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    return done.stdout
+
+
+def walk(faulty: dict[str, str], stride: int) -> dict[str, dict[str, Any]]:
+    rows = [json.loads(line) for line in run(faulty, "fault_walk", str(stride)).splitlines()]
     return {row["workload"]: row for row in rows}
 
 
@@ -128,15 +133,7 @@ def test_memory_that_python_does_not_get(
 ) -> None:
     if importlib.util.find_spec("_testcapi") is None:
         pytest.skip("CPython's own tests, which can refuse it memory, are not here")
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.core.memory_walk"],
-        cwd=ROOT,
-        env=faulty,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    printed = run(faulty, "memory_walk")
     with capsys.disabled():
-        print(f"\n\nPython: {done.stdout.strip()}")
-    assert int(done.stdout.split()[4]) > 10
+        print(f"\n\nPython: {printed.strip()}")
+    assert int(printed.split()[4]) > 10

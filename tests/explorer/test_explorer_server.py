@@ -250,7 +250,7 @@ class TestCommand:
     def test_wrong_use(self) -> None:
         result = self.run("photo.exr", "--scene", "ufo")
         assert result.exit_code == 2
-        assert "leave them out with an IMAGE" in result.stderr
+        assert "leave it out with an IMAGE" in result.stderr
         assert self.run("--size", "0x3").exit_code == 2
 
     def test_failures(self, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -76,27 +76,13 @@ def test_names_shapes_and_dtypes(
 ) -> None:
     image = hdr_picture(40, 24, channels, dtype)
     frames = renderer.apply(image, METHODS[method])
+    # The level of 1 x 1, after 2 x 1, is not part of the chain.
+    downs = {"down_0": (12, 20), "down_1": (6, 10), "down_2": (3, 5), "down_3": (1, 2)}
+    chain = {**downs, "up_2": (3, 5), "up_1": (6, 10), "up_0": (12, 20)}
     blurs = {
         "tutorial": {"blur_vertical": (24, 40)},
-        # The level of 1 x 1, after 2 x 1, is not part of the chain.
-        "pyramid": {
-            "down_0": (12, 20),
-            "down_1": (6, 10),
-            "down_2": (3, 5),
-            "down_3": (1, 2),
-            "up_2": (3, 5),
-            "up_1": (6, 10),
-            "up_0": (12, 20),
-        },
-        "dual-kawase": {
-            "down_0": (12, 20),
-            "down_1": (6, 10),
-            "down_2": (3, 5),
-            "down_3": (1, 2),
-            "up_2": (3, 5),
-            "up_1": (6, 10),
-            "up_0": (12, 20),
-        },
+        "pyramid": chain,
+        "dual-kawase": chain,
     }[method]
     shapes = {"glow": (24, 40), **blurs, "bloom": (24, 40)}
     assert {name: array.shape for name, array in frames.items()} == {

@@ -15,13 +15,10 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.checks import import_extra
-from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
-from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
+from vkbloom.cli.live_options import live_options
 from vkbloom.cli.program import as_wrong_use, given
-from vkbloom.cli.scene_options import scene_options
-from vkbloom.cli.settings_options import settings_options
 from vkbloom.explorer.viewer import GLOW, Viewer
 from vkbloom.settings import SHADINGS, Shading
 
@@ -29,7 +26,6 @@ _LARGEST_PORT: Final = 65535
 
 
 @click.command(cls=Command)
-@click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
 @click.option(
     "--port",
     type=click.IntRange(0, _LARGEST_PORT),
@@ -46,23 +42,17 @@ _LARGEST_PORT: Final = 65535
     help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred", show_default=True)
-@subimage_option
-@layer_option
 @glow_options
-@device_options
-@scene_options
-@settings_options
+@live_options(image_has_size=False)
 def command(
     *,
-    source: str | None,
+    image: NDArray[Any] | None,
+    mask: str | None,
+    emission: str | None,
     port: int,
     opens: bool,
     size: tuple[int, int],
     shading: Shading,
-    subimage: int,
-    layer: str | None,
-    mask: str | None,
-    emission: str | None,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -76,19 +66,14 @@ def command(
     shading begins with the tone map "aces" and the encoding "srgb".
     """
     import_extra("tornado", "notebook", "explore")
-    if source is not None and (given("base") or given("shading") or given("size")):
-        raise click.UsageError(
-            "--scene, --shading and --size are for a scene; leave them out with an IMAGE"
-        )
-    if source is None:
-        refuse_glow_of_scene(mask, emission)
     looked_at: vkbloom.Scene | NDArray[Any]
     begun: vkbloom.Settings | None = settings
-    arguments: dict[str, Any] = {}
-    if source is not None:
-        looked_at = read_picture(source, subimage, None, layer=layer).pixels
-        arguments = accompanying(mask, emission)(looked_at)
+    glow: dict[str, Any] = {}
+    if image is not None:
+        looked_at = image
+        glow = accompanying(mask, emission)(image)
     else:
+        refuse_glow_of_scene(mask, emission)
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
@@ -97,9 +82,7 @@ def command(
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 
         def new_viewer() -> Viewer:
-            return Viewer(
-                looked_at, begun, size=size, shading=shading, renderer=renderer, **arguments
-            )
+            return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer, **glow)
 
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.

@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import click
+from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.checks import import_extra
-from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.image_files import layer_option, note, read_picture, subimage_option
+from vkbloom.cli.image_files import note
 from vkbloom.cli.live import HELP, Live
+from vkbloom.cli.live_options import live_options
 from vkbloom.cli.program import given
-from vkbloom.cli.scene_options import scene_options
-from vkbloom.cli.settings_options import settings_options
 from vkbloom.settings import SHADINGS, Shading
 
 _LARGEST: Final = (1600, 900)  # of the window that an image opens
@@ -29,7 +28,6 @@ _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"12
 
 
 @click.command(cls=Command, epilog=f"\b\n{HELP}")
-@click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
 @click.option(
     "--size",
     type=SIZE,
@@ -60,21 +58,15 @@ _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"12
     show_default=True,
     help="Folder of the screenshots.",
 )
-@subimage_option
-@layer_option
-@device_options
-@scene_options
-@settings_options
+@live_options(image_has_size=True)
 def command(
     *,
-    source: str | None,
+    image: NDArray[Any] | None,
     size: tuple[int, int],
     shading: Shading,
     mode: Literal["fifo", "mailbox"],
     count: int | None,
     out: Path,
-    subimage: int,
-    layer: str | None,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -82,25 +74,18 @@ def command(
 ) -> None:
     """Show the bloom of IMAGE, or of a scene, in a window with live controls."""
     glfw = import_extra("glfw", "window", "view")
-    if source is not None and (given("base") or given("shading")):
-        raise click.UsageError(
-            "--scene and --shading are for a scene; leave them out with an IMAGE"
-        )
-    shown: Any = None
-    if source is not None:
-        shown = read_picture(source, subimage, None, layer=layer).pixels
-        if not given("size"):
-            height, width = shown.shape[:2]
-            fit = min(1.0, _LARGEST[0] / width, _LARGEST[1] / height)
-            size = (max(1, int(width * fit)), max(1, int(height * fit)))
-    live = Live(settings, None if source is not None else scene())
+    if image is not None and not given("size"):
+        height, width = image.shape[:2]
+        fit = min(1.0, _LARGEST[0] / width, _LARGEST[1] / height)
+        size = (max(1, int(width * fit)), max(1, int(height * fit)))
+    live = Live(settings, scene() if image is None else None)
     with (
         _opened(glfw, size) as window,
         vkbloom.Renderer(adapter, validation=validation) as renderer,
         vkbloom.Surface(renderer, window, mode=mode) as surface,
     ):
-        image = None if shown is None else renderer.upload(shown)
-        view = _View(renderer, image, live, shading)
+        uploaded = None if image is None else renderer.upload(image)
+        view = _View(renderer, uploaded, live, shading)
         view.listen(glfw, window)
         begin = 0.0
         for number in view.frames(glfw, window, surface, out):

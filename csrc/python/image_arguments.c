@@ -1,0 +1,101 @@
+// Python's images and masks as the core's structs. All functions return false with an exception
+// set.
+#include "python/module.h"
+
+#include <string.h>
+
+// NumPy marks unaligned arrays with a prefix.
+char vkb_element_code(const Py_buffer *view)
+{
+    const char *format = view->format ? view->format : "B";
+
+    if (*format == '@' || *format == '=')
+        ++format;
+    return strlen(format) == 1 ? *format : 0;
+}
+
+bool vkb_has_element(const Py_buffer *view, const char *codes)
+{
+    char code = vkb_element_code(view);
+    return code && strchr(codes, code);
+}
+
+enum vkb_format vkb_pixel_format(char code)
+{
+    return code == 'B' ? VKB_FORMAT_RGBA8_UNORM
+         : code == 'e' ? VKB_FORMAT_RGBA16_FLOAT
+                       : VKB_FORMAT_RGBA32_FLOAT;
+}
+
+static bool hold_image(PyObject *array, struct vkb_held_image *image)
+{
+    image->held = PyObject_GetBuffer(array, &image->view, PyBUF_STRIDES | PyBUF_FORMAT) == 0;
+    return image->held;
+}
+
+static bool has_sides(const Py_buffer *view)
+{
+    return view->shape[0] >= 1 && view->shape[1] >= 1 && view->shape[0] <= INT32_MAX
+        && view->shape[1] <= INT32_MAX;
+}
+
+bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
+{
+    const Py_buffer *view = &image->view;
+
+    if (!hold_image(array, image))
+        return false;
+    if (!vkb_has_element(view, "Bef")) {
+        PyErr_Format(PyExc_TypeError, "%s: an array of uint8, float16 or float32 is needed", name);
+        return false;
+    }
+    if (view->ndim != 3 || !has_sides(view) || (view->shape[2] != 3 && view->shape[2] != 4)) {
+        PyErr_Format(PyExc_ValueError, "%s: a shape of (H, W, 3) or (H, W, 4) is needed", name);
+        return false;
+    }
+    image->input = (struct vkb_input){
+        .memory = view->buf,
+        .row_stride = view->strides[0],
+        .pixel_stride = view->strides[1],
+        .channel_stride = view->strides[2],
+        .format = vkb_pixel_format(vkb_element_code(view)),
+        .width = (uint32_t)view->shape[1],
+        .height = (uint32_t)view->shape[0],
+        .channels = (uint32_t)view->shape[2],
+    };
+    return true;
+}
+
+bool vkb_read_mask(PyObject *array, struct vkb_held_image *image)
+{
+    const Py_buffer *view = &image->view;
+
+    if (!hold_image(array, image))
+        return false;
+    if (!vkb_has_element(view, "f")) {
+        PyErr_SetString(PyExc_TypeError, "mask: an array of float32 is needed");
+        return false;
+    }
+    if (view->ndim != 2 || !has_sides(view)) {
+        PyErr_SetString(PyExc_ValueError, "mask: a shape of (H, W) is needed");
+        return false;
+    }
+    image->input = (struct vkb_input){
+        .memory = view->buf,
+        .row_stride = view->strides[0],
+        .pixel_stride = view->strides[1],
+        .channel_stride = sizeof(float),
+        .format = VKB_FORMAT_R32_FLOAT,
+        .width = (uint32_t)view->shape[1],
+        .height = (uint32_t)view->shape[0],
+        .channels = 1,
+    };
+    return true;
+}
+
+void vkb_release_image(struct vkb_held_image *image)
+{
+    if (image->held)
+        PyBuffer_Release(&image->view);
+    image->held = false;
+}

@@ -1,0 +1,55 @@
+"""The arguments of commands that show an IMAGE or a scene with live controls."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, Final
+
+import click
+
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
+from vkbloom.cli.program import given
+from vkbloom.cli.scene_options import scene_options
+from vkbloom.cli.settings_options import settings_options
+
+__all__ = ["live_options"]
+
+#: Options of a scene, by the names of their parameters.
+_OF_SCENE: Final = {"base": "--scene", "shading": "--shading", "size": "--size"}
+
+
+def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add IMAGE and its options, and those of the device, the scene and the settings.
+
+    The command gets the pixels of IMAGE as `image`, which is None for a scene. `image_has_size`:
+    ``--size`` is also for an IMAGE.
+    """
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
+        @subimage_option
+        @layer_option
+        @device_options
+        @scene_options
+        @settings_options
+        @functools.wraps(command)
+        def run(
+            *,
+            source: str | None,
+            subimage: int,
+            layer: str | None,
+            **arguments: Any,
+        ) -> Any:
+            if source is None:
+                return command(image=None, **arguments)
+            for name, option in _OF_SCENE.items():
+                if given(name) and not (name == "size" and image_has_size):
+                    raise click.UsageError(f"{option} is for a scene; leave it out with an IMAGE")
+            image = read_picture(source, subimage, None, layer=layer).pixels
+            return command(image=image, **arguments)
+
+        return run
+
+    return add
