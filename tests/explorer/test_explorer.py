@@ -85,7 +85,7 @@ class TestControls:
                     assert value is None or field["low"] <= value <= field["high"]
                     assert field["integer"] == (type(value) is int)
                 elif field["kind"] == "choice":
-                    assert value in field["choices"] or (value is None and field["optional"])
+                    assert value in field["choices"] or (value in (None, []) and field["optional"])
                 else:
                     assert type(value) is bool
 
