@@ -362,6 +362,7 @@
 #define TEXEL_ROWS                    16
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
+#define GODOT_COLUMNS                 8
 #define TILE_LOADED                   64
 #define TILE_ROWS                     32
 #define TILE_RUNS                     4

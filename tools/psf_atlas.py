@@ -13,6 +13,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
+from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom import psf
@@ -22,6 +23,7 @@ mpl.use("agg")
 # Pixels per degree of 1920 pixels in 50 degrees.
 SCALE = 1920 / 50
 SIDE = 255
+PRESET_SIZE = (512, 512)
 SHOWN: dict[str, tuple[psf.PSF, str]] = {
     "spencer photopic": (psf.spencer(), "day"),
     "spencer mesopic": (psf.spencer("mesopic"), "dusk"),
@@ -51,12 +53,24 @@ def draw_pictures(path: Path) -> None:
     plt.close(figure)
 
 
-def draw_curves(path: Path) -> None:
+def of_presets() -> dict[str, psf.PSF]:
+    """Return the point spread of each preset, without its threshold; none where it is 0."""
+    found: dict[str, psf.PSF] = {}
+    for name, settings in vkbloom.presets.items():
+        linear = settings.replace(threshold=None)
+        # Bevy's prefilter makes 0.0001 of black.
+        black = vkbloom.reference.blur(np.zeros((*PRESET_SIZE, 3)), linear, format="rgba32float")
+        spread = psf.measured(linear, PRESET_SIZE).own_array() - black
+        if spread.max() > 0:
+            found[name] = psf.samples(spread)
+    return found
+
+
+def draw_curves(shown: dict[str, psf.PSF], radii: NDArray[np.float64], path: Path) -> None:
     """Write radial profiles, encircled energies and transfer functions, of green."""
     figure, (profile, energy, transfer) = plt.subplots(1, 3, figsize=(15, 6), layout="constrained")
-    radii = np.geomspace(0.5, 2000, 80)
     cycles = np.linspace(0, 0.5, 60)
-    for number, (name, (one, _)) in enumerate(SHOWN.items()):
+    for number, (name, one) in enumerate(shown.items()):
         style = {"color": mpl.colormaps["tab20"](number), "label": name}
         # Rings of pixels, in pixels of the picture.
         unit = SCALE if one.unit == "degree" else 1.0
@@ -95,6 +109,38 @@ def table() -> str:
     return "\n".join(rows)
 
 
+def preset_table(shown: dict[str, psf.PSF]) -> str:
+    """Return the figures of each preset's point spread as a table in Markdown."""
+    rows = [
+        "| preset | energy | share of the peak pixel | within 10 pixels | within 100 pixels |",
+        "|---|---|---|---|---|",
+    ]
+    for name, one in shown.items():
+        energy = one.energy()[1]
+        peak = one.array(PRESET_SIZE)[..., 1].max()
+        near, far = one.encircled_energy([10.0, 100.0])[:, 1] / energy
+        rows.append(f"| `{name}` | {energy:.4g} | {peak / energy:.3g} | {near:.4g} | {far:.4g} |")
+    return "\n".join(rows)
+
+
+def preset_section(docs: Path) -> str:
+    """Draw the curves of the presets, and return their part of the page."""
+    shown = of_presets()
+    # Smaller rings would have a few pixels, or none.
+    draw_curves(shown, np.geomspace(3, 400, 30), docs / "pictures" / "psf_presets.png")
+    left_out = ", ".join(f"`{name}`" for name in vkbloom.presets if name not in shown)
+    return (
+        "## Of the presets\n\n"
+        f"What one pixel of 1 becomes in the middle of {PRESET_SIZE[0]} x {PRESET_SIZE[1]} pixels, "
+        "without the preset's threshold. Methods with\nsoft thresholds of their own make "
+        "something else of brighter pixels. The energy is what the bloom has, before\nthe "
+        f"composite. {left_out} removes a single pixel as a firefly.\n\n"
+        "![Radial profiles, encircled energies, transfer functions of presets]"
+        "(pictures/psf_presets.png)\n\n"
+        f"{preset_table(shown)}\n"
+    )
+
+
 def fit_table() -> str:
     """Return how near a pyramid comes to each function, by its number of levels."""
     counts = (2, 4, 6, 8)
@@ -122,7 +168,8 @@ def main() -> None:
     parser.add_argument("docs", nargs="?", type=Path, default=Path("docs"))
     docs = parser.parse_args().docs
     draw_pictures(docs / "pictures" / "psf_atlas.jpg")
-    draw_curves(docs / "pictures" / "psf_curves.png")
+    functions = {name: one for name, (one, _) in SHOWN.items()}
+    draw_curves(functions, np.geomspace(0.5, 2000, 80), docs / "pictures" / "psf_curves.png")
     (docs / "psf_atlas.md").write_text(
         "# Atlas of point-spread functions\n\n"
         "<!-- Made by tools/psf_atlas.py. -->\n\n"
@@ -139,7 +186,7 @@ def main() -> None:
         "the number of\nlevels: root mean square of the difference of logarithms, in decades, of "
         "what is at least 1e-4 of the peak. A share\nof the light stays where it is, the last "
         "column for 8 levels.\n\n"
-        f"{fit_table()}\n"
+        f"{fit_table()}\n\n{preset_section(docs)}"
     )
 
 

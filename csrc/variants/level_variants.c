@@ -11,6 +11,7 @@ static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
     VKB_BY_FORMAT(double_final_comp);
 static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
 static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
+static const enum vkb_shader godot_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(godot_rows);
 static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
@@ -99,6 +100,35 @@ static bool weights_taps(const struct vkb_pass_row *pass)
     }
 }
 
+// Whether the target has exactly half of the size of the image that the pass reads.
+static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    const struct vkb_image_row *source = &graph->images[pass->reads[0]];
+    const struct vkb_image_row *target = &graph->images[pass->targets[0]];
+
+    return source->width == 2 * target->width && source->height == 2 * target->height;
+}
+
+bool vkb_add_godot_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        bool *fits, struct vkb_error *error)
+{
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == VKB_SHADER_godot_blur_frag
+         && pass->constants.direction == DIRECTION_HORIZONTAL && is_half(&choice->plain, pass)
+         && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
+         && vkb_fits_words(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.sampling = 0;
+    vkb_drop_reads(&row, 1);
+    vkb_make_words(&row, godot_words[choice->plain.images[pass->reads[0]].format], GODOT_COLUMNS,
+                   FILTER_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                          bool *fits, struct vkb_error *error)
 {
@@ -106,8 +136,7 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     struct vkb_pass_row row;
 
-    *fits = weights_taps(pass) && source->width == 2 * target->width
-         && source->height == 2 * target->height
+    *fits = weights_taps(pass) && is_half(&choice->plain, pass)
          && vkb_formats[source->format].vk == vkb_formats[target->format].vk
          && vkb_fits_words(choice, pass);
     if (!*fits)

@@ -141,7 +141,9 @@ glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
         "unreal_flare": _unreal(),
         "blender_ghosts": _blender_ghosts(),
         "blender_streaks": _blender_streaks(),
-        "anamorphic": (Streaks(directions=1, threshold=1, fade=0.985, base=6, iterations=3),),
+        "anamorphic": (
+            Streaks(directions=1, threshold=1, fade=0.97, base=6, iterations=3, intensity=0.3),
+        ),
         "godot_dirt": (Dirt(strength=0.8, mode="lerp"),),
     }
 )

@@ -13,6 +13,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
+#include "lib/godot.glsl"
 
 // The position from which a sample is read: samples are clamped in pairs.
 int paired(int place, int length)
@@ -21,18 +22,12 @@ int paired(int place, int length)
     return min(pair + (place & 1), length - 1);
 }
 
-// In units of the cap, which is at least 6. Negative luminances count as 0.
-float luminance(vec4 value)
-{
-    return max(dot(value.rgb, vec3(0.299, 0.587, 0.114)), 0.0) / max(params.luminance_cap, 6.0);
-}
-
 vec4 read(ivec2 pixel, ivec2 size)
 {
     if (DIRECTION == DIRECTION_VERTICAL)
         return texelFetch(source, pixel, 0);
     vec4 value = sample_at(source, place_in(source, pixel, size), vec2(0.0), SAMPLING);
-    return FIRST != 0 ? value / (1.0 + luminance(value)) : value;
+    return dimmed(value);
 }
 
 // The part of a colour that glows.
@@ -58,7 +53,6 @@ vec4 end(vec4 sum)
 
 vec4 shade()
 {
-    const float weights[5] = float[](0.2024, 0.1790, 0.1240, 0.0672, 0.0285);
     ivec2 size = ivec2(params.target_width, params.target_height);
     vec4 sum = vec4(0.0);
     for (int tap = -4; tap <= 4; ++tap) {
@@ -67,7 +61,7 @@ vec4 shade()
             pixel.x = paired(pixel.x + tap, size.x);
         else
             pixel.y = paired(pixel.y + tap, size.y);
-        sum += weights[abs(tap)] * read(pixel, size);
+        sum += GODOT_WEIGHTS[abs(tap)] * read(pixel, size);
     }
     return stored(DIRECTION == DIRECTION_HORIZONTAL ? sum : end(sum));
 }

@@ -24,12 +24,7 @@ WRITE_IMAGE(2);
 #define AXIS_TEXEL(at) load_pixel(image, read_shapes[0], clamp(at, 0, read_shapes[0].x - 1), line)
 #include "lib/axis_filter.glsl"
 
-void store_float(int x, int row, vec4 value)
-{
-    int at = (row - target_shape.w) * target_shape.z + x;
-    if (x < target_shape.x)
-        target.row_words[at] = max(floatBitsToUint(value), uvec4(unknown_zero));
-}
+#include "variants/store_float.glsl"
 
 void main()
 {

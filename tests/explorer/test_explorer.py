@@ -85,7 +85,7 @@ class TestControls:
                     assert value is None or field["low"] <= value <= field["high"]
                     assert field["integer"] == (type(value) is int)
                 elif field["kind"] == "choice":
-                    assert value in field["choices"] or (value is None and field["optional"])
+                    assert value in field["choices"] or (value in (None, []) and field["optional"])
                 else:
                     assert type(value) is bool
 
@@ -95,6 +95,26 @@ class TestControls:
                 ends = [field["from"], field["to"]] if field["kind"] == "number" else [False, True]
                 for value in field.get("choices", ends):
                     METHODS[name](**{field["name"]: value})
+
+    def test_point_spread_functions(self) -> None:
+        """Every value that a control offers makes a function."""
+        described = json.loads(json.dumps(controls(), allow_nan=False))["functions"]
+        for name, function in described.items():
+            defaults = function["defaults"]
+            assert defaults["psf"] == name
+            assert settings_from({"method": "convolution", "psf": defaults})
+            for field in function["fields"]:
+                assert field["help"], (name, field)
+                *outer, key = field["name"].split(".")
+                value = defaults[outer[0]][key] if outer else defaults[key]
+                if field["kind"] == "number":
+                    assert field["from"] <= value <= field["to"]
+                    assert field["integer"] == (type(value) is int)
+                for end in field.get("choices", [field.get("from"), field.get("to")]):
+                    made = json.loads(json.dumps(defaults))
+                    (made[outer[0]] if outer else made)[key] = end
+                    assert settings_from({"method": "convolution", "psf": made})
+        assert {field["name"] for field in described["cie_total"]["fields"]} == {"age", "pigment"}
 
     def test_the_ranges_that_were_asked_for(self) -> None:
         fields = {field["name"]: field for field in controls()["methods"]["separable"]["fields"]}

@@ -105,7 +105,7 @@ def read(page: Page, folder: Path) -> NDArray[np.uint8]:
 
 
 def field(page: Page, name: str) -> Locator:
-    return page.locator(f"[data-field={name}]")
+    return page.locator(f'[data-field="{name}"]')
 
 
 def wait_for_code(page: Page, code: str) -> None:
@@ -185,6 +185,23 @@ def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_p
     # And when a preset is chosen.
     page.get_by_label("preset").select_option("jimenez2014")
     wait_for_code(page, 'vkbloom.presets["jimenez2014"].replace(exposure=2.0)')
+
+
+def test_point_spread_functions(page: Page) -> None:
+    page.get_by_label("preset").select_option("camera_lens")
+    wait_for_code(page, 'vkbloom.presets["camera_lens"]')
+    assert field(page, "psf").input_value() == "harvey_shack"
+    field(page, "surfaces").fill("20")
+    page.locator(".vkb-foot code", has_text="surfaces=20").wait_for()
+    field(page, "psf").select_option("gaussian")
+    page.locator(".vkb-foot code", has_text="vkbloom.psf.gaussian(sigma=8.0)").wait_for()
+    field(page, "psf").select_option("aperture")
+    field(page, "mask.blades").fill("5")
+    page.locator(".vkb-foot code", has_text="blades=5").wait_for()
+    # The preset is as before.
+    page.get_by_label("preset").select_option("iris_6")
+    wait_for_code(page, 'vkbloom.presets["iris_6"]')
+    assert field(page, "mask.blades").input_value() == "6"
 
 
 def test_what_is_refused_is_said(page: Page) -> None:

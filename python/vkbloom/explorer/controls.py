@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal
 
 from vkbloom import _core
+from vkbloom.explorer.functions import functions
+from vkbloom.explorer.steps import slider_step
 from vkbloom.glare import Glare
 from vkbloom.glares import glares
 from vkbloom.presets import presets
@@ -50,7 +52,6 @@ _SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
 }
 # Fields that come first, in addition to the numbers that only this method has.
 _FIRST: Final = ("bloom", "threshold", "intensity", "exposure", "tonemap")
-_STEPS_OF_A_SLIDER: Final = 200
 # Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
@@ -65,15 +66,16 @@ def controls() -> dict[str, Any]:
         "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
         "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
         range from "low" to "high", and "integer"; choices have "choices", and may have a name for
-        "none" of them. "presets": settings by
-        name, as from `Settings.to_dict`. "look": the fields that keep their values when another
-        preset or method is selected.
+        "none" of them. "functions": the point-spread functions of a convolution, as from
+        `functions`. "presets": settings by name, as from `Settings.to_dict`. "look": the fields
+        that keep their values when another preset or method is selected.
     """
     return {
         "methods": {
             name: {"defaults": kind().to_dict(), "fields": _fields(kind)}
             for name, kind in METHODS.items()
         },
+        "functions": functions(),
         "presets": {name: settings.to_dict() for name, settings in presets.items()},
         "look": _LOOK,
     }
@@ -135,7 +137,7 @@ def _control(
         "high": high,
         "from": start,
         "to": end,
-        "step": 1 if integer else _round_step((end - start) / _STEPS_OF_A_SLIDER),
+        "step": 1 if integer else slider_step(start, end),
     }
 
 
@@ -146,16 +148,6 @@ def _takes(kind: type[Settings], name: str, value: Any) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _round_step(step: float) -> float:
-    """Return the largest step of 1, 2 or 5 times a power of ten that is not above a step."""
-    for power in range(3, -9, -1):
-        for digit in (5, 2, 1):
-            # Parsed from text, since a product may not be the nearest float.
-            if (round_one := float(f"{digit}e{power}")) <= step * (1 + 1e-9):
-                return round_one
-    raise ValueError(f"step: {step!r} is too small")
 
 
 def settings_from(fields: object) -> Settings:

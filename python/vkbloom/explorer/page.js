@@ -897,6 +897,49 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     showPlan();
   }
 
+  // A labelled control. `change` puts a value into the settings.
+  function fieldRow(field, value, change) {
+    const [parts, show, first] = control(field, (next) => {
+      change(next);
+      presetSelect.value = "";
+      request(editing);
+    });
+    show(value);
+    first.dataset.field = field.name;
+    const words = field.name.split(".").at(-1).replaceAll("_", " ");
+    const text = make("span", { textContent: words });
+    const row = make("label", { className: `vkb-field vkb-${field.kind}`, title: field.help });
+    row.append(text, make("span", { className: "vkb-parts" }, ...parts));
+    return row;
+  }
+
+  // The choice of a convolution's function, and its parameters. Functions without controls, which
+  // hold arrays, are shown by name. Objects of presets are copied, not changed.
+  function functionRows(own) {
+    const known = setup.functions;
+    const choices = Object.keys(known);
+    if (!(own.psf in known)) choices.unshift(own.psf);
+    const kind = { name: "psf", kind: "choice", choices, help: "the point-spread function" };
+    const choice = fieldRow(kind, own.psf, (name) => {
+      settings[editing].psf = known[name]?.defaults ?? own;
+      buildFields();
+      fields.querySelector('[data-field="psf"]').focus();
+    });
+    const parameters = (known[own.psf]?.fields ?? []).map((field) => {
+      const path = field.name.split(".");
+      const value = path.reduce((object, key) => object?.[key], own);
+      // A mask of numbers has no blades.
+      if (value === undefined) return null;
+      return fieldRow(field, value, (next) => {
+        const now = settings[editing].psf;
+        const [key, inner] = path;
+        const changed = inner ? { ...now[key], [inner]: next } : next;
+        settings[editing].psf = { ...now, [key]: changed };
+      });
+    });
+    return [choice, ...parameters.filter((row) => row !== null)];
+  }
+
   function buildFields({ keepPreset = false } = {}) {
     const wasOpen = fields.querySelector("details")?.open ?? false;
     if (!keepPreset) presetSelect.value = "";
@@ -904,18 +947,13 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     methodSelect.value = current.method;
     const rows = { true: [], false: [] };
     for (const field of setup.methods[current.method].fields) {
-      const [parts, show, first] = control(field, (value) => {
+      const row = fieldRow(field, current[field.name], (value) => {
         settings[editing][field.name] = value;
-        presetSelect.value = "";
-        request(editing);
       });
-      show(current[field.name]);
-      first.dataset.field = field.name;
-      const text = make("span", { textContent: field.name.replaceAll("_", " ") });
-      const row = make("label", { className: `vkb-field vkb-${field.kind}`, title: field.help });
-      row.append(text, make("span", { className: "vkb-parts" }, ...parts));
       rows[field.first].push(row);
     }
+    // After the switch of the bloom.
+    if (current.psf) rows.true.splice(1, 0, ...functionRows(current.psf));
     fields.replaceChildren(
       ...rows.true,
       make("details", { open: wasOpen }, make("summary", { textContent: "More" }), ...rows.false),

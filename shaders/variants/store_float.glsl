@@ -1,0 +1,7 @@
+// Stores a pixel to a target of single floats.
+void store_float(int x, int row, vec4 value)
+{
+    int at = (row - target_shape.w) * target_shape.z + x;
+    if (x < target_shape.x)
+        target.row_words[at] = max(floatBitsToUint(value), uvec4(unknown_zero));
+}
