@@ -1,5 +1,7 @@
 """Make docs/pictures/night.jpg: a made-up city at night, without bloom and with it.
 
+night_psf.jpg beside it has a part of the city with each preset that is a convolution.
+
 The picture is computed here, from rectangles and random numbers: lights are up to 60 times as
 bright as a white wall in the same exposure, as in an HDR photograph.
 """
@@ -13,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
+from vkbloom.views import pictures
 
 Image = NDArray[np.float32]
 
@@ -106,6 +109,28 @@ def water(image: Image, random: np.random.Generator) -> None:
         image[horizon + row] = reflected * 0.34 + np.array([0.002, 0.003, 0.006], np.float32)
 
 
+def draw_convolutions(renderer: vkbloom.Renderer, image: Image, target: Path) -> None:
+    """Write a part of the picture without bloom and with each convolution, in two rows."""
+    look = {"exposure": 0.6, "tonemap": "agx", "encoding": "srgb"}
+    every: dict[str, vkbloom.Settings] = {"no bloom": vkbloom.Separable(bloom=False)}
+    every |= {
+        name: settings
+        for name, settings in vkbloom.presets.items()
+        if isinstance(settings, vkbloom.Convolution)
+    }
+    top, left, height, width = 190, 420, 290, 400
+    sheet = np.ones((2 * height, 3 * width, 3), np.uint8)
+    labels = []
+    for index, (name, settings) in enumerate(every.items()):
+        final = renderer.apply(image, settings.replace(**look), attachments=["final"])["final"]
+        y, x = index // 3 * height, index % 3 * width
+        part = np.clip(final[top : top + height, left : left + width], 0, 1)
+        sheet[y : y + height, x : x + width] = np.rint(255 * part)
+        labels.append((x + 8, y + 22, name))
+    shown = pictures.labelled(sheet, labels, 17).astype(np.float32) / 255
+    print(vkbloom.write(target, shown, encoding="none", quality=88))
+
+
 def main() -> None:
     """Write the picture: the left half without bloom, the right half with it."""
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures/night.jpg")
@@ -115,6 +140,7 @@ def main() -> None:
             renderer.apply(image, settings, attachments=["final"])["final"]
             for settings in (SETTINGS.replace(bloom=False), SETTINGS)
         )
+        draw_convolutions(renderer, image, target.with_name("night_psf.jpg"))
     middle = SIZE[0] // 2
     shown = np.concatenate([plain[:, :middle], bloom[:, middle:]], axis=1)
     shown[:, middle - 1 : middle + 1] = 1

@@ -60,7 +60,7 @@ static bool places_rows(const struct vkb_graph *graph, const struct vkb_pass_row
         || (pass->band_rows == VKB_BAND_ANY_ROW && pass->constants.sampling == SAMPLING_FETCH);
 }
 
-// Makes the first row of a band that of a row of an image, an even one.
+// Makes bands start at an even row of an image.
 static bool align(struct vkb_bands *bands, uint32_t image_height, uint32_t height)
 {
     const uint32_t own = 2 * (height / common_divisor(height, image_height));
@@ -122,7 +122,7 @@ bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t he
             bands->levels[bands->level_count++] = image;
         }
     }
-    // What is tall may be in either part.
+    // A pass that reads and writes images of full height may be in either part.
     bands->reach = (uint32_t)ceil(before + after);
     for (uint32_t i = 0; i < bands->level_count; ++i)
         if (graph->images[bands->levels[i]].format == VKB_FORMAT_RG11B10_UFLOAT)
@@ -189,7 +189,7 @@ static void keep_images(struct vkb_graph *graph, const bool *wanted, uint32_t *p
         struct vkb_image_row *row = &graph->images[i];
         if (!wanted[i])
             continue;
-        // Under a name that no pass writes: the image is cached by it.
+        // No pass writes an image of this name, by which the image is cached.
         if (row->input >= VKB_INPUT_LEVEL)
             snprintf(row->name, sizeof row->name, "level_%d", row->input - VKB_INPUT_LEVEL);
         graph->images[kept] = *row;

@@ -20,7 +20,7 @@ struct vkb_fft_line vkb_fft_line(uint32_t least);
 // each, the longest first. False: there are none.
 bool vkb_fft_group_radices(uint32_t length, uint32_t *radices);
 
-// How lines lie, and what is there of them before the transform.
+// How the lines lie, and which of their elements exist before the transform.
 struct vkb_fft_axis {
     enum vkb_mode direction;
     enum vkb_boundary boundary;  // not wrap_x
@@ -29,8 +29,8 @@ struct vkb_fft_axis {
     struct vkb_fft_line line;
 };
 
-// A stage along an axis, on its way forth or back, of so many lines, from one image of single
-// floats to another or to itself. The caller may change what it adds to the row.
+// A stage of the forward or inverse transform of all lines along an axis, from one image of single
+// floats to another or to itself. The caller may change the row.
 struct vkb_fft_stage {
     const char *name;
     const struct vkb_fft_axis *axis;

@@ -25,9 +25,9 @@ struct vkb_screen *vkb_screen_create(const struct vkb_device *device, struct vkb
 void vkb_screen_destroy(const struct vkb_device *device, struct vkb_frame *frame,
                         struct vkb_screen *screen);
 
-// Presents the plan's first output, which a submission before this one leaves in the frame's
-// images. It is as large as the surface, where that has the proportions of the plan's `final`; else
-// black bars are added. *shown: whether there was an image to show it on.
+// Presents the plan's first output, which an earlier submission has left in the frame's images. The
+// output is scaled to the surface. If the proportions of `final` differ from those of the surface,
+// black bars are added. *shown: whether the swapchain had an image.
 bool vkb_screen_show(struct vkb_device *device, struct vkb_frame *frame, struct vkb_screen *screen,
                      const struct vkb_plan *plan, const struct vkb_swapchain_spec *spec,
                      bool *shown, struct vkb_error *error);

@@ -65,7 +65,7 @@ bool vkb_swapchain_create(const struct vkb_device *device, VkSurfaceKHR surface,
     return done;
 }
 
-// All but the surface and the handle, which the next swapchain takes over.
+// Keeps the surface and the handle, which the next swapchain takes over.
 static void destroy_images(const struct vkb_device *device, struct vkb_swapchain *swapchain)
 {
     const struct VolkDeviceTable *vk = &device->vk;
@@ -95,7 +95,7 @@ void vkb_swapchain_destroy(const struct vkb_device *device, struct vkb_swapchain
     *swapchain = (struct vkb_swapchain){0};
 }
 
-// Whether levels pass as they are, or linear light is encoded, and blits can write it.
+// Whether blits can write the format, and it keeps levels, or encodes linear light.
 static bool fits(const struct vkb_device *device, const VkSurfaceFormatKHR *format, bool linear)
 {
     VkFormatProperties properties;
@@ -223,7 +223,7 @@ bool vkb_swapchain_renew(const struct vkb_device *device, struct vkb_swapchain *
     VkSurfaceCapabilitiesKHR surface;
 
     swapchain->stale = true;
-    // The device may have run all, and not have presented it: that waits for semaphores, too.
+    // The device may have finished all commands, while presentations still wait for semaphores.
     if (!VK(error, device->vk.vkQueueWaitIdle(device->queue))
         || !VK(error, device->instance->vk.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
                           device->adapter.physical, swapchain->surface, &surface)))
