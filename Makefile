@@ -12,6 +12,8 @@ CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) setup.py p
 # Test processes. All tests of a file run in one process, which makes its fixtures once.
 WORKERS := $(shell nproc 2>/dev/null || echo 2)
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+# One thread of lavapipe in each of them: with more they take a quarter more time from each other.
+test check sanitize: export LP_NUM_THREADS := 1
 # The tests that a change of the core or of a method breaks first. They reach every layer, and have no
 # other process, browser or large image.
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \

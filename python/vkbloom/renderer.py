@@ -226,6 +226,7 @@ class Renderer:
         >>> renderer.closed
         True
         """
+        self._planned = None
         self._core.close()
 
     def capture(self, path: str | os.PathLike[str]) -> contextlib.AbstractContextManager[None]:

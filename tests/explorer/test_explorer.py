@@ -224,8 +224,8 @@ class TestViewer:
         assert (answer["animated"], answer["own_size"]) == (True, [64, 36])
 
     def test_the_scene_to_begin_with(self, renderer: Renderer) -> None:
-        """Its lights tell all presets apart, by more than two levels in the mean of a pixel's
-        three channels somewhere: pictures that are alike differ by rounding alone."""
+        """Its lights tell all presets apart, by more than 15 levels somewhere: pictures that are
+        alike differ by rounding alone, which is two levels at most."""
         viewer = Viewer(renderer=renderer, size=(160, 90))
         answer, _ = ask(viewer, kind="setup")
         assert (answer["shading"], answer["glow"], answer["animated"]) == ("deferred", 6, True)
@@ -239,7 +239,7 @@ class TestViewer:
         for one, other in itertools.combinations(pictures, 2):
             difference = np.abs(pictures[one] - pictures[other])
             assert difference.mean() > 0.5, (one, other)
-            assert difference.max() > 20, (one, other)
+            assert difference.max() > 15, (one, other)
 
     def test_shading_and_glow(self, viewer: Viewer, scene: Scene, renderer: Renderer) -> None:
         frame(viewer, Pyramid(), shading="deferred", glow=9)
