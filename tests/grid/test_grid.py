@@ -16,7 +16,17 @@ import pytest
 
 import vkbloom
 from tests.framebuffers import noise
-from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, Settings, reductions
+from vkbloom import (
+    Convolution,
+    DualKawase,
+    Frames,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    reductions,
+)
 from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import blocks
 from vkbloom.grid.plan import Grid, PassCounter, ask, lay_out
@@ -184,7 +194,11 @@ class TestPasses:
             ).timings
             grid = ask_for(moved, {}, settings, attachments=names, size=(70, 45), shading=kind)
         layout = lay_out(grid, renderer)
-        assert PassCounter(grid, layout, renderer).alone(()) == len(ran)
+        names_of_passes = set(ran)
+        if isinstance(settings, Convolution):
+            # Another test may have used the same kernel, whose spectrum is then up to date.
+            names_of_passes.add("kernel")
+        assert PassCounter(grid, layout, renderer).alone(()) == len(names_of_passes)
 
 
 def ask_for(source: Any, axes: Any, settings: Settings | None = None, **more: Any) -> Grid:
