@@ -20,7 +20,6 @@ Axis along_row;
 #define AXIS_TEXEL(at) filter_row(image, along_row, at)
 #include "lib/axis_filter.glsl"
 
-// `tap_step` is the distance of the taps of a tent, in texels of the image.
 // The filters along rows and along columns are of UPSAMPLE_*; the steps are the distances of their
 // taps in texels of the image.
 vec4 upsample(sampler2D image, ivec2 kinds, vec2 tap_step)

@@ -60,16 +60,20 @@ MUTATIONS = {
     # The centre of the tent, on the way up: 0.25 becomes 0.255.
     "weight wrong by 2 %": Mutation(
         shader="pyramid_up.frag",
-        original="            sum += weight * sample_at(",
-        mutated="            sum += (x == 0 && y == 0 ? 1.02 : 1.0) * weight * sample_at(",
+        original="    vec4 sum = params.coarse * level;\n",
+        mutated="    level += 0.005 * fetch_clamped(smaller, PLACE_IN(smaller).texel);\n"
+        "    vec4 sum = params.coarse * level;\n",
         test=IMAGE.format(settings="Pyramid(levels=3)"),
         equal=("glow", "down_0", "down_1", "down_2"),
         different=("up_1", "up_0", "bloom", "final"),
     ),
     "missing half-texel": Mutation(
         shader="kawase_up.frag",
-        original="    Place place = PLACE_IN(smaller);\n",
-        mutated="    Place place = PLACE_IN(smaller);\n    place.part -= 0.5;\n",
+        original='#include "lib/upsample.glsl"\n',
+        mutated="Place displaced(Place place)\n{\n    place.part -= 0.5;\n    return place;\n}\n"
+        "#undef PLACE_IN\n#define PLACE_IN(source) displaced(place_in_rows(COMPLETE_SIZE(source), "
+        "PIXEL, ivec2(params.target_width, params.target_height), params.row_offset))\n"
+        '#include "lib/upsample.glsl"\n',
         test=IMAGE.format(settings="DualKawase(levels=3)"),
         equal=("glow", "down_0", "down_1", "down_2"),
         different=("up_1", "up_0", "bloom", "final"),
