@@ -276,7 +276,7 @@ class Ghosts(GlareLight):
         q_k = 1/2 + s_k (p - 1/2)
         ghosts(p) = v(p) sum over k of tint_k w(q_k) min(max(c(q_k) - threshold, 0), maximum)
 
-    with w(q) = max(0, 1 - |q - 1/2| / radius)^falloff, and for (x, y) = 2 p - 1
+    with w(q) = max(0, 1 - abs(q - 1/2) / radius)^falloff, and for (x, y) = 2 p - 1
     v(p) = 1 + vignette (min((x^2 + y^2)^2, 1) - 1). Red is read at q + a, blue at q - a, with a of
     the length `aberration` towards the centre.
 
@@ -360,7 +360,7 @@ class Halo(GlareLight):
     With p the place of a pixel and d its distance from the centre, in heights of the picture, and u
     the direction from p to the centre, halo(p) is
 
-        (1 - smoothstep(0, 1, |d - radius| / width)) c'(p + radius u)
+        (1 - smoothstep(0, 1, abs(d - radius) / width)) c'(p + radius u)
 
     with c' = min(max(c - threshold, 0), maximum). Red and blue are moved as in `Ghosts`.
 
