@@ -3,7 +3,7 @@
 Runs over a core built with VKBLOOM_FAULTS: ``python fault_walk.py STRIDE [WORKLOAD ...]``. Point n
 is the n-th Vulkan call or allocation; the walk ends when the workload finishes without reaching it.
 One of STRIDE points is walked (1: all points). Without names, all workloads are walked; if STRIDE
-is above 1, each method with one of the sets of variants in turn.
+is above 1, one method of three, with one of the sets of variants in turn.
 """
 
 from __future__ import annotations
@@ -62,6 +62,18 @@ def accompanied(renderer: Renderer) -> Arrays:
     both = renderer.apply(image, settings, mask=mask[::-1], emission=emission)
     results = {"first": frames, "masked": masked, "both": both}
     return {f"{key} {name}": one[name] for key, one in results.items() for name in one}
+
+
+def glared(renderer: Renderer) -> Arrays:
+    """All stages of glare, of another mask the second time."""
+    stages = (vkbloom.Streaks(), vkbloom.Ghosts(), vkbloom.Halo(), vkbloom.Dirt(seed=1))
+    settings = vkbloom.Separable(glare=stages)
+    mask = picture(*SIZE, 1, seed=2)[..., 0]
+    frames = {
+        turn: renderer.apply(picture(*SIZE), settings, mask=mask)
+        for turn, mask in (("first", mask), ("second", mask[::-1]))
+    }
+    return {f"{turn} {name}": one[name] for turn, one in frames.items() for name in one}
 
 
 def batch(renderer: Renderer) -> Arrays:
@@ -175,6 +187,7 @@ WORK: dict[str, Work] = {
     "render forward": lambda renderer: renderer.render(UFO, size=SIZE),
     "render deferred": lambda renderer: renderer.render(textured(), size=SIZE, shading="deferred"),
     "mask and emission": accompanied,
+    "glare": glared,
     "batch": batch,
     "grid": grid,
     "grid in memory": grid_in_memory,
@@ -364,8 +377,8 @@ def workloads(stride: int) -> list[str]:
     others = [name for name in WORK if name not in methods]
     if not presents():
         others.remove("present")
-    # Three for each preset: of the first preset the first, of the next one the second.
-    some = [name for i, name in enumerate(methods) if i % 3 == i // 3 % 3]
+    # Three for each preset: of the first preset the first, of the fourth one the second.
+    some = [name for i, name in enumerate(methods) if i % 9 == i // 9 % 3]
     return ["create", "close", *others, *(methods if stride == 1 else some)]
 
 

@@ -59,8 +59,8 @@ def show(rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]) ->
 
 
 OTHERS = (
-    *("create", "close", "render forward", "render deferred", "mask and emission", "batch"),
-    *("grid", "grid in memory", "grid to Zarr", "readback", "handles"),
+    *("create", "close", "render forward", "render deferred", "mask and emission", "glare"),
+    *("batch", "grid", "grid in memory", "grid to Zarr", "readback", "handles"),
 )
 
 
@@ -76,7 +76,7 @@ def names(stride: int) -> list[str]:
         f"apply {preset} {variant}"
         for index, preset in enumerate(presets)
         for turn, variant in enumerate(("fragment", "cpu", "gpu"))
-        if stride == 1 or turn == index % 3
+        if stride == 1 or 3 * (index % 3) + turn == index // 3 % 3
     ]
     return [*OTHERS, *methods]
 
@@ -95,7 +95,7 @@ def test_points_of_every_workload(
     show(rows, capsys)
     # Not every driver has a surface without a window.
     assert set(rows) - {"present"} == set(expected)
-    assert sum(row["raised"] for row in rows.values()) > 60
+    assert sum(row["raised"] for row in rows.values()) > 40
     for name, row in rows.items():
         if stride == 1:
             # Each point was reached, and most of them raised; closing continues after any failure.

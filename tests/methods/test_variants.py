@@ -92,8 +92,9 @@ def test_every_variant_against_the_reference(
     assert_matches_reference(varied.apply(image, settings), image, settings)
 
 
-@pytest.mark.parametrize("name", PRESETS)
-def test_presets_in_every_variant(varied: Renderer, name: str) -> None:
+# The others have the same bits in every variant, and test_presets.py has their references.
+@pytest.mark.parametrize("name", NEARLY_EQUAL)
+def test_presets_whose_variants_round_differently(varied: Renderer, name: str) -> None:
     image = hdr_picture(96, 64, 4, "float32")
     assert_matches_reference(varied.apply(image, presets[name]), image, presets[name])
 
