@@ -7,12 +7,13 @@ set -eu
 cd "$(dirname "$0")/.."
 # A method, format or variant reaches no other code with a larger image, or where its values are
 # compared with the reference: tests of these, of Python alone and of other processes are left out.
+# Each preset is in test_variants.py.
 if [ $# = 0 ]; then
     for name in adapters array_memory batches bundled_driver core_arguments errors eviction graph \
         interruption lifetime out_of_date pipeline_cache plans readback settings threads; do
         set -- "$@" "tests/core/test_$name.py"
     done
-    for name in apply_input dither level_weights presets rg11b10 variants; do
+    for name in apply_input dither level_weights rg11b10 variants; do
         set -- "$@" "tests/methods/test_$name.py"
     done
     for name in deferred deferred_passes render textures; do
@@ -20,12 +21,11 @@ if [ $# = 0 ]; then
     done
     set -- "$@" tests/grid/test_grid.py
     for name in apply_input.py::test_largest_side apply_input.py::test_long_odd_side \
-        presets.py::test_a_preset_is_its_reference presets.py::test_hdrps_cubic_filter \
         rg11b10.py::test_every_method variants.py::test_every_variant variants.py::test_final_alone \
         variants.py::test_large variants.py::test_the_forward_frame; do
         set -- "$@" --deselect "tests/methods/test_$name"
     done
-    set -- "$@" -k "not count_of_a_point and not dry_run" -n 2 --dist loadfile
+    set -- "$@" -k "not count_of_a_point and not dry_run and not is_what_runs" -n 2 --dist loadfile
 fi
 folder=$PWD/build/sanitize
 mkdir -p "$folder"

@@ -83,7 +83,15 @@ def check(renderer: Renderer, image: Array, settings: Settings) -> None:
         assert_allclose(actual, values, rtol=0, atol=largest, err_msg=name)
 
 
-@pytest.mark.parametrize(("name", "size", "dtype"), by_turns(PUBLISHED, SIZES, turns=FORMATS))
+# Each preset in every format, at every second size: the first, or the second one.
+@pytest.mark.parametrize(
+    ("name", "size", "dtype"),
+    [
+        row
+        for row in by_turns(PUBLISHED, SIZES, turns=FORMATS)
+        if PUBLISHED.index(row[0]) % 2 == SIZES.index(row[1]) % 2
+    ],
+)
 def test_a_preset_is_its_reference(
     renderer: Renderer, name: str, size: tuple[int, int], dtype: Any
 ) -> None:
