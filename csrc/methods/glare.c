@@ -20,13 +20,13 @@ struct stage {
 };
 
 typedef bool add_stage(const struct stage *stage, uint32_t *image, struct vkb_error *error);
-static add_stage vkb_add_streaks, vkb_add_ghosts, vkb_add_halo, vkb_add_dirt;
+static add_stage add_streaks, add_ghosts, add_halo, add_dirt;
 
 static const struct {
     const char *name;
     add_stage *add;
 } kinds[VKB_STAGE_COUNT] = {
-#define STAGE_ROW(constant, name) [VKB_STAGE_##constant] = {#name, vkb_add_##name},
+#define STAGE_ROW(constant, name) [VKB_STAGE_##constant] = {#name, add_##name},
     VKB_STAGES(STAGE_ROW)
 #undef STAGE_ROW
 };
@@ -114,7 +114,7 @@ static bool add_ray_image(const struct stage *stage, int ray, int iteration, boo
 }
 
 // Each ray is iterated by itself; its last iteration adds the rays before.
-static bool vkb_add_streaks(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+static bool add_streaks(const struct stage *stage, uint32_t *image, struct vkb_error *error)
 {
     const struct vkb_glare_values *values = &stage->settings->values;
     // One direction is a line to both sides.
@@ -160,18 +160,18 @@ static bool add_flare(const struct stage *stage, enum vkb_shader fragment, uint3
     return vkb_graph_add_pass(stage->levels.graph, &row, error);
 }
 
-static bool vkb_add_ghosts(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+static bool add_ghosts(const struct stage *stage, uint32_t *image, struct vkb_error *error)
 {
     return add_flare(stage, VKB_SHADER_ghosts_frag, image, error);
 }
 
-static bool vkb_add_halo(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+static bool add_halo(const struct stage *stage, uint32_t *image, struct vkb_error *error)
 {
     return add_flare(stage, VKB_SHADER_halo_frag, image, error);
 }
 
 // Dirt has no image of its own.
-static bool vkb_add_dirt(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+static bool add_dirt(const struct stage *stage, uint32_t *image, struct vkb_error *error)
 {
     (void)stage;
     (void)error;

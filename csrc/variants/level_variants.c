@@ -109,24 +109,32 @@ static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pa
     return source->width == 2 * target->width && source->height == 2 * target->height;
 }
 
+// Adds the pass as one of words, which loads the texels of its first image.
+static bool add_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                      enum vkb_shader shader, uint32_t columns, uint32_t rows,
+                      struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    row.constants.sampling = 0;
+    vkb_drop_reads(&row, 1);
+    vkb_make_words(&row, shader, columns, rows);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 bool vkb_add_godot_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         bool *fits, struct vkb_error *error)
 {
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    struct vkb_pass_row row;
 
     *fits = pass->shader == VKB_SHADER_godot_blur_frag
          && pass->constants.direction == DIRECTION_HORIZONTAL && is_half(&choice->plain, pass)
          && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
          && vkb_fits_words(choice, pass);
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants.sampling = 0;
-    vkb_drop_reads(&row, 1);
-    vkb_make_words(&row, godot_words[choice->plain.images[pass->reads[0]].format], GODOT_COLUMNS,
-                   FILTER_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return !*fits
+        || add_words(choice, pass, godot_words[source->format], GODOT_COLUMNS, FILTER_ROWS, error);
 }
 
 bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -134,18 +142,13 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    struct vkb_pass_row row;
 
     *fits = weights_taps(pass) && is_half(&choice->plain, pass)
          && vkb_formats[source->format].vk == vkb_formats[target->format].vk
          && vkb_fits_words(choice, pass);
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants.sampling = 0;
-    vkb_drop_reads(&row, 1);
-    vkb_make_words(&row, halve_taps_words[source->format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return !*fits
+        || add_words(choice, pass, halve_taps_words[source->format], HALVE_WORDS_COLUMNS,
+                     HALVE_WORDS_ROWS, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
