@@ -182,10 +182,10 @@ def main() -> None:
         "The curves and the table are of the green channel.\n\n"
         f"{table()}\n\n"
         "## Approximation by a pyramid\n\n"
-        "[`vkbloom.fit_pyramid`](fits.md) approximates each function on 512 x 512 pixels. The figures "
-        "are the residuals by\nnumber of levels: the root mean square of the difference of "
-        "logarithms, in decades, over all pixels of at least 1e-4\nof the peak. The last column is "
-        "the share of light that 8 levels do not blur.\n\n"
+        "[`vkbloom.fit_pyramid`](fits.md) approximates each function on 512 x 512 pixels. "
+        "The figures are the residuals by\nnumber of levels: the root mean square of the "
+        "difference of logarithms, in decades, over all pixels of at least 1e-4\nof the peak. "
+        "The last column is the share of light that 8 levels do not blur.\n\n"
         f"{fit_table()}\n\n{preset_section(docs)}"
     )
 
