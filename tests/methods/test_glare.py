@@ -357,6 +357,8 @@ def test_settings() -> None:
     assert settings.glare[0] == SHORT
     assert Pyramid(glare=cast("Any", "three_lensflare")).glare == glares["three_lensflare"]
     assert Ghosts.from_dict(settings.glare[1].to_dict()) == settings.glare[1]
+    with pytest.raises(ValueError, match=r"^stage: 'halo' is not the 'ghosts' of Ghosts"):
+        Ghosts.from_dict({"stage": "halo"})
     settings = Pyramid(glare=(SHORT,))
     assert settings == Pyramid(glare=cast("Any", [SHORT]))
     assert hash(settings) == hash(Pyramid(glare=cast("Any", SHORT.to_dict())))
