@@ -47,7 +47,7 @@ class Case(NamedTuple):
 # Every stage and every field of it; every format; all composites; odd sizes.
 CASES: dict[str, Case] = {
     "streaks": Case(Pyramid(glare=(SHORT,), threshold=0.3, knee=0.5)),
-    "streaks-uint8": Case(Separable(glare=(SHORT,), threshold=0.30001), "uint8"),
+    "streaks-uint8": Case(Separable(glare=(SHORT,), threshold=0.30001), "uint8", (64, 48)),
     "streaks-float16": Case(
         Separable(glare=(SHORT,), composite="screen", intensity=0.1), "float16", (64, 48)
     ),
