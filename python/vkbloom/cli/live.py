@@ -6,7 +6,8 @@ import dataclasses
 from typing import Any, Final
 
 import vkbloom
-from vkbloom.settings import Settings, field_range, methods
+from vkbloom.fields import field_range
+from vkbloom.settings import Settings, methods
 
 __all__ = ["HELP", "Live"]
 
