@@ -283,7 +283,7 @@ class TestWholeSettings:
             (None, {"settings": ["kino"]}, TypeError, "'kino' is not Settings"),
             (None, {"settings": []}, ValueError, "has no values"),
             (None, {"preset": ["kino"], "settings": [Separable()]}, ValueError, "exclude"),
-            (Separable(), {"preset": ["kino"]}, ValueError, "the axis preset has the settings"),
+            (Separable(), {"preset": ["kino"]}, ValueError, "the axis preset sets all settings"),
             (None, {"preset": ["kino", "tutorial"], "levels": [1]}, ValueError, "not a field of"),
             (None, {"preset": ["tutorial"], "intensity": [-9]}, ValueError, "intensity"),
         ],
