@@ -198,7 +198,7 @@ class TestStores:
             (["--reduce", "ssim@blur_scale=3"], "is not a value of the axis"),
             (["--chunk", "blur_scale"], "AXIS=COUNT"),
             (["--size", "3x3"], "the source is not a scene"),
-            (["--attachments", "none"], "request one of them"),
+            (["--attachments", "none"], "request some"),
             (["--sheet", "a.jpg"], "--sheet: a.jpg does not end in .png"),
             (["--curves", "a"], "--curves: a does not end in .png, .svg, .pdf"),
             (

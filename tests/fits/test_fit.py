@@ -226,7 +226,7 @@ class TestRefused:
                 Pyramid(),
                 ["radius"],
                 {"bounds": {"radius": (2, 1)}},
-                "bounds: radius: 2 is not less",
+                "radius: 2 is not less than 1",
             ),
             (
                 Pyramid(),
