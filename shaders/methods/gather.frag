@@ -24,9 +24,6 @@ vec4 share(sampler2D image, int level)
     if (level >= LEVELS)
         return vec4(0.0);
     float weight = params.shares[level >> 2][level & 3];
-    ivec2 target_size = ivec2(params.target_width, params.target_height);
-    if (UPSAMPLE == UPSAMPLE_LINEAR && params.row_offset == 0 && COMPLETE_SIZE(image) == target_size)
-        return weight * texelFetch(image, PIXEL, 0);
     return weight * upsample(image, ivec2(UPSAMPLE), vec2(0.0));
 }
 
