@@ -178,7 +178,7 @@ def test_stages(renderer: Renderer, name: str) -> None:
         Pyramid(
             levels=2,
             alpha="blur",
-            glare=Streaks(angle=20, base=3, iterations=2, threshold=0.1, halvings=1),
+            glare=(Streaks(angle=20, base=3, iterations=2, threshold=0.1, halvings=1),),
         ),
     ],
     ids=["flares", "streaks"],
