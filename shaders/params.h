@@ -84,12 +84,13 @@
     VEC4S(B, kernel, LINE_VEC4S)
 
 // The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as in
-// LINE_BLOCK.
+// LINE_BLOCK. `columns` are those that an invocation of strip.comp writes.
 #define FUSED_BLOOM_BLOCK(B, READS, INPUT, VEC4S) \
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
     INPUT(B, int, vertical_radius) \
     INPUT(B, int, horizontal_radius) \
+    INPUT(B, int, columns) \
     VEC4S(B, vertical, FUSED_VEC4S) \
     VEC4S(B, horizontal, FUSED_VEC4S)
 
@@ -346,8 +347,8 @@
 #define LINE_OUTPUTS           8
 #define LINE_VEC4S             34
 #define STRIP_RADIUS           4
-#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
-#define STRIP_ROWS             135
+#define STRIP_COLUMNS          240
+#define STRIP_ROWS(CHANNEL)    ((CHANNEL) == 1 ? 4 : 8)
 #define HALVE_COLUMNS          4
 #define HALVE_ROWS             16
 #define DOUBLE_COLUMNS         4
