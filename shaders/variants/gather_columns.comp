@@ -36,10 +36,7 @@ WRITE_IMAGE(8);
 #include "variants/store.glsl"
 
 #define AXIS_FILTER filter_column
-#define AXIS_LINEAR linear_in_column
-#define AXIS_INSET_CUBIC inset_cubic_in_column
 #define AXIS_IMAGE usamplerBuffer image, ivec4 shape
-#define AXIS_ARGUMENT image, shape
 #define AXIS_TEXEL(at) load_floats(image, shape, line, at)
 #include "lib/axis_filter.glsl"
 

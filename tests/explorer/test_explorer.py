@@ -294,7 +294,7 @@ class TestViewer:
             answer = opened("emission", "glow.exr", glow.read_bytes())
             assert answer["glows"] == {"mask": "mask.png", "emission": "glow.exr"}
             given["emission"] = vkbloom.read(glow)[..., :3]
-        assert "a.png: a mask is grey" in opened("mask", "a.png", file)["error"]
+        assert "a.png: a mask must be grey" in opened("mask", "a.png", file)["error"]
         small = vkbloom.write(tmp_path / "small.png", pixels[:8, :8]).read_bytes()
         assert "is not the image's" in opened("emission", "small.png", small)["error"]
         assert opened("mask")["glows"] == {"emission": "glow.exr"}
