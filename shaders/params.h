@@ -342,17 +342,17 @@
 
 // Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line and of a fused bloom.
 // A line up to LINE_SHORT_RADIUS is compiled for its radius.
-#define LINE_RADIUS            64
-#define LINE_SHORT_RADIUS      8
-#define LINE_OUTPUTS           8
-#define LINE_VEC4S             34
-#define STRIP_RADIUS           4
-#define STRIP_COLUMNS          240
-#define STRIP_ROWS(CHANNEL)    ((CHANNEL) == 1 ? 4 : 8)
-#define HALVE_COLUMNS          4
-#define HALVE_ROWS             16
-#define DOUBLE_COLUMNS         4
-#define DOUBLE_ROWS            32
+#define LINE_RADIUS         64
+#define LINE_SHORT_RADIUS   8
+#define LINE_OUTPUTS        8
+#define LINE_VEC4S          34
+#define STRIP_RADIUS        4
+#define STRIP_COLUMNS       240
+#define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
+#define HALVE_COLUMNS       4
+#define HALVE_ROWS          16
+#define DOUBLE_COLUMNS      4
+#define DOUBLE_ROWS         32
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8

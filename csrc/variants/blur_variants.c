@@ -156,8 +156,8 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-// The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of a word, so that
-// the invocations of a workgroup share a row as evenly as possible.
+// The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of a word, so
+// that the invocations of a workgroup share a row as evenly as possible.
 static uint32_t strip_columns(uint32_t width)
 {
     const uint32_t most = ROW_INVOCATIONS * STRIP_COLUMNS;
