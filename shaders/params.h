@@ -303,7 +303,7 @@
     SETTING(strength, 1.0, 0.0, 16.0)
 
 #define GLARE_COUNT_ROWS(COUNT) \
-    COUNT(halvings, 1, 0, MOST_HALVINGS) \
+    COUNT(halvings, 2, 0, MOST_HALVINGS) \
     COUNT(directions, 6, 1, 16) \
     COUNT(base, 4, 2, MOST_TAPS) \
     COUNT(iterations, 4, 1, 6) \

@@ -145,7 +145,15 @@ glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
         "blender_ghosts": _blender_ghosts(),
         "blender_streaks": _blender_streaks(),
         "anamorphic": (
-            Streaks(directions=1, threshold=1, fade=0.97, base=6, iterations=3, intensity=0.3),
+            Streaks(
+                directions=1,
+                threshold=1,
+                fade=0.97,
+                base=6,
+                iterations=3,
+                intensity=0.3,
+                halvings=1,
+            ),
         ),
         "godot_dirt": (Dirt(strength=0.8, mode="lerp"),),
     }

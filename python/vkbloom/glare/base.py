@@ -149,7 +149,7 @@ class GlareLight(Glare):
     Examples
     --------
     >>> vkbloom.Streaks(intensity=2, threshold=1).halvings
-    1
+    2
     """
 
     intensity: float = stage_field("intensity")

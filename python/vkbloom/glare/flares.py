@@ -74,7 +74,6 @@ class Ghosts(GlareLight):
     radius: float = stage_field("radius", default=0.75)
     vignette: float = stage_field("vignette")
     aberration: float = stage_field("aberration")
-    halvings: int = stage_field("halvings", default=2)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -156,4 +155,3 @@ class Halo(GlareLight):
     width: float = stage_field("width")
     maximum: float = stage_field("maximum")
     aberration: float = stage_field("aberration")
-    halvings: int = stage_field("halvings", default=2)
