@@ -62,7 +62,8 @@ static bool check_names(const struct vkb_graph *graph, PyObject *names)
         for (image = 0; image < graph->image_count; ++image)
             if (graph->images[image].framebuffer && strlen(list) + VKB_NAME_SIZE + 2 < sizeof list)
                 strcat(strcat(list, *list ? ", " : ""), graph->images[image].name);
-        PyErr_Format(PyExc_ValueError, "attachments: there is no %R here, only %s", name, list);
+        PyErr_Format(PyExc_ValueError, "attachments: unknown framebuffer %R; available: %s", name,
+                     list);
         return false;
     }
     return true;
@@ -529,7 +530,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_plan_spec = {
     .name = "vkbloom._core.Plan",
     .basicsize = sizeof(struct vkb_plan_object),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
-           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .flags = VKB_TYPE_FLAGS | Py_TPFLAGS_HAVE_GC,
     .slots = slots,
 };

@@ -76,7 +76,7 @@ def capture(instance: int, path: str | os.PathLike[str]) -> Iterator[None]:
         if written and not done:
             written.unlink()
     if not written:
-        raise _core.Error(f"RenderDoc captured nothing. {_HOW}")
+        raise _core.Error(f"RenderDoc made no capture. {_HOW}")
     written.replace(target)
 
 

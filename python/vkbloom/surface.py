@@ -32,13 +32,14 @@ def _window_surface(renderer: Renderer, window: object) -> int:
     glfw = import_extra("glfw", "window", "a window")
     if renderer.info.bundled:
         raise _core.Error(
-            "the bundled driver opens no windows; set VKBLOOM_DRIVER=system to take the system's"
+            "the bundled driver does not support windows; use the system's with "
+            "VKBLOOM_DRIVER=system"
         )
     handle = ctypes.c_uint64()
     result = glfw.create_window_surface(renderer._core.instance, window, None, ctypes.byref(handle))
     if result != 0:
         raise _core.Error(
-            f"{renderer.info.name} makes no surface of this window (VkResult {result}); "
+            f"{renderer.info.name} cannot create a surface for this window (VkResult {result}); "
             "create the window with the hint CLIENT_API = NO_API"
         )
     return handle.value
@@ -137,12 +138,12 @@ class Surface:
         handle = 0
         if self._window is not None:
             if size is not None:
-                raise ValueError("size: a window has its own; leave the argument out")
+                raise ValueError("size: a window determines its size; leave the argument out")
             handle = _window_surface(renderer, window)
         elif callable(window):
             handle = int(cast("Callable[[int], int]", window)(renderer._core.instance))
         elif window is not None:
-            raise TypeError(f"window: {window!r} is not a window of glfw, a function or None")
+            raise TypeError(f"window: {window!r} is not a glfw window, a function or None")
         self._core = renderer._core.screen(handle, mode == "mailbox")
         self.timings: dict[str, float] = {}
 
@@ -159,7 +160,7 @@ class Surface:
     @size.setter
     def size(self, size: tuple[int, int]) -> None:
         if self._window is not None:
-            raise ValueError("size: a window has its own; set the window's")
+            raise ValueError("size: a window determines its size; resize the window")
         self._size = check_size("size", size)
 
     def present(

@@ -125,7 +125,7 @@ def test_a_surface_of_another_renderer_is_refused(surface: Surface, scene: Scene
     with Renderer() as other:
         source = scene_source(scene, SIZE, "forward", 0.0)
         plan = other._core.plan(source, Separable(), ("final",))
-        with pytest.raises(ValueError, match="it belongs to another renderer"):
+        with pytest.raises(ValueError, match="it was created by another renderer"):
             other._core.show(source, plan, surface._core, *SIZE, False)
 
 
@@ -148,7 +148,7 @@ def test_what_cannot_be_shown(
 
 
 def test_what_is_no_surface(renderer: Renderer) -> None:
-    with pytest.raises(TypeError, match="window: 'x' is not a window of glfw, a function or None"):
+    with pytest.raises(TypeError, match="window: 'x' is not a glfw window, a function or None"):
         Surface(renderer, "x")
     with pytest.raises(ValueError, match='mode: 5 is not "fifo" or "mailbox"'):
         Surface(renderer, mode=5)  # type: ignore[arg-type]

@@ -21,9 +21,9 @@ from vkbloom.cli.live_options import live_options
 from vkbloom.cli.program import given
 from vkbloom.settings import SHADINGS, Shading
 
-_LARGEST: Final = (1600, 900)  # of the window that an image opens
-_TITLE_SECONDS: Final = 0.5  # between two lines of values
-_WAIT_SECONDS: Final = 0.1  # while nothing can be seen
+_LARGEST: Final = (1600, 900)  # size of a window for an image
+_TITLE_SECONDS: Final = 0.5  # between updates of the title
+_WAIT_SECONDS: Final = 0.1  # while the window is hidden
 _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"123456789")
 
 
@@ -48,7 +48,7 @@ _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"12
     "count",
     metavar="N",
     type=click.IntRange(min=2),
-    help="Close after N frames, and print how many there were in a second after the first one.",
+    help="Close after N frames, and print the frame rate, without the first frame.",
 )
 @click.option(
     "-o",
@@ -90,7 +90,7 @@ def command(
         begin = 0.0
         for number in view.frames(glfw, window, surface, out):
             if number == 1:
-                # Until here, shaders were compiled.
+                # The first frame includes the compilation of shaders.
                 begin = time.perf_counter()
             elif number == count:
                 rate = (number - 1) / (time.perf_counter() - begin)
@@ -100,7 +100,7 @@ def command(
 
 @contextlib.contextmanager
 def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
-    """Open a window without an API of its own."""
+    """Open a window without an OpenGL context."""
     reasons: list[str] = []
     glfw.set_error_callback(lambda code, text: reasons.append(text.decode(errors="replace")))
     window = None
@@ -109,14 +109,14 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
             glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
             window = glfw.create_window(*size, "vkbloom", None, None)
         if not window:
-            raise vkbloom.Error(f"no window: {'; '.join(reasons) or 'glfw gives no reason'}")
+            raise vkbloom.Error(f"no window was opened: {'; '.join(reasons) or 'unknown reason'}")
         yield window
     finally:
         glfw.terminate()
 
 
 class _View:
-    """What the renderer makes of the state, which keys and the mouse change."""
+    """Renders the state, which keys and the mouse change."""
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class _View:
             note(f"Wrote {path}")
 
     def listen(self, glfw: Any, window: Any) -> None:
-        """Have keys and the mouse change the state."""
+        """Connect keys and the mouse to the state."""
         live = self._live
         keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
         last = [0.0, 0.0]
@@ -170,7 +170,7 @@ class _View:
         glfw.set_scroll_callback(window, lambda _, x, y: live.scroll(y))
 
     def frames(self, glfw: Any, window: Any, surface: vkbloom.Surface, out: Path) -> Iterator[int]:
-        """Show frames until the window is closed; yield how many there were."""
+        """Show frames until the window is closed; yield the number of each."""
         live = self._live
         pictures = itertools.count(1)
         since = before = time.perf_counter()
