@@ -378,9 +378,11 @@
 #define FFT_INVOCATIONS 64
 #define FFT_ROW_COLUMNS 8
 #define FFT_MOST_RADIX  64
-// The most where the other elements are in shared memory.
-#define FFT_MOST_GROUP_RADIX 16
-#define FFT_LIMIT            1e28
+// The most where the other elements are in shared memory; and the most where a length can have
+// fewer, since fewer registers let more workgroups run at a time.
+#define FFT_MOST_GROUP_RADIX  16
+#define FFT_USUAL_GROUP_RADIX 10
+#define FFT_LIMIT             1e28
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -395,7 +397,7 @@
 // makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
 // GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are
 // the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of GROUP_WIDTH
-// lines, and they exchange EXCHANGED floats of each element at once.
+// lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -432,8 +434,7 @@
     CONSTANT(32, RADIX_3, radix_3) \
     CONSTANT(33, RADIX_4, radix_4) \
     CONSTANT(34, GROUP_WIDTH, group_width) \
-    CONSTANT(35, GROUP_HEIGHT, group_height) \
-    CONSTANT(36, EXCHANGED, exchanged)
+    CONSTANT(35, GROUP_HEIGHT, group_height)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

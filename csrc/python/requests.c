@@ -406,13 +406,6 @@ static int clear(PyObject *object)
     return 0;
 }
 
-static void dealloc(PyObject *object)
-{
-    PyObject_GC_UnTrack(object);
-    clear(object);
-    vkb_free_object(object);
-}
-
 static PyMethodDef methods[] = {
     {"wait", wait_for, METH_NOARGS,
      "wait() -> ([timings, ...], (NaNs, infinities of the input)). Waits until the device has "
@@ -421,7 +414,7 @@ static PyMethodDef methods[] = {
 };
 
 static PyType_Slot slots[] = {
-    {Py_tp_dealloc, dealloc},
+    {Py_tp_dealloc, vkb_dealloc},
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
     {Py_tp_methods, methods},
@@ -432,7 +425,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_submission_spec = {
     .name = "vkbloom._core.Submission",
     .basicsize = sizeof(struct submission),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
-           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .flags = VKB_TYPE_FLAGS | Py_TPFLAGS_HAVE_GC,
     .slots = slots,
 };

@@ -72,18 +72,11 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     return 0;
 }
 
+// The renderer keeps a screen that was not closed until it is closed itself.
 static int clear(PyObject *object)
 {
     Py_CLEAR(((struct vkb_screen_object *)object)->renderer);
     return 0;
-}
-
-// The renderer keeps a screen that was not closed until it is closed itself.
-static void dealloc(PyObject *object)
-{
-    PyObject_GC_UnTrack(object);
-    clear(object);
-    vkb_free_object(object);
 }
 
 static PyMethodDef methods[] = {
@@ -93,7 +86,7 @@ static PyMethodDef methods[] = {
 };
 
 static PyType_Slot slots[] = {
-    {Py_tp_dealloc, dealloc},
+    {Py_tp_dealloc, vkb_dealloc},
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
     {Py_tp_methods, methods},
@@ -104,7 +97,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_screen_spec = {
     .name = "vkbloom._core.Screen",
     .basicsize = sizeof(struct vkb_screen_object),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
-           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .flags = VKB_TYPE_FLAGS | Py_TPFLAGS_HAVE_GC,
     .slots = slots,
 };

@@ -1,7 +1,5 @@
 #include "vulkan/swapchain.h"
 
-#include <string.h>
-
 static bool find_mode(const struct vkb_device *device, bool mailbox,
                       struct vkb_swapchain *swapchain, struct vkb_error *error)
 {
@@ -22,14 +20,33 @@ static bool find_mode(const struct vkb_device *device, bool mailbox,
                     "mode: the surface has no \"mailbox\"; every surface has \"fifo\"");
 }
 
+// Mesa's drivers share the code of their surfaces.
+static bool is_mesa(VkDriverId driver)
+{
+    switch (driver) {
+    case VK_DRIVER_ID_MESA_RADV:
+    case VK_DRIVER_ID_INTEL_OPEN_SOURCE_MESA:
+    case VK_DRIVER_ID_MESA_LLVMPIPE:
+    case VK_DRIVER_ID_MESA_TURNIP:
+    case VK_DRIVER_ID_MESA_V3DV:
+    case VK_DRIVER_ID_MESA_PANVK:
+    case VK_DRIVER_ID_MESA_VENUS:
+    case VK_DRIVER_ID_MESA_DOZEN:
+        return true;
+    default:
+        return false;
+    }
+}
+
 static bool create_headless(const struct vkb_device *device, VkSurfaceKHR *surface,
                             struct vkb_error *error)
 {
     const struct vkb_instance *instance = device->instance;
 
-    // The loader offers the extension if any installed driver has it. It gives the others a surface
-    // that they do not know, with which NVIDIA's driver 580 ends the process.
-    if (!instance->vk.vkCreateHeadlessSurfaceEXT || !strstr(device->adapter.driver_info, "Mesa"))
+    // The loader offers the extension if any installed driver has it, and Vulkan does not tell
+    // which. The loader passes the surface to the other drivers, too, and NVIDIA's driver 580
+    // crashes then.
+    if (!instance->vk.vkCreateHeadlessSurfaceEXT || !is_mesa(device->adapter.driver_id))
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "a surface without a window needs VK_EXT_headless_surface, which the "
                         "driver of %s lacks; Mesa's lavapipe 25 has it",
