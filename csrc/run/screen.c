@@ -69,12 +69,12 @@ struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceK
     return NULL;
 }
 
+// After a wait for the queue: presentations wait for the semaphores, and no fence tells when they
+// have waited.
 static void destroy_swapchain(const struct vkb_device *device, struct vkb_screen *screen)
 {
     if (!screen->swapchain)
         return;
-    // Presentations wait for the semaphores, and no fence tells when they have waited.
-    (void)VK_RESULT(device->vk.vkQueueWaitIdle(device->queue));
     for (uint32_t i = 0; i < VKB_MAX_SCREEN_IMAGES; ++i)
         device->vk.vkDestroySemaphore(device->handle, screen->images[i].rendered, NULL);
     memset(screen->images, 0, sizeof screen->images);
@@ -88,6 +88,7 @@ void vkb_screen_destroy(const struct vkb_device *device, struct vkb_screen *scre
     while (*screens != screen)
         screens = &(*screens)->next;
     *screens = screen->next;
+    (void)VK_RESULT(device->vk.vkQueueWaitIdle(device->queue));
     destroy_swapchain(device, screen);
     if (screen->surface)
         device->instance->vk.vkDestroySurfaceKHR(device->instance->handle, screen->surface, NULL);
@@ -155,12 +156,13 @@ static bool renew(const struct vkb_device *device, struct vkb_screen *screen,
     VkSurfaceCapabilitiesKHR surface;
     VkFormat format;
 
+    if (!VK(error, device->vk.vkQueueWaitIdle(device->queue))
+        || !VK(error, device->instance->vk.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
+                          device->adapter.physical, screen->surface, &surface)))
+        return false;
     destroy_swapchain(device, screen);
     screen->wanted = show->extent;
     screen->linear = show->linear;
-    if (!VK(error, device->instance->vk.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
-                       device->adapter.physical, screen->surface, &surface)))
-        return false;
     if (!(surface.supportedUsageFlags & VK_IMAGE_USAGE_TRANSFER_DST_BIT))
         return vkb_fail(error, VKB_ERROR_GENERAL, "the surface's images cannot be copied to");
     const VkExtent2D *low = &surface.minImageExtent, *high = &surface.maxImageExtent;

@@ -328,6 +328,7 @@ static void object(const char *text)
 static struct {
     VkSemaphore semaphores[256];
     uint32_t count;
+    bool suboptimal;  // the swapchain should be renewed, which begins with a look at the surface
 } presented;
 
 static VKAPI_ATTR VkResult VKAPI_CALL present(VkQueue queue, const VkPresentInfoKHR *info)
@@ -335,13 +336,16 @@ static VKAPI_ATTR VkResult VKAPI_CALL present(VkQueue queue, const VkPresentInfo
     for (uint32_t i = 0; i < info->waitSemaphoreCount; ++i)
         presented.semaphores[presented.count++ % 256] = info->pWaitSemaphores[i];
     const VkResult result = below.vkQueuePresentKHR(queue, info);
-    return result == VK_SUCCESS && lacks("fit") ? VK_SUBOPTIMAL_KHR : result;
+    presented.suboptimal = result == VK_SUCCESS && lacks("fit");
+    return presented.suboptimal ? VK_SUBOPTIMAL_KHR : result;
 }
 
 static VKAPI_ATTR VkResult VKAPI_CALL acquire(VkDevice handle, VkSwapchainKHR swapchain,
                                               uint64_t timeout, VkSemaphore semaphore,
                                               VkFence fence, uint32_t *index)
 {
+    if (presented.suboptimal)
+        object("a suboptimal swapchain is used again");
     if (lacks("date"))
         return VK_ERROR_OUT_OF_DATE_KHR;
     return below.vkAcquireNextImageKHR(handle, swapchain, timeout, semaphore, fence, index);
@@ -354,6 +358,7 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_surface(VkPhysicalDevice physical, VkS
     const VkResult result =
         below.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(physical, surface, capabilities);
 
+    presented.suboptimal = false;
     if (lacks("area"))
         capabilities->currentExtent = (VkExtent2D){0, 0};
     if (lacks("height"))

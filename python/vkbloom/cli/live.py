@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import vkbloom
-from vkbloom.settings import Settings, methods
+from vkbloom.settings import Settings, Shading, methods
 
 __all__ = ["HELP", "Live"]
 
@@ -49,6 +49,8 @@ class Live:
     ----------
     settings : Settings
     source : Scene or Image
+    shading : {"forward", "deferred"}
+        Of a scene.
     framebuffer : str
         What is shown.
     time : float
@@ -60,6 +62,7 @@ class Live:
 
     settings: Settings
     source: Any
+    shading: Shading = "forward"
     framebuffer: str = "final"
     time: float = 0.0
     paused: bool = False

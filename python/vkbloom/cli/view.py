@@ -53,12 +53,12 @@ def command(
         vkbloom.Surface(renderer, window, mailbox=mailbox) as surface,
     ):
         source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)
-        live = Live(settings, source)
-        _listen(glfw, window, renderer, live, shading)
+        live = Live(settings, source, shading)
+        _listen(glfw, window, renderer, live)
         since = before = time.perf_counter()
         shown = 0
         while not (live.closed or glfw.window_should_close(window)):
-            options: dict[str, Any] = {"shading": shading, "time": live.time}
+            options: dict[str, Any] = {"shading": live.shading, "time": live.time}
             if surface.present(live.source, live.settings, attachment=live.framebuffer, **options):
                 shown += 1
             else:
@@ -96,16 +96,14 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
         glfw.terminate()
 
 
-def _listen(
-    glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live, shading: Shading
-) -> None:
+def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> None:
     """Have keys and the mouse change the state."""
     keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
     last = [0.0, 0.0]
 
     def on_key(_: Any, key: int, code: int, action: int, mods: int) -> None:
         if action != glfw.RELEASE and key in keys:
-            outputs = renderer.plan(live.source, live.settings, shading=shading).outputs
+            outputs = renderer.plan(live.source, live.settings, shading=live.shading).outputs
             colours = [name for name, (shape, _) in outputs.items() if len(shape) == 3]
             live.press(keys[key], colours)
 
