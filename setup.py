@@ -32,6 +32,7 @@ WORDS_ALONE = {
     "kino_bright.comp",
     "highlights.comp",
     "scale.comp",
+    "streaks.comp",
     "godot_rows.comp",
 }
 # Shaders that load single floats and store words of each format, too.

@@ -363,6 +363,8 @@
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
 #define GODOT_COLUMNS                 8
+#define STREAK_COLUMNS                8
+#define STREAK_ROWS                   32
 #define TILE_LOADED                   64
 #define TILE_ROWS                     32
 #define TILE_RUNS                     4

@@ -301,35 +301,34 @@ def page(subjects: list[Subject], device: str) -> str:
 TEXT = """# Which laws blurs and blooms keep
 
 Written by `tools/laws.py`. It tests blurs and blooms of other packages, and of this one, against
-the assertions of `vkbloom.testing` (see [testing.md](testing.md)). Adapter, for those that use
-one: {device}.
+the assertions of `vkbloom.testing` (see [testing.md](testing.md)). The adapter, where one is used:
+{device}.
 
 Gaussians have a sigma of {sigma:g} pixels. Images are float32 of 65 x 65 pixels with values up to
-1; 256 x 256 for chains of halved images; 512 x 512 with values up to 16 for the methods that
-engines published, most of which have a threshold. Tolerances are the defaults. An empty cell
-means that the law does not apply. A question mark means that the premise of the law does not
-hold. "Mirrored" is `assert_symmetric` for left and right, top and bottom; "transposed" is the
-same for rows and columns. The limit for fireflies is 1: no bright pixel may raise its neighbours
-by more.
+1. Chains of halved images have 256 x 256 pixels. Published methods of engines have 512 x 512
+pixels with values up to 16, because most of them have a threshold. Tolerances are the defaults.
+An empty cell means that the law does not apply. A question mark means that the premise of the law
+does not hold. "Mirrored" is `assert_symmetric` for left and right and for top and bottom;
+"transposed" is `assert_symmetric` for rows and columns. The limit for fireflies is 1: a bright
+pixel may raise its neighbours by at most 1.
 
-A broken law is not in itself a fault. A median is not linear. A threshold is meant to break
-superposition. A linear blur spreads fireflies. A chain that halves by 2 x 2 pixels moves the
-light of a pixel to the centre of its square. A broken law is a fault if the method promises that
-law.
+A broken law is a fault only if the method promises this law. A median is not linear. A threshold
+breaks superposition on purpose. A linear blur spreads fireflies. A chain that halves by 2 x 2
+pixels moves the light of a pixel to the centre of its square.
 
 {table}
 
 ## Deviations
 
-For each blur: the gain and the standard deviation of its point spread, then the largest deviation
+Each blur has the gain and the standard deviation of its point spread, and the largest deviation
 from each broken law, with its position.
 
 {notes}
 
 ## Notes
 
-- pygfx's bloom adds the light of its levels. So its gain is the number of levels, and the picture
-  with bloom is brighter as a whole. Its `use_karis_average` has no effect in this version: one
+- pygfx's bloom is the sum of its levels. So its gain is the number of levels, and the bloom makes
+  the picture brighter everywhere. Its `use_karis_average` has no effect in this version: one
   uniform buffer holds the switch for all levels, all writes to it come before the first pass
   runs, and the last write turns it off.
 - `unsharp_mask` of this scikit-image is called with `channel_axis=2` here. With -1 it filters

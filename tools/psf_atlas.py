@@ -130,11 +130,11 @@ def preset_section(docs: Path) -> str:
     draw_curves(shown, np.geomspace(3, 400, 30), docs / "pictures" / "psf_presets.png")
     left_out = ", ".join(f"`{name}`" for name in vkbloom.presets if name not in shown)
     return (
-        "## Of the presets\n\n"
-        f"What one pixel of 1 becomes in the middle of {PRESET_SIZE[0]} x {PRESET_SIZE[1]} pixels, "
-        "without the preset's threshold. Methods with\nsoft thresholds of their own make "
-        "something else of brighter pixels. The energy is what the bloom has, before\nthe "
-        f"composite. {left_out} removes a single pixel as a firefly.\n\n"
+        "## Presets\n\n"
+        f"The point is one pixel of 1 in the middle of {PRESET_SIZE[0]} x {PRESET_SIZE[1]} pixels. "
+        "The presets have no threshold here. Methods\nthat are not linear spread brighter pixels "
+        "differently. The energy is that of the bloom, before the composite.\n"
+        f"{left_out} is missing, because it removes a single pixel as a firefly.\n\n"
         "![Radial profiles, encircled energies, transfer functions of presets]"
         "(pictures/psf_presets.png)\n\n"
         f"{preset_table(shown)}\n"
@@ -179,13 +179,13 @@ def main() -> None:
         f"{SIDE} x {SIDE} pixels around the point. White is a channel's largest value, black is a "
         "millionth of it or less.\n\n"
         "![Radial profiles, encircled energies, transfer functions](pictures/psf_curves.png)\n\n"
-        "Of the green channel.\n\n"
+        "The curves and the table are of the green channel.\n\n"
         f"{table()}\n\n"
-        "## By a pyramid\n\n"
-        "How near [`vkbloom.fit_pyramid`](fits.md) comes to each function, on 512 x 512 pixels, by "
-        "the number of\nlevels: root mean square of the difference of logarithms, in decades, of "
-        "what is at least 1e-4 of the peak. A share\nof the light stays where it is, the last "
-        "column for 8 levels.\n\n"
+        "## Approximation by a pyramid\n\n"
+        "[`vkbloom.fit_pyramid`](fits.md) approximates each function on 512 x 512 pixels. "
+        "The figures are the residuals by\nnumber of levels: the root mean square of the "
+        "difference of logarithms, in decades, over all pixels of at least 1e-4\nof the peak. "
+        "The last column is the share of light that 8 levels do not blur.\n\n"
         f"{fit_table()}\n\n{preset_section(docs)}"
     )
 

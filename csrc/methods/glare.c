@@ -89,7 +89,7 @@ static bool add_iteration(const struct stage *stage, int ray, int rays, int iter
     row.reads[1] = before != VKB_NO_IMAGE ? before : from;
     row.read_count = 2;
     row.constants.add_own = before != VKB_NO_IMAGE;
-    row.constants.first = iteration == 0;
+    row.constants.first = iteration == 0 && values->threshold > 0.0f;
     row.block = VKB_BLOCK_streaks;
     set_weights(values, iteration, last ? 1.0 / rays : 1.0, params);
     // Light goes in the direction of the angle, so that it comes from the other one.

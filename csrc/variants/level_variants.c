@@ -42,10 +42,13 @@ static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pa
     }
 }
 
-// Whether the device can run the pass as make_halving and make_doubling set it.
+// Whether the device can run the pass as make_halving and make_doubling set it. Shaders for words
+// are compiled for one format of all images.
 static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    return choice->variants != VKB_VARIANTS_CPU || vkb_fits_words(choice, pass);
+    return choice->variants != VKB_VARIANTS_CPU
+        || (vkb_fits_words(choice, pass)
+            && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]));
 }
 
 // If a threshold pass writes the larger level, adds a fused pass that reads the image itself. It
@@ -141,11 +144,8 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
                          bool *fits, struct vkb_error *error)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
 
-    *fits = weights_taps(pass) && is_half(&choice->plain, pass)
-         && vkb_formats[source->format].vk == vkb_formats[target->format].vk
-         && vkb_fits_words(choice, pass);
+    *fits = weights_taps(pass) && is_half(&choice->plain, pass) && loads(choice, pass);
     return !*fits
         || add_words(choice, pass, halve_taps_words[source->format], HALVE_WORDS_COLUMNS,
                      HALVE_WORDS_ROWS, error);

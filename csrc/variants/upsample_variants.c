@@ -12,12 +12,6 @@ static const enum vkb_shader columns_shaders[VKB_FORMAT_COUNT] =
 static const enum vkb_shader gather_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(gather_columns);
 static const enum vkb_shader kawase_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(kawase_columns);
 
-// Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
-static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
-{
-    return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
-}
-
 // The size of an image that is filtered along rows.
 static struct vkb_size rows_size(const struct vkb_variant_choice *choice,
                                  const struct vkb_pass_row *pass, uint32_t from)
@@ -100,7 +94,7 @@ bool vkb_add_upsampled(const struct vkb_variant_choice *choice, const struct vkb
     *fits = pass->shader == VKB_SHADER_pyramid_up_frag && !vkb_doubles(pass)
          && !vkb_only_scales(&choice->plain, pass) && fits_rows(choice, pass, 1)
          && (!pass->constants.add_own
-             || has_format_of(&choice->plain, pass->reads[1], pass->targets[0]));
+             || vkb_has_format_of(&choice->plain, pass->reads[1], pass->targets[0]));
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -122,12 +116,16 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
 {
     struct vkb_pass_row row;
     const uint32_t levels = (uint32_t)pass->constants.levels;
+    const bool own = pass->constants.upsample == UPSAMPLE_LINEAR
+                  && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+                  && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
 
     *fits = pass->shader == VKB_SHADER_gather_frag && fits_rows(choice, pass, levels);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    for (uint32_t level = 0; level < levels; ++level) {
+    row.constants.add_own = own;
+    for (uint32_t level = own; level < levels; ++level) {
         const struct row_filter filter = {
             .from = pass->reads[level],
             .kind = (enum vkb_mode)pass->constants.upsample,

@@ -31,6 +31,8 @@ vkb_variant_add vkb_add_halved_taps, vkb_add_godot_rows;
 // Upsampling by any factor as two passes, along rows and along columns; the sum of several levels
 // that are upsampled so.
 vkb_variant_add vkb_add_upsampled, vkb_add_gathered, vkb_add_kawase_up;
+// Iterations of streaks.
+vkb_variant_add vkb_add_streaks;
 // Transforms of complete lines in shared memory.
 vkb_variant_add vkb_add_lines;
 
@@ -39,6 +41,9 @@ vkb_variant_add vkb_add_lines;
 
 // How the device rounds a value that is stored in an image of this format, as a STORED_* mode.
 enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format);
+
+// Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
+bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
 // The last pass whose only target is the image; NULL: none.

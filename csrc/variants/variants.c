@@ -40,6 +40,11 @@ enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format for
              : vkb_storage_mode(format);
 }
 
+bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
+{
+    return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
+}
+
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
 {
     uint32_t writers = 0;
@@ -110,26 +115,20 @@ static const enum vkb_shader kino_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMA
 static const enum vkb_shader highlights_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(highlights);
 static const enum vkb_shader scale_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(scale);
 
-// Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
-static bool has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
-{
-    return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
-}
-
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     return vkb_is_composite(pass) && pass->constants.bloom != BLOOM_LINES && !pass->constants.masked
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
-        && has_format_of(graph, pass->reads[0], pass->reads[1])
-        && has_format_of(graph, pass->reads[0], pass->targets[0]);
+        && vkb_has_format_of(graph, pass->reads[0], pass->reads[1])
+        && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
 // Whether the pass is a threshold pass between images of the same format.
 static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_threshold(pass) && has_format_of(graph, pass->reads[0], pass->targets[0]);
+    return vkb_is_threshold(pass) && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
 // The shaders for a pass from an image of the target's size and format; NULL: it is none of those
@@ -138,7 +137,7 @@ static const enum vkb_shader *unfiltered_shaders(const struct vkb_graph *graph,
                                                  const struct vkb_pass_row *pass)
 {
     if (pass->constants.masked || !vkb_same_size(graph, pass->reads[0], pass->targets[0])
-        || !has_format_of(graph, pass->reads[0], pass->targets[0]))
+        || !vkb_has_format_of(graph, pass->reads[0], pass->targets[0]))
         return NULL;
     switch (pass->shader) {
     case VKB_SHADER_kino_prefilter_frag:
@@ -248,6 +247,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_upsampled, TWO_PASSES},
     {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered, TWO_PASSES},
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_kawase_up, TWO_PASSES},
+    {VKB_VARIANTS_CPU, "strips", vkb_add_streaks, 0},
     {VKB_VARIANTS_CPU, "words", add_transform, 0},
     {VKB_VARIANTS_CPU, "pixels", add_pixels, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},

@@ -29,18 +29,29 @@ from vkbloom._core import (
     ValidationError,
 )
 from vkbloom.adapter import AdapterInfo, adapters
-from vkbloom.convolution import Convolution
 from vkbloom.explorer import explore
 from vkbloom.frames import Frames
-from vkbloom.glare import Dirt, Ghosts, Glare, GlareLight, Halo, Streaks
+from vkbloom.glare.base import Glare, GlareLight
+from vkbloom.glare.dirt import Dirt
+from vkbloom.glare.flares import Ghosts, Halo
+from vkbloom.glare.streaks import Streaks
 from vkbloom.glares import glares
-from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
 from vkbloom.image import Image
+from vkbloom.methods.bevy import BevyBloom
+from vkbloom.methods.blender import BlenderGlare
+from vkbloom.methods.convolution import Convolution
+from vkbloom.methods.filament import FilamentBloom
+from vkbloom.methods.godot import GodotBloom
+from vkbloom.methods.kino import KinoBloom
+from vkbloom.methods.mip_chain import DualKawase, Pyramid
+from vkbloom.methods.pygfx import PygfxBloom
+from vkbloom.methods.separable import TUTORIAL, Separable, gaussian_weights
+from vkbloom.methods.unity import HdrpBloom, UrpBloom
+from vkbloom.methods.unreal import UnrealBloom
 from vkbloom.plans import Pass, Plan
 from vkbloom.presets import presets
-from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
 from vkbloom.renderer import Renderer
-from vkbloom.settings import TUTORIAL, DualKawase, Pyramid, Separable, Settings, gaussian_weights
+from vkbloom.settings import Settings
 from vkbloom.surface import Surface
 from vkbloom.version import installed_version
 

@@ -9,12 +9,15 @@ import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.glare import Dirt, Ghosts, Halo, Streaks, check_glare
+from vkbloom.glare.base import check_glare
+from vkbloom.glare.dirt import Dirt
+from vkbloom.glare.flares import Ghosts, Halo
+from vkbloom.glare.streaks import Streaks
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from vkbloom.glare import Glare
+    from vkbloom.glare.base import Glare
 
 
 def _filament() -> tuple[Glare, ...]:

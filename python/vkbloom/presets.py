@@ -8,14 +8,21 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from vkbloom.convolution import Convolution
-from vkbloom.glows import BlenderGlare, GodotBloom, PygfxBloom
+from vkbloom.methods.bevy import BevyBloom
+from vkbloom.methods.blender import BlenderGlare
+from vkbloom.methods.convolution import Convolution
+from vkbloom.methods.filament import FilamentBloom
+from vkbloom.methods.godot import GodotBloom
+from vkbloom.methods.kino import KinoBloom
+from vkbloom.methods.mip_chain import DualKawase, Pyramid
+from vkbloom.methods.pygfx import PygfxBloom
+from vkbloom.methods.separable import Separable
+from vkbloom.methods.unity import HdrpBloom, UrpBloom
+from vkbloom.methods.unreal import UnrealBloom
 from vkbloom.psf.aperture import aperture, iris
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.lens import harvey_shack
 from vkbloom.psf.renderers import fog_glow, unreal
-from vkbloom.published import BevyBloom, FilamentBloom, HdrpBloom, KinoBloom, UnrealBloom, UrpBloom
-from vkbloom.settings import DualKawase, Pyramid, Separable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

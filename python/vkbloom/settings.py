@@ -1,4 +1,4 @@
-"""The settings of a bloom: frozen dataclasses whose parameters the C core declares.
+"""The settings of a bloom: the fields that all methods share.
 
 Defaults and ranges are read from the core's tables, which come from ``shaders/params.h``: each is
 declared once for the shaders, the core and Python.
@@ -7,14 +7,20 @@ declared once for the shaders, the core and Python.
 from __future__ import annotations
 
 import dataclasses
-import math
-import operator
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal, Self, cast, get_args
+from collections.abc import Mapping
+from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 from vkbloom import _core
-from vkbloom.checks import as_float, check_floats, check_like, check_size
-from vkbloom.glare import Glare, replaced_stages, stage_field_of
+from vkbloom.checks import check_like, check_size
+from vkbloom.fields import (
+    choice_field,
+    field_range,
+    flag_field,
+    import_class,
+    make_from_fields,
+    number_field,
+)
+from vkbloom.glare.base import Glare, replaced_stages, stage_field_of
 from vkbloom.glares import read_glare
 
 Shading = Literal["forward", "deferred"]
@@ -22,50 +28,28 @@ Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 Encoding = Literal["none", "gamma22", "srgb"]
 Alpha = Literal["keep", "max", "blur"]
-Texel = Literal["own", "x"]
 BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"]
 
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 BLOOM_FORMATS: tuple[BloomFormat, ...] = get_args(BloomFormat)
 
-#: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
-TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
-
-
-def number_field(
-    name: str,
-    default: float | None = None,
-    unit: str = "1",
-    range: tuple[float, float] | None = None,
-    option: str | None = None,
-) -> Any:
-    """Declare a field that is a number in the core's table, which gives its default and range.
-
-    A method whose source has a narrower range declares it here. `option` is the field's name on the
-    command line, if it differs.
-    """
-    initial, _, _ = _core.VALUES[name]
-    return dataclasses.field(
-        default=initial if default is None else default,
-        metadata={"unit": unit, "range": range, "option": option or name},
-    )
-
-
-def field_range(field: dataclasses.Field[Any]) -> tuple[float, float]:
-    """Return the least and the largest value of a field that is a number."""
-    narrowed: tuple[float, float] | None = field.metadata.get("range")
-    _, low, high = _core.VALUES[field.name]
-    return narrowed or (low, high)
-
-
-def flag_field(name: str) -> Any:
-    """Declare a bool field, which is 0 or 1 in the core's table."""
-    return dataclasses.field(default=bool(_core.VALUES[name][0]))
-
-
-def choice_field(name: str) -> Any:
-    """Declare a field whose value is one of the core's names; the first is the default."""
-    return dataclasses.field(default=_core.CHOICES[name][0])
+#: The class of each method. The order is that of `methods`, and of the methods in the core. The
+#: classes are imported on first use, because some of them import much.
+METHODS: Final = {
+    "separable": "vkbloom.methods.separable:Separable",
+    "pyramid": "vkbloom.methods.mip_chain:Pyramid",
+    "dual_kawase": "vkbloom.methods.mip_chain:DualKawase",
+    "convolution": "vkbloom.methods.convolution:Convolution",
+    "bevy": "vkbloom.methods.bevy:BevyBloom",
+    "kino": "vkbloom.methods.kino:KinoBloom",
+    "filament": "vkbloom.methods.filament:FilamentBloom",
+    "urp": "vkbloom.methods.unity:UrpBloom",
+    "hdrp": "vkbloom.methods.unity:HdrpBloom",
+    "unreal": "vkbloom.methods.unreal:UnrealBloom",
+    "godot": "vkbloom.methods.godot:GodotBloom",
+    "blender": "vkbloom.methods.blender:BlenderGlare",
+    "pygfx": "vkbloom.methods.pygfx:PygfxBloom",
+}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -159,6 +143,8 @@ class Settings:
     method: ClassVar[str]
     #: The composites that the method has.
     composites: ClassVar[tuple[Composite, ...]] = ("add", "mix", "screen")
+    #: Whether the method's threshold has a knee.
+    has_knee: ClassVar[bool] = True
 
     bloom: bool = flag_field("bloom")
     threshold: float | None = None
@@ -187,6 +173,11 @@ class Settings:
             elif field.name in _core.CHOICES:
                 self._check_name(field.name, _core.CHOICES[field.name])
         self._check_name("composite", self.composites, f", which the method {self.method} has")
+        if self.knee != 0 and not self.has_knee:
+            raise ValueError(
+                f"knee: {self.knee!r} is not 0; the threshold of the method {self.method} has no "
+                "knee"
+            )
         if self.format is not None:
             self._check_name("format", BLOOM_FORMATS)
         if self.bloom_size is not None:
@@ -312,25 +303,8 @@ class Settings:
         >>> Settings.from_dict({"method": "pyramid", "levels": 3})  # doctest: +SKIP
         Pyramid(bloom=True, ..., levels=3, ...)
         """
-        if not isinstance(fields, Mapping):
-            raise TypeError(f"fields: a mapping is needed, not {type(fields).__name__}")
-        own = getattr(cls, "method", None)
-        method = fields.get("method", own)
-        kinds = methods()
-        if not isinstance(method, str) or method not in kinds:
-            raise ValueError(f"method: {method!r} is not one of {', '.join(kinds)}")
-        if own not in (None, method):
-            raise ValueError(f"method: {method!r} is not the {own!r} of {cls.__name__}")
-        values = {name: value for name, value in fields.items() if name != "method"}
-        known = [field.name for field in dataclasses.fields(kinds[method])]
-        unknown = [name for name in values if name not in known]
-        if unknown:
-            raise ValueError(
-                f"fields: {method} has no {', '.join(map(repr, unknown))}; it has "
-                f"{', '.join(known)}"
-            )
-        made: Any = kinds[method](**values)
-        return cast("Self", made)
+        made: Self = make_from_fields(cls, methods(), "method", fields, "fields")
+        return made
 
     def to_json(self) -> str:
         """Return `to_dict` as JSON text.
@@ -393,274 +367,9 @@ class Settings:
         return display.fields_html(self)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Separable(Settings):
-    """A blur by a symmetric kernel, first vertical, then horizontal.
-
-    One pass computes w0 c(0) + strength * sum of w_i (c(+i) + c(-i)) over i = 1..n. Its taps are
-    ``blur_scale`` texels of the bloom buffer apart, filtered bilinearly and clamped to the edge.
-    All passes but the last run at the size of the bloom buffers; the last is evaluated at every
-    pixel of ``final``.
-
-    Parameters
-    ----------
-    blur_scale : float
-        Distance of the taps in texels, 0 to 16.
-    blur_strength : float
-        Factor of all taps except the centre, 0 to 16.
-    weights : sequence of float
-        Half-kernel w0..wn, 1 to 65 of them.
-    loops : int
-        How often the vertical and horizontal passes are repeated, 1 to 16 times.
-    layers : sequence of (float, float)
-        (scale, strength), 1 to 8 of them, each number 0 to 16. Each layer is a complete blur at
-        blur_scale * scale; the blurs are added with their strengths.
-    first_tap : {1, 0}
-        First index of the sum, 0 or 1. 0: the sum includes the centre, whose weight becomes
-        w0 (1 + 2 strength).
-    texel : {"own", "x"}
-        Step of the vertical pass. "own": 1 / height of the texture; "x": 1 / width, as in the
-        horizontal pass.
-    direct : bool
-        Whether to apply the kernel as one pass of N x N taps instead of two of N.
-    **settings
-        The fields of `Settings`.
-
-    See Also
-    --------
-    gaussian_weights : Makes `weights`.
-    Pyramid, DualKawase : Methods for wide blurs.
-
-    Notes
-    -----
-    Source: the forward system and the outline system, which differ in `first_tap` and `texel`.
-
-    Examples
-    --------
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(1.0), blur_strength=1.0)
-    >>> image = np.zeros((9, 9, 4), np.float32)
-    >>> image[4, 4] = 1
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     bloom = renderer.apply(image, settings)["bloom"]
-    >>> bloom[4, 1:8, 0].round(3)
-    array([0.002, 0.022, 0.097, 0.159, 0.097, 0.022, 0.002], dtype=float32)
-    """
-
-    method: ClassVar[str] = "separable"
-
-    blur_scale: float = number_field("blur_scale", unit="texel")
-    blur_strength: float = number_field("blur_strength")
-    weights: tuple[float, ...] = TUTORIAL
-    loops: int = number_field("loops")
-    layers: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
-    first_tap: int = number_field("first_tap")
-    texel: Texel = choice_field("texel")
-    direct: bool = flag_field("direct")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "weights", check_floats("weights", self.weights))
-        if not 1 <= len(self.weights) <= _core.MAX_WEIGHTS:
-            raise ValueError(
-                f"weights: {len(self.weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
-            )
-        try:
-            pairs = tuple(tuple(layer) for layer in self.layers)
-        except TypeError:
-            raise TypeError(
-                f"layers: {self.layers!r} is not a sequence of pairs (scale, strength)"
-            ) from None
-        layers = tuple(check_floats("layers", layer) for layer in pairs)
-        if not 1 <= len(layers) <= _core.MAX_LAYERS:
-            raise ValueError(
-                f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}"
-            )
-        if any(len(layer) != 2 for layer in layers):
-            raise ValueError(
-                f"layers: {self.layers!r} is not a sequence of pairs (scale, strength)"
-            )
-        if any(not 0 <= number <= 16 for layer in layers for number in layer):
-            raise ValueError(f"layers: {self.layers!r} has a number out of range, 0 to 16")
-        object.__setattr__(self, "layers", layers)
-
-
-def check_level_weights(weights: Sequence[float], count: int) -> tuple[float, ...]:
-    """Return the weights as floats; TypeError or ValueError unless they are `count` numbers."""
-    numbers = check_floats("level_weights", weights)
-    if len(numbers) != count:
-        raise ValueError(
-            f"level_weights: {len(numbers)} weights are out of range, {count}, one for each level"
-        )
-    return numbers
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Pyramid(Settings):
-    """A mip chain: 13 taps down, a 3 x 3 tent up, the levels added on the way.
-
-    Parameters
-    ----------
-    levels : int
-        Number of levels, 1 to 16. ``down_0`` has half of the bloom size, each next level half of
-        the previous one, floored and at least 1. The chain ends before a level of 1 x 1, unless
-        that is the first.
-    radius : float
-        Distance of the tent's taps in texels of the smaller level, 0 to 16.
-    firefly_filter : bool
-        In the first downsample the five 2 x 2 groups are weighted by 1 / (1 + luminance of the
-        group's mean) and renormalized.
-    level_weights : sequence of float or None
-        As many finite numbers w_0, w_1, ... as `levels`; they may be negative. If the chain ends
-        early, only the first ones are used. None: the mean of the levels.
-    scale_x, scale_y : float
-        Factors of the distances of all taps, 0 to 16. scale_x=4 stretches the bloom along x, as an
-        anamorphic lens does.
-    **settings
-        The fields of `Settings`.
-
-    See Also
-    --------
-    DualKawase : A chain without additions.
-    BevyBloom, KinoBloom, FilamentBloom, UrpBloom, HdrpBloom : Pyramids of engines.
-
-    Notes
-    -----
-    Weights of the downsample: centre 0.125; four diagonals 1 texel away 0.125 each; four axials
-    2 texels away 0.0625 each; four diagonals 2 texels away 0.03125 each. Upsample: (1 2 1)^2 / 16,
-    up_k = down_k + tent(up_k+1). ``bloom`` is tent(up_0) at every pixel of ``final``, divided by
-    the number of levels, so that a flat image keeps its value. In "rgba8unorm", whose largest value
-    is 1, the images up_k hold the mean of their levels instead of the sum; the bloom is the same.
-
-    With weights up_k = w_k down_k + tent(up_k+1), where the smallest level is w_N-1 down_N-1, and
-    ``bloom`` = tent(up_0) is not divided: a flat image becomes the sum of the weights. In
-    "rgba8unorm" up_k is divided by the sum of the weights' sizes, ``|w_k|`` + ... + ``|w_N-1|``.
-
-    Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
-    SIGGRAPH 2014.
-
-    Examples
-    --------
-    >>> image = np.zeros((32, 32, 3), np.float16)
-    >>> image[16, 16] = 100
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=3, composite="mix"))
-    >>> list(frames)
-    ['glow', 'down_0', 'down_1', 'down_2', 'up_1', 'up_0', 'bloom', 'final']
-    >>> frames["down_2"].shape
-    (4, 4, 4)
-    """
-
-    method: ClassVar[str] = "pyramid"
-
-    levels: int = number_field("levels")
-    radius: float = number_field("radius", unit="texel")
-    firefly_filter: bool = flag_field("firefly_filter")
-    level_weights: tuple[float, ...] | None = None
-    scale_x: float = number_field("scale_x")
-    scale_y: float = number_field("scale_y")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.level_weights is not None:
-            weights = check_level_weights(self.level_weights, self.levels)
-            object.__setattr__(self, "level_weights", weights)
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class DualKawase(Settings):
-    """A chain of halved images: downsampled with 5 taps, upsampled with 8, nothing added.
-
-    Parameters
-    ----------
-    levels : int
-        Number of levels, 1 to 16; their sizes are those of `Pyramid`.
-    offset : float
-        Factor of the distances of all taps, 0 to 16.
-    **settings
-        The fields of `Settings`.
-
-    See Also
-    --------
-    Pyramid : A chain whose levels are added.
-
-    Notes
-    -----
-    Downsample: (4 c + the four diagonals at half a texel of the source) / 8. Upsample: (the four
-    axials at one texel of the smaller level + 2 times the four diagonals at half a texel of it)
-    / 12.
-
-    Source: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
-
-    Examples
-    --------
-    >>> image = np.full((16, 16, 3), 0.25, np.float32)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.DualKawase(levels=2))
-    >>> bool(np.allclose(frames["bloom"][..., :3], 0.25, atol=1e-5))
-    True
-    """
-
-    method: ClassVar[str] = "dual_kawase"
-
-    levels: int = number_field("levels", default=4)
-    offset: float = number_field("offset")
-
-
-def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
-    """Make a normalized Gaussian half-kernel.
-
-    Parameters
-    ----------
-    sigma : float
-        Standard deviation in taps, above 0.
-    radius : int, optional
-        Number of taps on each side, 0 to 64. Default: ceil(3 sigma), at most 64.
-
-    Returns
-    -------
-    tuple of float
-        w0..w_radius with w_i proportional to exp(-i^2 / (2 sigma^2)) and
-        w0 + 2 (w1 + ... + w_radius) = 1.
-
-    Raises
-    ------
-    ValueError
-        `sigma` or `radius` is out of range.
-    TypeError
-        `sigma` is not a number, or `radius` not an integer.
-
-    See Also
-    --------
-    Separable : Takes the weights.
-
-    Examples
-    --------
-    >>> weights = vkbloom.gaussian_weights(1.0, radius=2)
-    >>> [round(weight, 4) for weight in weights]
-    [0.4026, 0.2442, 0.0545]
-    """
-    limit = _core.MAX_WEIGHTS - 1
-    deviation = as_float("sigma", sigma)
-    if not 0 < deviation < math.inf:
-        raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
-    if radius is None:
-        radius = math.ceil(min(3 * deviation, limit))
-    try:
-        radius = operator.index(radius)
-    except TypeError:
-        raise TypeError(f"radius: {radius!r} is not an integer") from None
-    if not 0 <= radius <= limit:
-        raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
-    # A product becomes infinity where the operator ** would raise OverflowError.
-    distances = [tap / deviation for tap in range(radius + 1)]
-    weights = [math.exp(-0.5 * distance * distance) for distance in distances]
-    total = weights[0] + 2 * sum(weights[1:])
-    return tuple(weight / total for weight in weights)
-
-
 def methods() -> dict[str, type[Settings]]:
-    """Return the settings class of each method, by the method's name."""
-    return {kind.method: kind for kind in Settings.__subclasses__()}
+    """Return the settings class of each method, by the method's name, in the order of the core."""
+    return {name: import_class(place) for name, place in METHODS.items()}
 
 
 def check_shading(shading: str) -> Shading:
@@ -673,7 +382,8 @@ def check_shading(shading: str) -> Shading:
 def check_settings(settings: Settings | None) -> Settings:
     """Return the settings, `Separable()` for None; raise TypeError for anything else."""
     if settings is None:
-        return Separable()
+        default: Settings = import_class(METHODS["separable"])()
+        return default
     if not isinstance(settings, Settings):
         raise TypeError(f"settings: {settings!r} is not a Settings")
     return settings

@@ -5,18 +5,12 @@
 Axis along_row;
 
 #define AXIS_FILTER filter_row
-#define AXIS_LINEAR linear_in_row
-#define AXIS_INSET_CUBIC inset_cubic_in_row
 #define AXIS_IMAGE sampler2D image
-#define AXIS_ARGUMENT image
 #define AXIS_TEXEL(at) fetch_clamped(image, ivec2(at, line))
 #include "lib/axis_filter.glsl"
 
 #define AXIS_FILTER filter_column
-#define AXIS_LINEAR linear_in_column
-#define AXIS_INSET_CUBIC inset_cubic_in_column
 #define AXIS_IMAGE sampler2D image
-#define AXIS_ARGUMENT image
 #define AXIS_TEXEL(at) filter_row(image, along_row, at)
 #include "lib/axis_filter.glsl"
 

@@ -33,7 +33,9 @@ vec4 sample_moved(vec2 offset)
 vec4 shade()
 {
     vec4 sum = ADD_OWN != 0 ? texelFetch(before, PIXEL, 0) : vec4(0.0);
-    for (int tap = 0; tap < params.count; ++tap)
+    // The first tap is the pixel's own texel.
+    sum += params.weights[0] * fetch(PIXEL);
+    for (int tap = 1; tap < params.count; ++tap)
         sum += params.weights[tap] * sample_moved(float(tap) * vec2(params.step_x, params.step_y));
     return stored(sum);
 }

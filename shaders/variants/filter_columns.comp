@@ -30,10 +30,7 @@ WRITE_IMAGE(3);
 #include "variants/store.glsl"
 
 #define AXIS_FILTER filter_column
-#define AXIS_LINEAR linear_in_column
-#define AXIS_INSET_CUBIC inset_cubic_in_column
 #define AXIS_IMAGE usamplerBuffer image
-#define AXIS_ARGUMENT image
 #define AXIS_TEXEL(at) load_floats(image, read_shapes[0], line, at)
 #include "lib/axis_filter.glsl"
 

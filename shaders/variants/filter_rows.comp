@@ -17,10 +17,7 @@ READ_IMAGE(1, source);
 WRITE_IMAGE(2);
 
 #define AXIS_FILTER filter_row
-#define AXIS_LINEAR linear_in_row
-#define AXIS_INSET_CUBIC inset_cubic_in_row
 #define AXIS_IMAGE usamplerBuffer image
-#define AXIS_ARGUMENT image
 #define AXIS_TEXEL(at) load_pixel(image, read_shapes[0], clamp(at, 0, read_shapes[0].x - 1), line)
 #include "lib/axis_filter.glsl"
 

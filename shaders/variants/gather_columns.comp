@@ -2,7 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 // Adds up levels of several sizes that filter_rows.comp has filtered along rows: filters each along
-// columns and multiplies it by its weight.
+// columns and multiplies it by its weight. With ADD_OWN the first one has the target's size and needs
+// no filter.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/axis.glsl"
@@ -23,20 +24,34 @@ READ_IMAGE(6, level_5);
 READ_IMAGE(7, level_6);
 WRITE_IMAGE(8);
 
+#define LOAD load_own
+#define LOAD_IMAGE level_0
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS 4
+#define LOAD_FROM 0
+#define LOAD_COUNT COLUMNS
+#include "variants/load.glsl"
+
 #define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
 #define AXIS_FILTER filter_column
-#define AXIS_LINEAR linear_in_column
-#define AXIS_INSET_CUBIC inset_cubic_in_column
 #define AXIS_IMAGE usamplerBuffer image, ivec4 shape
-#define AXIS_ARGUMENT image, shape
 #define AXIS_TEXEL(at) load_floats(image, shape, line, at)
 #include "lib/axis_filter.glsl"
 
 #include "variants/row_axis.glsl"
 
 vec4 sums[COLUMNS];
+
+void add_own(int first, int y)
+{
+    uvec4 raw[COLUMNS];
+
+    load_own(first, y, raw);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        sums[i] += params.shares[0][0] * value_of(raw[i]);
+}
 
 void add(usamplerBuffer image, int level, int first, int y)
 {
@@ -62,7 +77,10 @@ void main()
     for (int y = first.y; y < end; ++y) {
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             sums[i] = vec4(0.0);
-        add(level_0, 0, first.x, y);
+        if (ADD_OWN != 0)
+            add_own(first.x, y);
+        else
+            add(level_0, 0, first.x, y);
         add(level_1, 1, first.x, y);
         add(level_2, 2, first.x, y);
         add(level_3, 3, first.x, y);

@@ -21,7 +21,8 @@ from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
 from vkbloom.io.images import Picture
 from vkbloom.io.srgb import decode_srgb, encode_srgb
-from vkbloom.settings import Pyramid, Separable
+from vkbloom.methods.mip_chain import Pyramid
+from vkbloom.methods.separable import Separable
 
 oiio = pytest.importorskip("OpenImageIO")
 

@@ -9,8 +9,11 @@ import json
 import math
 import pickle
 import re
+import subprocess
+import sys
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +21,8 @@ import pytest
 
 import vkbloom
 from vkbloom import TUTORIAL, Separable, Settings, _core, gaussian_weights, presets
-from vkbloom.settings import field_range
+from vkbloom.fields import field_range
+from vkbloom.settings import methods
 
 DEFAULTS = {
     "bloom": True,
@@ -405,7 +409,17 @@ def documented_range(kind: type[Settings], name: str) -> tuple[float, float] | N
     return (float(found[1]), float(found[2])) if found else None
 
 
-@pytest.mark.parametrize("kind", Settings.__subclasses__())
+def test_methods_have_the_order_of_the_core() -> None:
+    """Importing one method's module first does not change it."""
+    header = Path(__file__).parents[2] / "csrc/passes/settings.h"
+    rows = re.findall(r"^    METHOD\(\w+, (\w+), ", header.read_text(), re.MULTILINE)
+    code = "import vkbloom.methods.pygfx; from vkbloom.settings import methods; print(*methods())"
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert names.stdout.split() == rows
+    assert [kind.method for kind in methods().values()] == rows
+
+
+@pytest.mark.parametrize("kind", methods().values())
 def test_the_ranges_in_docstrings(kind: type[Settings]) -> None:
     for field in dataclasses.fields(kind):
         if field.name not in _core.VALUES or isinstance(field.default, bool):

@@ -47,7 +47,7 @@ class Case(NamedTuple):
 # Every stage and every field of it; every format; all composites; odd sizes.
 CASES: dict[str, Case] = {
     "streaks": Case(Pyramid(glare=(SHORT,), threshold=0.3, knee=0.5)),
-    "streaks-uint8": Case(Separable(glare=(SHORT,), threshold=0.30001), "uint8"),
+    "streaks-uint8": Case(Separable(glare=(SHORT,), threshold=0.30001), "uint8", (64, 48)),
     "streaks-float16": Case(
         Separable(glare=(SHORT,), composite="screen", intensity=0.1), "float16", (64, 48)
     ),
@@ -357,6 +357,8 @@ def test_settings() -> None:
     assert settings.glare[0] == SHORT
     assert Pyramid(glare=cast("Any", "three_lensflare")).glare == glares["three_lensflare"]
     assert Ghosts.from_dict(settings.glare[1].to_dict()) == settings.glare[1]
+    with pytest.raises(ValueError, match=r"^stage: 'halo' is not the 'ghosts' of Ghosts"):
+        Ghosts.from_dict({"stage": "halo"})
     settings = Pyramid(glare=(SHORT,))
     assert settings == Pyramid(glare=cast("Any", [SHORT]))
     assert hash(settings) == hash(Pyramid(glare=cast("Any", SHORT.to_dict())))

@@ -15,7 +15,7 @@ from vkbloom import reductions
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import read
 from vkbloom.cli.program import as_wrong_use
-from vkbloom.glare import stage_field_of
+from vkbloom.glare.base import stage_field_of
 
 __all__ = ["REDUCTIONS", "axis_bounds", "axis_values", "chunk_counts", "named_reductions"]
 

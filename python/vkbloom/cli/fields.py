@@ -15,9 +15,9 @@ import click
 import vkbloom
 from vkbloom import psf
 from vkbloom.cli.program import given
-from vkbloom.convolution import PSFLike
-from vkbloom.glare import Glare
+from vkbloom.glare.base import Glare
 from vkbloom.glares import glares
+from vkbloom.methods.convolution import PSFLike
 from vkbloom.psf.base import PSF
 from vkbloom.views.descriptions import described_parameters
 

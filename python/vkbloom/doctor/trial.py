@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from vkbloom import reference
 from vkbloom.frames import Frames
+from vkbloom.methods.separable import Separable
 from vkbloom.renderer import Renderer
 from vkbloom.scene import Camera, Mesh, Scene
-from vkbloom.settings import Separable
 
 SIZE: Final = (64, 48)
 SETTINGS: Final = Separable(bloom_size=(32, 24))

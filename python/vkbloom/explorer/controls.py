@@ -10,11 +10,12 @@ from typing import Any, Final, Literal
 from vkbloom import _core
 from vkbloom.explorer.functions import functions
 from vkbloom.explorer.steps import slider_step
-from vkbloom.glare import Glare
+from vkbloom.fields import field_range
+from vkbloom.glare.base import Glare
 from vkbloom.glares import glares
 from vkbloom.presets import presets
 from vkbloom.psf.base import PSF
-from vkbloom.settings import Settings, field_range, methods
+from vkbloom.settings import Settings, methods
 from vkbloom.views.descriptions import described_parameters
 
 __all__ = ["METHODS", "as_code", "controls", "settings_from"]

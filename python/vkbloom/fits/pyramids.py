@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from vkbloom.checks import check_index, check_size, import_extra
 from vkbloom.fits.losses import Measure, light
 from vkbloom.fits.result import FitResult
+from vkbloom.methods.mip_chain import Pyramid
 from vkbloom.psf import PSF
 from vkbloom.renderer import Renderer
-from vkbloom.settings import Pyramid
 
 __all__ = ["fit_pyramid"]
 

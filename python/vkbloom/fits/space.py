@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom.checks import check_number
-from vkbloom.settings import Settings, field_range
+from vkbloom.fields import field_range
+from vkbloom.settings import Settings
 
 __all__ = ["Axis", "Bounds", "Point", "Space", "space_of"]
 

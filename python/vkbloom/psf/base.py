@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom.checks import as_float, check_size
+from vkbloom.fields import make_from_fields
 from vkbloom.psf.values import ArrayValue
 
 if TYPE_CHECKING:
@@ -286,20 +287,9 @@ class PSF(abc.ABC):
         >>> psf.PSF.from_dict({"psf": "gaussian", "sigma": 2})
         gaussian(sigma=2.0)
         """
-        if not isinstance(fields, Mapping):
-            raise TypeError(f"psf: a mapping is needed, not {type(fields).__name__}")
         kinds = {kind.__name__: kind for kind in _leaves(PSF)}
-        name = fields.get("psf")
-        if not isinstance(name, str) or name not in kinds:
-            raise ValueError(f"psf: {name!r} is not one of {', '.join(sorted(kinds))}")
-        values = {key: value for key, value in fields.items() if key != "psf"}
-        known = [field.name for field in dataclasses.fields(cast("Any", kinds[name]))]
-        unknown = [key for key in values if key not in known]
-        if unknown:
-            raise ValueError(
-                f"psf: {name} has no {', '.join(map(repr, unknown))}; it has {', '.join(known)}"
-            )
-        return cast("Self", cast("Any", kinds[name])(**values))
+        made: Self = make_from_fields(cls, dict(sorted(kinds.items())), "psf", fields, "psf")
+        return made
 
     def to_json(self) -> str:
         """Return `to_dict` as JSON text.

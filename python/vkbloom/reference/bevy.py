@@ -20,7 +20,7 @@ from .threshold import luminance, masked, soften
 from .upsampling import combine, flat_gain, tent
 
 if TYPE_CHECKING:
-    from vkbloom.published import BevyBloom
+    from vkbloom.methods.bevy import BevyBloom
 
 __all__ = ["gain", "passes"]
 

@@ -19,7 +19,7 @@ from .threshold import brightest, firefly_weight, masked
 from .upsampling import combine, linear, tent_of_target
 
 if TYPE_CHECKING:
-    from vkbloom.glows import BlenderGlare
+    from vkbloom.methods.blender import BlenderGlare
 
 __all__ = ["gain", "passes"]
 

@@ -12,7 +12,7 @@ from .levels import level_sizes
 from .sampling import CENTRE, Array, Taps, sample
 
 if TYPE_CHECKING:
-    from vkbloom.settings import DualKawase
+    from vkbloom.methods.mip_chain import DualKawase
 
 __all__ = ["gain", "passes"]
 

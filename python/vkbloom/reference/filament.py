@@ -20,7 +20,7 @@ from .threshold import brightest, firefly_weight, masked
 from .upsampling import combine, linear, tent_of_target
 
 if TYPE_CHECKING:
-    from vkbloom.published import FilamentBloom
+    from vkbloom.methods.filament import FilamentBloom
 
 __all__ = ["gain", "passes"]
 

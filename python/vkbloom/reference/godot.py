@@ -16,7 +16,7 @@ from .threshold import brightest, luminance, masked
 from .upsampling import cubic, linear
 
 if TYPE_CHECKING:
-    from vkbloom.glows import GodotBloom
+    from vkbloom.methods.godot import GodotBloom
 
 __all__ = ["gain", "passes"]
 

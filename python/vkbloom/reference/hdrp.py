@@ -19,7 +19,7 @@ from .threshold import firefly_weight, luminance, masked
 from .upsampling import combine, cubic, spline_taps
 
 if TYPE_CHECKING:
-    from vkbloom.published import HdrpBloom
+    from vkbloom.methods.unity import HdrpBloom
 
 __all__ = ["gain", "passes"]
 

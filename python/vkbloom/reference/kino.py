@@ -18,7 +18,7 @@ from .threshold import brightest, firefly_weight, masked, soften
 from .upsampling import combine, tent
 
 if TYPE_CHECKING:
-    from vkbloom.published import KinoBloom
+    from vkbloom.methods.kino import KinoBloom
 
 __all__ = ["gain", "passes"]
 

@@ -18,7 +18,7 @@ from .threshold import firefly_weight, luminance, masked
 from .upsampling import combine, linear, tent
 
 if TYPE_CHECKING:
-    from vkbloom.glows import PygfxBloom
+    from vkbloom.methods.pygfx import PygfxBloom
 
 __all__ = ["gain", "passes"]
 

@@ -13,7 +13,7 @@ from .threshold import firefly_weight, luminance
 from .upsampling import combine, tent
 
 if TYPE_CHECKING:
-    from vkbloom.settings import Pyramid
+    from vkbloom.methods.mip_chain import Pyramid
 
 __all__ = ["downsample", "gain", "groups", "passes"]
 

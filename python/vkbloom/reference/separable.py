@@ -10,7 +10,7 @@ from .image import Storage
 from .sampling import Array, sample
 
 if TYPE_CHECKING:
-    from vkbloom.settings import Separable
+    from vkbloom.methods.separable import Separable
 
 __all__ = ["gain", "passes"]
 

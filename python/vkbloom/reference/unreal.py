@@ -16,7 +16,7 @@ from .sampling import Array, sample
 from .threshold import luminance, masked
 
 if TYPE_CHECKING:
-    from vkbloom.published import UnrealBloom
+    from vkbloom.methods.unreal import UnrealBloom
 
 __all__ = ["gain", "passes"]
 

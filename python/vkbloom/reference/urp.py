@@ -19,7 +19,7 @@ from .threshold import masked, soften
 from .upsampling import combine, flat_gain, linear
 
 if TYPE_CHECKING:
-    from vkbloom.published import UrpBloom
+    from vkbloom.methods.unity import UrpBloom
 
 __all__ = ["gain", "passes"]
 

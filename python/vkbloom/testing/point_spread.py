@@ -441,8 +441,8 @@ def _check_lit(assertion: str, spread: Image, error: float) -> None:
             fail(
                 assertion,
                 "a lit pixel gives light",
-                f"the largest value is {largest:.3g} in channel {channel}, which may be off by "
-                f"{error:.3g}",
+                f"the largest value in channel {channel} is {largest:.3g}; more than {error:.3g} "
+                "is needed",
             )
 
 

@@ -5,45 +5,25 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, NamedTuple, cast
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom.checks import check_size
-from vkbloom.glare import SERIALS
+from vkbloom.core_kernel import CoreKernel, kernel_pixels
+from vkbloom.fields import choice_field
 from vkbloom.psf.base import PSF, check_above
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.resampling import box_resample
 from vkbloom.psf.sampled import SampledPSF, samples
-from vkbloom.settings import Settings, choice_field
+from vkbloom.settings import Settings
 
 __all__ = ["Boundary", "Convolution", "PSFLike"]
 
 Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
 #: What a kernel can be given as: a function, what its `to_dict` gave, or an array.
 PSFLike = PSF | Mapping[str, Any] | ArrayLike
-
-
-class CoreKernel(NamedTuple):
-    """What the core reads of a kernel.
-
-    Attributes
-    ----------
-    pixels : ndarray of float32, shape (h, w, 4)
-        Linear RGB, and the mean of its channels for alpha.
-    serial : int
-        A number that no other kernel of this process has.
-    is_grey : bool
-        Whether all channels are equal.
-    prefilter : (float, float, float)
-        min, max and mult of Unreal Engine's; min above max: none.
-    """
-
-    pixels: NDArray[np.float32]
-    serial: int
-    is_grey: bool
-    prefilter: tuple[float, float, float]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -229,9 +209,6 @@ def _kernel(
 def _core_kernel(
     settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
 ) -> tuple[NDArray[np.float32], int, bool]:
-    kernel = _kernel(settings, frame, buffers)
-    pixels = np.empty((*kernel.shape[:2], 4), np.float32)
-    pixels[..., :3] = kernel
-    pixels[..., 3] = kernel.mean(axis=2)
+    pixels, serial = kernel_pixels(_kernel(settings, frame, buffers))
     first = pixels[..., :1]
-    return pixels, next(SERIALS), bool((pixels == first).all())
+    return pixels, serial, bool((pixels == first).all())

@@ -1,0 +1,23 @@
+// Variants of the stages of glare.
+#include "variants/variant.h"
+
+#include <string.h>
+
+static const enum vkb_shader streaks_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(streaks);
+
+bool vkb_add_streaks(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                     bool *fits, struct vkb_error *error)
+{
+    const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == VKB_SHADER_streaks_frag && vkb_fits_words(choice, pass)
+         && vkb_has_format_of(choice->graph, pass->reads[0], pass->targets[0]);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.sampling = 0;
+    row.constants.levels = pass->params.streaks.count;
+    vkb_make_words(&row, streaks_shaders[format], STREAK_COLUMNS, STREAK_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}

@@ -1,0 +1,230 @@
+"""What all stages of glare share, and the stages of settings."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar, Final, Self
+
+from vkbloom import _core
+from vkbloom.checks import check_like
+from vkbloom.fields import import_class, make_from_fields, number_field
+
+#: The class of each stage, imported on first use. The order is that of `stages`.
+STAGES: Final = {
+    "streaks": "vkbloom.glare.streaks:Streaks",
+    "ghosts": "vkbloom.glare.flares:Ghosts",
+    "halo": "vkbloom.glare.flares:Halo",
+    "dirt": "vkbloom.glare.dirt:Dirt",
+}
+
+
+def stage_field(name: str, default: float | None = None, unit: str = "1") -> Any:
+    """Declare a field that is a number in the core's table of glare."""
+    return number_field(name, default=default, unit=unit, table=_core.GLARE_VALUES)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Glare:
+    """Base class of the stages of glare; use a stage's class, such as `Streaks`.
+
+    Stages are frozen and hashable. Their light is added to the bloom: with s the scene, b the
+    bloom, i its intensity and g_k, i_k the framebuffer and the intensity of each stage, ``final``
+    is made of s and i b + sum of i_k g_k in place of i b. `Dirt` multiplies this sum.
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    Ghosts, Halo, Streaks, Dirt : The stages.
+    Settings : Takes stages as `glare`.
+
+    Examples
+    --------
+    >>> settings = vkbloom.Pyramid(glare=(vkbloom.Streaks(), vkbloom.Streaks(directions=1)))
+    >>> image = np.zeros((32, 32, 3), np.float16)
+    >>> image[16, 16] = 100
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, settings)
+    >>> list(frames)[:3]
+    ['glow', 'streaks_0', 'streaks_1']
+    """
+
+    stage: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        if not hasattr(self, "stage"):
+            raise TypeError(f"{type(self).__name__} is abstract; use a stage, such as Streaks")
+        for field in dataclasses.fields(self):
+            if field.name in _core.GLARE_VALUES:
+                _, low, high = _core.GLARE_VALUES[field.name]
+                value = check_like(field.default, field.name, getattr(self, field.name), low, high)
+                object.__setattr__(self, field.name, value)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields by name, and ``stage``.
+
+        Returns
+        -------
+        dict
+            Values that JSON can represent.
+
+        See Also
+        --------
+        from_dict : Makes a stage from the result.
+
+        Examples
+        --------
+        >>> vkbloom.Streaks(directions=4).to_dict()["stage"]
+        'streaks'
+        """
+        return {"stage": self.stage, **dataclasses.asdict(self)}
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """Make a stage from the result of `to_dict`.
+
+        Parameters
+        ----------
+        fields : mapping of str to object
+            Values by field. Missing fields have their defaults. ``stage`` names the class; it may
+            be missing in calls on a stage's class, such as ``Streaks.from_dict``.
+
+        Returns
+        -------
+        Glare
+
+        Raises
+        ------
+        ValueError
+            There is no such stage or field, the stage is not that of the class, or a value is out
+            of range.
+        TypeError
+            A value has the wrong type.
+
+        See Also
+        --------
+        to_dict : The fields by name.
+
+        Examples
+        --------
+        >>> vkbloom.Streaks.from_dict({"stage": "streaks", "directions": 4}).directions
+        4
+        """
+        made: Self = make_from_fields(cls, stages(), "stage", fields, "glare")
+        return made
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class GlareLight(Glare):
+    """Base class of the stages that have light; use a stage's class, such as `Streaks`.
+
+    Parameters
+    ----------
+    intensity : float
+        Factor of the stage's light, 0 to 65504.
+    threshold : float
+        What is subtracted from each channel of what the stage reads, 0 to 65504; negative
+        differences become 0. If alpha is blurred, it is multiplied by the factor of the brightest
+        channel.
+    halvings : int
+        How often the size of the bloom buffers is halved for the stage, 0 to 4, by the 13 taps of
+        `Pyramid`. Each halving makes the stage four times as fast, and its light coarser.
+
+    See Also
+    --------
+    Ghosts, Halo, Streaks : The stages.
+
+    Notes
+    -----
+    A stage reads what glows: ``glow``, with threshold, mask and emission. Published methods apply
+    threshold and mask later than that, so that for the stages they are applied by themselves, by
+    the formulas of `Settings`. Outside of the picture there is no light. The framebuffers of stages
+    are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
+
+    Examples
+    --------
+    >>> vkbloom.Streaks(intensity=2, threshold=1).halvings
+    1
+    """
+
+    intensity: float = stage_field("intensity")
+    threshold: float = stage_field("threshold")
+    halvings: int = stage_field("halvings")
+
+
+def stages() -> dict[str, type[Glare]]:
+    """Return the class of each stage, by the stage's name."""
+    return {name: import_class(place) for name, place in STAGES.items()}
+
+
+def check_glare(glare: object) -> tuple[Glare, ...]:
+    """Return the stages of settings.
+
+    Parameters
+    ----------
+    glare : Glare, mapping, a sequence of them, or None
+        A mapping is what `Glare.to_dict` gave; None is no stage.
+
+    Raises
+    ------
+    ValueError
+        There are too many stages, or a mapping does not describe a stage.
+    TypeError
+        Something else is among them.
+    """
+    if glare is None:
+        return ()
+    if isinstance(glare, Glare | Mapping):
+        glare = (glare,)
+    if isinstance(glare, str) or not isinstance(glare, Iterable):
+        raise TypeError(f"glare: {glare!r} is not a sequence of stages")
+    found = []
+    for one in glare:
+        stage = Glare.from_dict(one) if isinstance(one, Mapping) else one
+        if not isinstance(stage, Glare):
+            raise TypeError(f"glare: {one!r} is not a stage, such as Streaks()")
+        found.append(stage)
+    if sum(stage.stage == "dirt" for stage in found) > 1:
+        raise ValueError("glare: there is more than one stage of dirt")
+    if len(found) > _core.MAX_STAGES:
+        raise ValueError(f"glare: {len(found)} stages are out of range, 0 to {_core.MAX_STAGES}")
+    return tuple(found)
+
+
+def stage_field_of(glare: tuple[Glare, ...], name: str) -> tuple[int, str]:
+    """Return the stage and the field of a name such as "glare.0.intensity".
+
+    Raises
+    ------
+    ValueError
+        There is no such stage, or it has no such field.
+    """
+    parts = name.split(".")
+    if len(parts) == 3 and parts[0] == "glare" and parts[1].isdecimal():
+        place = int(parts[1])
+        if place < len(glare) and parts[2] in glare[place].__dataclass_fields__:
+            return place, parts[2]
+    known = [
+        f"glare.{place}.{field.name}"
+        for place, stage in enumerate(glare)
+        for field in dataclasses.fields(stage)
+    ]
+    raise ValueError(
+        f"glare: {name!r} is not a field of a stage: {', '.join(known) or 'no stages'}"
+    )
+
+
+def replaced_stages(glare: tuple[Glare, ...], changes: Mapping[str, Any]) -> tuple[Glare, ...]:
+    """Return stages with some fields changed, by names such as "glare.0.intensity"."""
+    stages_now = list(glare)
+    for name, value in changes.items():
+        place, field = stage_field_of(glare, name)
+        changed: Any = dataclasses.replace(stages_now[place], **{field: value})
+        stages_now[place] = changed
+    return tuple(stages_now)

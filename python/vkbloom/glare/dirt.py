@@ -1,0 +1,121 @@
+"""Dirt on the lens."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import Any, ClassVar, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import check_number
+from vkbloom.core_kernel import CoreKernel, kernel_pixels
+from vkbloom.glare.base import Glare, stage_field
+
+DirtMode = Literal["multiply", "lerp"]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Dirt(Glare):
+    """A picture of dirt on the lens, by which bloom and glare are multiplied.
+
+    Parameters
+    ----------
+    image : array-like, shape (H, W) or (H, W, 3), or None
+        Linear and finite; it is copied, as float32, and enlarged bilinearly to the frame. None: a
+        picture of 480 x 270 that is made from the seed.
+    seed : int
+        0 to 65535.
+    strength : float
+        The s of the formulas, 0 to 16; with "lerp" 0 to 1.
+    mode : {"multiply", "lerp"}
+        With the light L and the dirt D, L D s or L (1 + s (D - 1)).
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    Settings : Takes it among `glare`, once at the most.
+
+    Notes
+    -----
+    Source: "multiply" as in google/filament, colorGrading.mat @ 263d042924de; "lerp" as in
+    godotengine/godot, tonemap.glsl @ 001c8c9c24dc (the glow map).
+
+    Examples
+    --------
+    >>> image = np.ones((4, 4, 3), np.float32)
+    >>> dirt = vkbloom.Dirt(image=[[0.5, 1]], mode="lerp", strength=0.5)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     final = renderer.apply(image, vkbloom.Pyramid(glare=(dirt,)))["final"]
+    >>> final[0, :, 0]
+    array([1.75  , 1.8125, 1.9375, 2.    ], dtype=float32)
+    """
+
+    stage: ClassVar[str] = "dirt"
+
+    image: Any = None
+    seed: int = stage_field("seed")
+    strength: float = stage_field("strength")
+    mode: DirtMode = "multiply"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.mode not in get_args(DirtMode):
+            raise ValueError(f"mode: {self.mode!r} is not one of {', '.join(get_args(DirtMode))}")
+        if self.mode == "lerp":
+            check_number("strength", self.strength, 0, 1)
+        if self.image is not None:
+            # Imported here, since settings are used without point-spread functions, too.
+            from vkbloom.psf.sampled import check_values  # noqa: PLC0415
+
+            object.__setattr__(self, "image", check_values("image", self.image))
+
+    def to_dict(self) -> dict[str, Any]:  # noqa: D102  as of Glare
+        image = None if self.image is None else self.image.to_plain()
+        return {**super().to_dict(), "image": image}
+
+    @property
+    def lerp(self) -> int:
+        """Whether the mode is "lerp", for the core."""
+        return int(self.mode == "lerp")
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """The picture, shape (H, W) or (H, W, 3)."""
+        return _made_dirt(self.seed) if self.image is None else self.image.array
+
+    def core_kernel(self, frame: object, buffers: object) -> CoreKernel:
+        """Return the picture as the core reads a kernel."""
+        return CoreKernel(*_core_dirt(self.replace_look()))
+
+    def replace_look(self) -> Dirt:
+        """Return the dirt with the defaults of all that its picture does not depend on."""
+        return Dirt(image=self.image, seed=self.seed)
+
+
+@functools.lru_cache(maxsize=4)
+def _core_dirt(dirt: Dirt) -> tuple[NDArray[np.float32], int]:
+    return kernel_pixels(dirt.pixels)
+
+
+@functools.lru_cache(maxsize=4)
+def _made_dirt(seed: int) -> NDArray[np.float32]:
+    """Return soft discs and specks of 0 to 1, (270, 480)."""
+    random = np.random.default_rng(seed)
+    y, x = np.indices((270, 480), np.float32)
+    picture = np.full(x.shape, 0.1, np.float32)
+    for radius, light in ((20.0, 0.25), (8.0, 0.4), (2.5, 0.6)):
+        for _ in range(40):
+            size = radius * random.uniform(0.5, 1.5)
+            distance = np.hypot(x - random.uniform(0, 480), y - random.uniform(0, 270)) / size
+            picture += light * random.random() * np.clip(4 * (1 - distance), 0, 1)
+    made: NDArray[np.float32] = np.minimum(picture, 1).astype(np.float32)
+    made.flags.writeable = False
+    return made

@@ -1,0 +1,99 @@
+"""Godot's glow."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vkbloom.checks import FLT_MAX, check_number
+from vkbloom.fields import flag_field, number_field
+from vkbloom.methods.mip_chain import check_level_weights
+from vkbloom.settings import BloomFormat, Composite, Settings
+
+#: Number of levels that have a weight in Godot.
+GODOT_LEVELS = 7
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class GodotBloom(Settings):
+    """Godot's glow, by default that of 4.6.
+
+    Parameters
+    ----------
+    threshold : float or None
+        Brightest channel from which a colour glows; Godot's HDR threshold.
+    threshold_scale : float
+        Brightness over which the threshold fades in, 0 to 65504.
+    luminance_cap : float
+        Largest value of a channel of ``down_0``, 0 to 65504.
+    glow_bloom : float
+        Share of every colour that glows regardless of the threshold, 0 to 1.
+    strength : float
+        Factor of each level's blur, 0 to 16.
+    level_weights : sequence of float
+        Seven weights, one for each level, 0 or more.
+    bicubic : bool
+        Whether to enlarge the levels by the cubic B-spline, as Godot does on desktop systems,
+        instead of bilinearly.
+    white : float
+        Largest brightness of the composite "screen", 0.01 to 65504.
+    composite : {"screen", "soft_light", "add", "replace", "mix"}
+        With s the scene and g the bloom times the intensity i. "screen": s + g - s g / white with g
+        clamped to 0..white. "soft_light": s + g (f(s) - s) with s and g after the tone map, g
+        clamped to 0..1, and f(s) = ((16 s - 12) s + 4) s up to 1/4, then sqrt(s), and s above 1.
+        "add": s + g. "replace": g. "mix": (1 - i) s + g.
+    exposure : float
+        In stops. It multiplies the scene before the composite, and ``down_0`` before the threshold.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    See Also
+    --------
+    presets : "godot_4_5" and "godot_4_6".
+
+    Notes
+    -----
+    Level i has the size floor(side / 2) >> i of the frame, at least 1. It is the image above it
+    (for level 0 the frame), read bilinearly at the level's pixel centres. It is blurred by the
+    half-kernel 0.2024, 0.1790, 0.1240, 0.0672, 0.0285 along both axes, and multiplied by the
+    strength. Samples are read in pairs: place n reads clamp(2 floor(n / 2), 0, W - 2) + n mod 2. So
+    the last two repeat beyond the border, and the last pixel of an odd width reads the one before
+    it. Sides of 1 are undefined in Godot; here all their places read the one sample.
+
+    In the first level, c is divided by 1 + L before the blur and by 1 - L after it, with
+    L = max((0.299, 0.587, 0.114) . c, 0) / max(cap, 6). Strength and exposure follow, then the
+    factor max(smoothstep(threshold, threshold + scale, max(c)), glow_bloom), then the cap.
+    ``bloom`` is the weighted sum of the enlarged levels. A weight up to 0.0001 counts as 0, and
+    levels after the last weight that is not 0 do not exist.
+
+    Source: godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl
+    @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc.
+
+    Examples
+    --------
+    >>> vkbloom.GodotBloom().composite
+    'screen'
+    """
+
+    method: ClassVar[str] = "godot"
+    composites: ClassVar[tuple[Composite, ...]] = ("screen", "soft_light", "add", "replace", "mix")
+    has_knee: ClassVar[bool] = False
+
+    threshold: float | None = 1.0
+    composite: Composite = "screen"
+    intensity: float = number_field("intensity", default=0.3)
+    format: BloomFormat | None = "rgba16float"
+    threshold_scale: float = number_field("threshold_scale")
+    luminance_cap: float = number_field("luminance_cap")
+    glow_bloom: float = number_field("glow_bloom")
+    strength: float = number_field("strength")
+    level_weights: tuple[float, ...] = (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0)
+    bicubic: bool = flag_field("bicubic")
+    white: float = number_field("white")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        weights = check_level_weights(self.level_weights, GODOT_LEVELS)
+        for weight in weights:
+            check_number("level_weights", weight, 0, FLT_MAX)
+        object.__setattr__(self, "level_weights", weights)
