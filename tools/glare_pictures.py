@@ -22,12 +22,12 @@ LOOK = vkbloom.Pyramid(threshold=1.0, intensity=0.15, exposure=0.6, tonemap="agx
 SHOWN: dict[str, tuple[vkbloom.Glare, ...]] = {
     "without glare": (),
     **vkbloom.glares,
-    "six streaks": (vkbloom.Streaks(threshold=4, fade=0.97),),
+    "six streaks": (vkbloom.Streaks(threshold=4, fade=0.94),),
     "ghosts and a halo": (
         vkbloom.Ghosts(threshold=6, aberration=0.01),
         vkbloom.Halo(threshold=6, aberration=0.01),
     ),
-    "streaks and dirt": (vkbloom.Streaks(threshold=4, fade=0.97), vkbloom.Dirt(strength=2)),
+    "streaks and dirt": (vkbloom.Streaks(threshold=4, fade=0.94), vkbloom.Dirt(strength=2)),
 }
 
 
@@ -43,11 +43,11 @@ def main() -> None:
             for name, stages in SHOWN.items()
         }
         settings = LOOK.replace(glare=(vkbloom.Streaks(threshold=4),))
-        axes = {"glare.0.fade": [0.9, 0.97, 0.99], "glare.0.directions": [1, 4, 6]}
+        axes = {"glare.0.fade": [0.8, 0.94, 0.98], "glare.0.directions": [1, 4, 6]}
         grid = renderer.grid(image, settings, axes=axes, attachments="final")
     save(shown, folder / "glare.jpg")
     points = {
-        f"fade {fade}, {count} directions": level(grid["final"].values[i, j])
+        f"fade {fade}, directions {count}": level(grid["final"].values[i, j])
         for i, fade in enumerate(axes["glare.0.fade"])
         for j, count in enumerate(axes["glare.0.directions"])
     }

@@ -112,7 +112,7 @@ int vkb_read_serial(PyObject *object, void *number)
     if (PyErr_Occurred())
         return 0;
     if (serial == 0)
-        PyErr_SetString(PyExc_ValueError, "scene: a serial of 0 stands for no scene");
+        PyErr_SetString(PyExc_ValueError, "scene: the serial 0 is reserved");
     *(uint64_t *)number = serial;
     return serial != 0;
 }
@@ -164,7 +164,7 @@ static bool read_choice(const struct reader *reader, int index, int *choice)
             Py_DECREF(value);
             return true;
         }
-    PyErr_Format(PyExc_ValueError, "%s: there is no %R", row->name, value);
+    PyErr_Format(PyExc_ValueError, "%s: unknown value %R", row->name, value);
     Py_DECREF(value);
     return false;
 }
@@ -182,7 +182,7 @@ static bool read_format(const struct reader *reader, enum vkb_format *format)
             *format = vkb_format_by_name(PyBytes_AsString(text));
         Py_XDECREF(text);
         if (!PyErr_Occurred() && (*format == VKB_FORMAT_NONE || vkb_formats[*format].channels == 1))
-            PyErr_Format(PyExc_ValueError, "format: %R is no format of bloom buffers", value);
+            PyErr_Format(PyExc_ValueError, "format: %R is not a format of bloom buffers", value);
     }
     Py_DECREF(value);
     return !PyErr_Occurred();
@@ -200,7 +200,7 @@ static bool read_size(const struct reader *reader, struct vkb_settings *settings
             && PyArg_ParseTuple(value, "O&O&;bloom_size must be (width, height)", vkb_read_uint32,
                                 &settings->bloom_width, vkb_read_uint32, &settings->bloom_height);
         if (done && (settings->bloom_width == 0 || settings->bloom_height == 0)) {
-            PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, 1 a side at least",
+            PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, sides of at least 1",
                          value);
             done = false;
         }
@@ -225,7 +225,7 @@ static bool read_method(const struct reader *reader, enum vkb_method *method)
             Py_DECREF(value);
             return true;
         }
-    PyErr_Format(PyExc_ValueError, "method: there is no %R", value);
+    PyErr_Format(PyExc_ValueError, "method: unknown method %R", value);
     Py_DECREF(value);
     return false;
 }

@@ -8,7 +8,8 @@ static bool read_names(PyObject *tuple, vkb_image_name *names, uint32_t *count)
     const Py_ssize_t given = PyTuple_Size(tuple);
 
     if (given > GATHERED_LEVELS) {
-        PyErr_Format(PyExc_ValueError, "names: %zd are more than %d", given, GATHERED_LEVELS);
+        PyErr_Format(PyExc_ValueError, "names: %zd names are out of range, 0 to %d", given,
+                     GATHERED_LEVELS);
         return false;
     }
     for (*count = 0; *count < given; ++*count) {
@@ -40,7 +41,7 @@ bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyOb
         return true;
     part->rows = source->source.image.size.height;
     if (part->rows > part->height || (uint64_t)first > part->height - part->rows) {
-        PyErr_Format(PyExc_ValueError, "part: rows %zd to %zd of %u", first,
+        PyErr_Format(PyExc_ValueError, "part: rows %zd to %zd are not within 0 to %u", first,
                      first + (Py_ssize_t)part->rows, part->height);
         return false;
     }

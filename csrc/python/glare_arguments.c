@@ -34,7 +34,7 @@ static bool read_kind(PyObject *object, enum vkb_stage_kind *kind)
             Py_DECREF(value);
             return true;
         }
-    PyErr_Format(PyExc_ValueError, "glare: there is no stage %R", value);
+    PyErr_Format(PyExc_ValueError, "glare: unknown stage %R", value);
     Py_DECREF(value);
     return false;
 }
@@ -63,7 +63,8 @@ static bool read_ghost_tuple(PyObject *tuple, struct vkb_stage *stage)
         return false;
     const Py_ssize_t count = PyTuple_Size(tuple);
     if (count > MOST_GHOSTS) {
-        PyErr_Format(PyExc_ValueError, "ghosts: %zd are out of range, 0 to %d", count, MOST_GHOSTS);
+        PyErr_Format(PyExc_ValueError, "ghosts: %zd ghosts are out of range, 0 to %d", count,
+                     MOST_GHOSTS);
         return false;
     }
     for (Py_ssize_t i = 0; i < count; ++i)
@@ -127,7 +128,7 @@ bool vkb_read_dirt(PyObject *object, struct vkb_held_kernel *held, struct vkb_se
         if (settings->stages[i].kind != VKB_STAGE_DIRT)
             continue;
         if (held->held) {
-            PyErr_SetString(PyExc_ValueError, "glare: there is more than one stage of dirt");
+            PyErr_SetString(PyExc_ValueError, "glare: there is more than one stage dirt");
             return false;
         }
         PyObject *tuple = PyObject_GetAttrString(object, "glare");

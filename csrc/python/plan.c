@@ -62,7 +62,8 @@ static bool check_names(const struct vkb_graph *graph, PyObject *names)
         for (image = 0; image < graph->image_count; ++image)
             if (graph->images[image].framebuffer && strlen(list) + VKB_NAME_SIZE + 2 < sizeof list)
                 strcat(strcat(list, *list ? ", " : ""), graph->images[image].name);
-        PyErr_Format(PyExc_ValueError, "attachments: there is no %R here, only %s", name, list);
+        PyErr_Format(PyExc_ValueError, "attachments: unknown framebuffer %R; available: %s", name,
+                     list);
         return false;
     }
     return true;

@@ -28,11 +28,11 @@ static bool check_plan(const struct vkb_renderer *renderer, const struct vkb_sou
                             (PyTypeObject *)state_of((PyObject *)renderer)->plan_type))
         PyErr_SetString(PyExc_TypeError, "plans: a tuple of Plans is needed");
     else if (plan->renderer != renderer->serial)
-        PyErr_SetString(PyExc_ValueError, "plans: one was made for another renderer");
+        PyErr_SetString(PyExc_ValueError, "plans: a plan was made for another renderer");
     else if (!vkb_source_fits(&plan->source, source))
-        PyErr_SetString(PyExc_ValueError, "plans: one was made for another source");
+        PyErr_SetString(PyExc_ValueError, "plans: a plan was made for another source");
     else if (!vkb_graph_same_images(&plan_at(plans, 0)->plan.graph, &plan->plan.graph))
-        PyErr_SetString(PyExc_ValueError, "plans: not all have the same images");
+        PyErr_SetString(PyExc_ValueError, "plans: their images differ");
     else
         return true;
     return false;
@@ -44,7 +44,7 @@ static bool check_plans(const struct vkb_renderer *renderer, const struct vkb_so
     const Py_ssize_t count = PyTuple_Size(plans);
 
     if (count < 1 || PyTuple_Size(arrays) != count) {
-        PyErr_Format(PyExc_ValueError, "arrays: %zd tuples for %zd plans; one is needed for each",
+        PyErr_Format(PyExc_ValueError, "arrays: %zd tuples do not match %zd plans",
                      PyTuple_Size(arrays), count);
         return false;
     }
@@ -151,7 +151,7 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
     if (rows
         && (rows->count == 0 || rows->first >= row->height
             || rows->count > row->height - rows->first)) {
-        PyErr_Format(PyExc_ValueError, "%s: it does not have those rows", row->name);
+        PyErr_Format(PyExc_ValueError, "%s: the rows are not within the framebuffer", row->name);
         return false;
     }
     const size_t size = vkb_output_size(plan, output);
@@ -178,8 +178,8 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
         if (!vkb_require_tuple(tuple, "arrays"))
             return false;
         if (PyTuple_Size(tuple) != (Py_ssize_t)plan->output_count) {
-            PyErr_Format(PyExc_ValueError, "arrays: %zd for %u framebuffers", PyTuple_Size(tuple),
-                         plan->output_count);
+            PyErr_Format(PyExc_ValueError, "arrays: %zd arrays do not match %u framebuffers",
+                         PyTuple_Size(tuple), plan->output_count);
             return false;
         }
         for (uint32_t output = 0; output < plan->output_count; ++output)

@@ -26,7 +26,7 @@ static bool count_elements(const Py_buffer *view, size_t size, const char *what,
     *number = (uint32_t)found;
     if (found <= UINT32_MAX)
         return true;
-    PyErr_Format(PyExc_ValueError, "scene: %zu %s are out of range, %u at the most", found, what,
+    PyErr_Format(PyExc_ValueError, "scene: %zu %s are out of range, 0 to %u", found, what,
                  UINT32_MAX);
     return false;
 }
@@ -63,8 +63,8 @@ static bool read_surfaces(PyObject *tuple, uint32_t texture_count, struct vkb_me
         taken += surface->index_count;
         if (surface->base >= texture_count || surface->emission >= texture_count
             || taken > mesh->index_count) {
-            PyErr_Format(PyExc_ValueError, "scene: surface %zd is beyond the textures or indices",
-                         i);
+            PyErr_Format(PyExc_ValueError,
+                         "scene: surface %zd is not within the textures or indices", i);
             return false;
         }
     }
@@ -174,7 +174,7 @@ static bool find_name(const struct name_row *rows, const char *name, int *value)
             *value = rows->value;
             return true;
         }
-    PyErr_Format(PyExc_ValueError, "texture: there is no %s", name);
+    PyErr_Format(PyExc_ValueError, "texture: unknown %s", name);
     return false;
 }
 

@@ -15,7 +15,7 @@ static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind
                 || (other->format == image->format && other->channels == image->channels))))
         return true;
     if (kind == VKB_INPUT_MASK)
-        PyErr_SetString(PyExc_ValueError, "mask: its size is not that of the image");
+        PyErr_SetString(PyExc_ValueError, "mask: its size differs from the image's");
     else
         PyErr_SetString(PyExc_ValueError,
                         "emission: its shape and dtype are not those of the image");
@@ -28,7 +28,8 @@ static bool read_levels(PyObject *levels, struct vkb_source_object *self)
     const Py_ssize_t count = PyTuple_Size(levels);
 
     if (count > GATHERED_LEVELS) {
-        PyErr_Format(PyExc_ValueError, "levels: %zd are more than %d", count, GATHERED_LEVELS);
+        PyErr_Format(PyExc_ValueError, "levels: %zd levels are out of range, 0 to %d", count,
+                     GATHERED_LEVELS);
         return false;
     }
     for (Py_ssize_t i = 0; i < count; ++i) {
@@ -231,7 +232,7 @@ static bool check_rows(const struct vkb_source_object *source, const struct vkb_
         && part->size.width == image->size.width && first <= image->size.height
         && part->size.height <= image->size.height - first)
         return true;
-    PyErr_SetString(PyExc_ValueError, "fill: the rows do not go into the image");
+    PyErr_SetString(PyExc_ValueError, "fill: the rows do not fit into the image");
     return false;
 }
 

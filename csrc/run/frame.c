@@ -146,8 +146,8 @@ static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
     // If the last write did not reach the image, there is no content to compare with.
     if (image->image.mapped && !image->content.valid)
         vkb_upload_forget(upload);
-    if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, input, &image->image,
-                          &changed, error))
+    if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, run->submission->number,
+                          input, &image->image, &changed, error))
         return false;
     run->send_input[kind] = changed || !image->content.valid;
     return !run->send_input[kind]

@@ -5,15 +5,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { VKB_MAX_PARTS = 8 };
+enum { VKB_MAX_PARTS = 16 };
 
 // Does the rows `first` to `end` (excluded). `part` is below VKB_MAX_PARTS, and no two calls at the
 // same time have the same one.
 typedef void vkb_rows(void *context, uint32_t part, uint32_t first, uint32_t end);
+// The rows before `end` are done.
+typedef void vkb_rows_done(void *context, uint32_t end);
 
 // Divides the rows `first` to `end` between the processor's cores, if they have `size` bytes that
-// are worth it, and returns when all are done. A thread that cannot be started is no error: the
-// caller's thread does its part. The threads receive no signals.
-void vkb_in_parts(vkb_rows *rows, void *context, uint32_t first, uint32_t end, size_t size);
+// are worth it, and returns when all are done. Rows are begun in their order. `done` is called in
+// the caller's thread, while the other threads go on, and at last with `end`; NULL: nobody needs
+// to know. A thread that cannot be started is no error: the others do its part. The threads receive
+// no signals.
+void vkb_in_parts(vkb_rows *rows, vkb_rows_done *done, void *context, uint32_t first, uint32_t end,
+                  size_t size);
 
 #endif

@@ -11,12 +11,12 @@ struct vkb_run {
     struct vkb_submission *submission;
     struct vkb_show *show;  // NULL: nothing is presented
     struct vkb_request *request;
-    const struct vkb_graph *graph;                      // the request's
-    struct vkb_cached_image **images;                   // by the graph's image index
-    struct vkb_content **contents;                      // of the cache
-    struct vkb_cached_image *inputs[VKB_INPUT_COUNT];   // by kind; NULL: none
-    const struct vkb_upload *uploads[VKB_INPUT_COUNT];  // the sources of their pixels
-    bool send_input[VKB_INPUT_COUNT];                   // the device does not have these pixels yet
+    const struct vkb_graph *graph;                     // the request's
+    struct vkb_cached_image **images;                  // by the graph's image index
+    struct vkb_content **contents;                     // of the cache
+    struct vkb_cached_image *inputs[VKB_INPUT_COUNT];  // by kind; NULL: none
+    struct vkb_upload *uploads[VKB_INPUT_COUNT];       // the sources of their pixels
+    bool send_input[VKB_INPUT_COUNT];                  // the device does not have these pixels yet
     // Images to be filled by this submission, and where their pixels start in the staging memory: a
     // kernel and a picture of dirt at most.
     struct vkb_cached_image *constants[2];

@@ -41,11 +41,27 @@ static struct vkb_submission *add_submission(struct vkb_submissions *submissions
     return submission;
 }
 
+// Frees the submissions that nobody waits for and that the device has finished: copies of rows.
+static bool free_finished(const struct vkb_device *device, struct vkb_submissions *submissions,
+                          struct vkb_error *error)
+{
+    for (size_t i = 0; i < submissions->count; ++i) {
+        struct vkb_submission *submission = submissions->submissions[i];
+        if (submission->taken || !submission->pending || !vkb_submission_over(device, submission))
+            continue;
+        if (!vkb_commands_reset(device, &submission->commands, error))
+            return false;
+        submission->pending = false;
+    }
+    return true;
+}
+
 bool vkb_submissions_take(const struct vkb_device *device, struct vkb_submissions *submissions,
                           struct vkb_submission **taken, struct vkb_error *error)
 {
+    if (!free_finished(device, submissions, error))
+        return false;
     struct vkb_submission *submission = find_free(submissions);
-
     if (!submission && !(submission = add_submission(submissions, error)))
         return false;
     if (!submission->commands.pool && !vkb_commands_create(device, &submission->commands, error))
@@ -68,7 +84,7 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
     submission->request_count = 0;
     vkb_readback_release(device, &submission->readback);
     for (size_t i = 0; i < submissions->count; ++i)
-        free_count += !submissions->submissions[i]->taken;
+        free_count += !submissions->submissions[i]->taken && !submissions->submissions[i]->pending;
     if (free_count <= KEPT_SUBMISSIONS)
         return;
     for (size_t i = 0; i < submissions->count; ++i)

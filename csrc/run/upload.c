@@ -4,6 +4,18 @@
 
 #include <string.h>
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+enum {
+    // The device copies at least so many bytes while the host packs others. Each copy is a
+    // submission, which takes about 10 us; the transfer of 1 MiB takes 20 us.
+    BAND_SIZE = 1 << 20,
+    // In how many bands a large image is copied: the last one is what is not hidden.
+    BANDS = 8,
+};
+
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload)
 {
     vkb_buffer_destroy(device, &upload->staging);
@@ -115,26 +127,36 @@ struct rows {
     uint32_t different[VKB_MAX_PARTS];  // the first such row of each part; the height: none
 };
 
-static bool row_differs(const struct rows *rows, uint32_t part, uint32_t y)
+// A row of the input as it is kept: the input's own, or packed into the part's row.
+static const unsigned char *packed_row(const struct rows *rows, uint32_t part, uint32_t y)
 {
     const struct vkb_input *input = rows->input;
-    const struct vkb_upload *upload = rows->upload;
-    const size_t size = row_size(input);
-    unsigned char *packed = upload->packed + part * size;
+    const unsigned char *own = input_row(input, y);
+    unsigned char *packed = rows->upload->packed + part * row_size(input);
 
-    if (is_complete(input) && is_contiguous(input))
-        return memcmp(kept_row(upload, y), input_row(input, y), size) != 0;
+    if (is_complete(input) && is_contiguous(input)
+        && (uintptr_t)own % vkb_formats[input->format].channel_size == 0)
+        return own;
     pack_row(packed, input, y);
-    return memcmp(kept_row(upload, y), packed, size) != 0;
+    return packed;
+}
+
+static bool row_differs(const struct rows *rows, uint32_t part, uint32_t y)
+{
+    return memcmp(kept_row(rows->upload, y), packed_row(rows, part, y), row_size(rows->input)) != 0;
 }
 
 static void compare_part(void *context, uint32_t part, uint32_t first, uint32_t end)
 {
     struct rows *rows = context;
 
+    // Rows come in their order: this one would not be the first that differs.
+    if (rows->different[part] < first)
+        return;
     while (first < end && !row_differs(rows, part, first))
         ++first;
-    rows->different[part] = first < end ? first : rows->input->height;
+    if (first < end)
+        rows->different[part] = first;
 }
 
 // The first row in which the input differs from the image that is held; its height: none.
@@ -148,7 +170,7 @@ static uint32_t first_difference(struct vkb_upload *upload, const struct vkb_inp
         return 0;
     for (int part = 0; part < VKB_MAX_PARTS; ++part)
         rows.different[part] = first;
-    vkb_in_parts(compare_part, &rows, 1, input->height, input->height * row_size(input));
+    vkb_in_parts(compare_part, NULL, &rows, 1, input->height, input->height * row_size(input));
     for (int part = 0; part < VKB_MAX_PARTS; ++part)
         first = rows.different[part] < first ? rows.different[part] : first;
     return first;
@@ -179,10 +201,9 @@ static struct vkb_specials count_singles(const uint32_t *bits, size_t count)
     return (struct vkb_specials){special - infinite, infinite};
 }
 
-static struct vkb_specials count_row(const struct vkb_upload *upload, uint32_t y)
+static struct vkb_specials count_row(const struct vkb_upload *upload, const void *row)
 {
     const size_t count = (size_t)upload->width * vkb_formats[upload->format].channels;
-    const void *row = kept_row(upload, y);
     struct vkb_specials sum = {0};
 
     for (size_t i = 0; upload->format != VKB_FORMAT_RGBA8_UNORM && i < count;
@@ -229,30 +250,62 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
     upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
     upload->row_pitch = image->mapped ? image->row_pitch : size;
     upload->format = input->format;
+    upload->sent = 0;
     upload->width = input->width;
     upload->height = input->height;
     upload->channels = input->channels;
     return true;
 }
 
+// Copies without a place in the host's caches: the device reads the pixels from memory, and the
+// cache would have to read what is overwritten. Needs end_streaming in the same thread.
+static void stream(unsigned char *to, const unsigned char *from, size_t size)
+{
+#ifdef __SSE2__
+    const size_t step = sizeof(__m128i), head = -(uintptr_t)to % step;
+
+    if (size >= head + step) {
+        memcpy(to, from, head);
+        to += head;
+        from += head;
+        size -= head;
+        for (; size >= step; to += step, from += step, size -= step)
+            _mm_stream_si128((__m128i *)(void *)to,
+                             _mm_loadu_si128((const __m128i *)(const void *)from));
+    }
+#endif
+    memcpy(to, from, size);
+}
+
+static void end_streaming(void)
+{
+#ifdef __SSE2__
+    _mm_sfence();
+#endif
+}
+
 static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end)
 {
     const struct rows *rows = context;
+    struct vkb_upload *upload = rows->upload;
+    // A mapped image is read by the same processor, a small one soon compared with the next.
+    const bool streams =
+        upload->pixels == upload->staging.mapped && upload->row_pitch * upload->height >= BAND_SIZE;
 
-    (void)part;
     for (uint32_t y = first; y < end; ++y) {
-        pack_row(kept_row(rows->upload, rows->offset + y), rows->input, y);
-        rows->upload->rows[rows->offset + y] = count_row(rows->upload, rows->offset + y);
+        unsigned char *to = kept_row(upload, rows->offset + y);
+        const unsigned char *row = streams ? packed_row(rows, part, y) : to;
+        if (!streams)
+            pack_row(to, rows->input, y);
+        upload->rows[rows->offset + y] = count_row(upload, row);
+        if (streams)
+            stream(to, row, row_size(rows->input));
     }
+    end_streaming();
 }
 
-// Packs rows `from` to the last of the input, whose first row is row `first` of the image.
-static void pack_rows(struct vkb_upload *upload, const struct vkb_input *input, uint32_t from,
-                      uint32_t first)
+static void sum_specials(struct vkb_upload *upload)
 {
-    struct rows rows = {.upload = upload, .input = input, .offset = first};
-
-    vkb_in_parts(pack_part, &rows, from, input->height, (input->height - from) * row_size(input));
     upload->specials = (struct vkb_specials){0};
     for (uint32_t y = 0; y < upload->height; ++y) {
         upload->specials.nan += upload->rows[y].nan;
@@ -260,40 +313,117 @@ static void pack_rows(struct vkb_upload *upload, const struct vkb_input *input, 
     }
 }
 
+static void record_rows(const struct vkb_device *device, VkCommandBuffer commands,
+                        const struct vkb_upload *upload, const struct vkb_image *image,
+                        uint32_t first, uint32_t end)
+{
+    const VkBufferImageCopy copy = {
+        .bufferOffset = first * upload->row_pitch,
+        .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+        .imageOffset = {0, (int32_t)first, 0},
+        .imageExtent = {image->width, end - first, 1},
+    };
+
+    device->vk.vkCmdCopyBufferToImage(commands, upload->staging.handle, image->handle,
+                                      vkb_access_layout(VKB_ACCESS_COPY_TARGET), 1, &copy);
+}
+
+// Rows that are packed while the device copies those before them.
+struct sending {
+    struct rows rows;  // the first member, as which pack_part gets it
+    struct vkb_device *device;
+    struct vkb_submissions *submissions;
+    uint64_t number;
+    struct vkb_image *image;
+    uint32_t band_rows;
+    bool failed;
+    struct vkb_error *error;
+};
+
+// Submits the copy of the rows from `sent` to `end`. The rows are disjoint, so that only the first
+// copy needs a barrier.
+static bool send_rows(const struct sending *sending, uint32_t end)
+{
+    struct vkb_device *device = sending->device;
+    struct vkb_upload *upload = sending->rows.upload;
+    struct vkb_submission *submission;
+
+    if (!vkb_submissions_take(device, sending->submissions, &submission, sending->error))
+        return false;
+    submission->number = sending->number;
+    bool done = vkb_commands_begin(device, &submission->commands, sending->error)
+             && vkb_buffer_flush(device, &upload->staging, sending->error);
+    if (done && sending->image->access != VKB_ACCESS_COPY_TARGET)
+        vkb_image_transition(device, submission->commands.buffer, sending->image,
+                             VKB_ACCESS_COPY_TARGET);
+    if (done) {
+        record_rows(device, submission->commands.buffer, upload, sending->image, upload->sent, end);
+        done = vkb_submission_submit(device, submission, NULL, sending->error);
+    }
+    if (!done)
+        vkb_commands_destroy(device, &submission->commands);
+    vkb_submissions_give_back(device, sending->submissions, submission);
+    upload->sent = end;
+    return done;
+}
+
+// The last rows are left to the submission that uses the image.
+static void send_done(void *context, uint32_t end)
+{
+    struct sending *sending = context;
+    const struct vkb_upload *upload = sending->rows.upload;
+
+    if (!sending->failed && end < upload->height && end - upload->sent >= sending->band_rows)
+        sending->failed = !send_rows(sending, end);
+}
+
 bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
                      const struct vkb_input *input, uint32_t first, struct vkb_error *error)
 {
-    pack_rows(upload, input, 0, first);
+    struct rows rows = {.upload = upload, .input = input, .offset = first};
+
+    vkb_in_parts(pack_part, NULL, &rows, 0, input->height, input->height * row_size(input));
+    sum_specials(upload);
     return upload->pixels != upload->staging.mapped
         || vkb_buffer_flush(device, &upload->staging, error);
 }
 
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
-                      struct vkb_submissions *submissions, const struct vkb_input *input,
-                      const struct vkb_image *image, bool *changed, struct vkb_error *error)
+                      struct vkb_submissions *submissions, uint64_t number,
+                      const struct vkb_input *input, struct vkb_image *image, bool *changed,
+                      struct vkb_error *error)
 {
     const bool fresh = !holds_such(upload, input);
     const uint32_t first = fresh ? 0 : first_difference(upload, input);
+    const size_t size = row_size(input);
+    const uint32_t least = (uint32_t)(BAND_SIZE / size) + 1, band = input->height / BANDS + 1;
+    struct sending sending = {
+        .rows = {.upload = upload, .input = input},
+        .device = device,
+        .submissions = submissions,
+        .number = number,
+        .image = image,
+        .band_rows = band > least ? band : least,
+        .error = error,
+    };
 
+    upload->sent = 0;
     *changed = first < input->height;
     if (!*changed)
         return true;
     if (!vkb_submissions_wait(device, submissions, error)
         || (fresh && !vkb_upload_begin(device, upload, input, image, error)))
         return false;
-    pack_rows(upload, input, first, 0);
-    return image->mapped || vkb_buffer_flush(device, &upload->staging, error);
+    vkb_in_parts(pack_part, image->mapped ? NULL : send_done, &sending, first, input->height,
+                 (input->height - first) * size);
+    sum_specials(upload);
+    return !sending.failed && (image->mapped || vkb_buffer_flush(device, &upload->staging, error));
 }
 
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,
-                       const struct vkb_upload *upload, struct vkb_image *image)
+                       struct vkb_upload *upload, struct vkb_image *image)
 {
-    VkBufferImageCopy copy = {
-        .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
-        .imageExtent = {image->width, image->height, 1},
-    };
-
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_TARGET);
-    device->vk.vkCmdCopyBufferToImage(commands, upload->staging.handle, image->handle,
-                                      vkb_access_layout(VKB_ACCESS_COPY_TARGET), 1, &copy);
+    record_rows(device, commands, upload, image, upload->sent, upload->height);
+    upload->sent = 0;
 }

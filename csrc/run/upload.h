@@ -1,6 +1,6 @@
 // Upload of images from the host. The pixels are packed into staging memory, or directly into the
 // device's image if it is mapped. They are kept there, so that the same image is not uploaded
-// twice.
+// twice. The device copies the first rows of a large image while the host packs the others.
 #ifndef VKB_UPLOAD_H
 #define VKB_UPLOAD_H
 
@@ -29,8 +29,9 @@ struct vkb_upload {
     uint32_t width, height, channels;
     struct vkb_specials *rows;     // in each row of the image
     struct vkb_specials specials;  // in the complete image
-    unsigned char *packed;         // a row of each part, for the comparison
+    unsigned char *packed;         // a row of each part, before it is compared or kept
     size_t row_capacity, packed_capacity;
+    uint32_t sent;  // rows whose copy was submitted since the last vkb_upload_record
 };
 
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload);
@@ -41,10 +42,12 @@ void vkb_upload_forget(struct vkb_upload *upload);
 // Packs the input in its format, with an alpha of 1 if it has none. *changed becomes true if it
 // differs from the last one. Pending submissions may still read the last one, so it is overwritten
 // only after a wait for them. `image` is the device's image. If it is mapped, it has the pixels
-// now; otherwise vkb_upload_record copies them.
+// now; otherwise vkb_upload_record copies them. Copies of the first rows of a large image are
+// submitted before, each as a submission of its own with that number.
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
-                      struct vkb_submissions *submissions, const struct vkb_input *input,
-                      const struct vkb_image *image, bool *changed, struct vkb_error *error);
+                      struct vkb_submissions *submissions, uint64_t number,
+                      const struct vkb_input *input, struct vkb_image *image, bool *changed,
+                      struct vkb_error *error);
 
 // The same in steps, without a comparison: vkb_upload_begin reserves memory for an image of the
 // input's size and format; vkb_upload_rows packs the input's rows as rows `first` and following of
@@ -55,8 +58,8 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
 bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
                      const struct vkb_input *input, uint32_t first, struct vkb_error *error);
 
-// Records the copy from staging memory to the image.
+// Records the copy of the rows that were not sent yet, from staging memory to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,
-                       const struct vkb_upload *upload, struct vkb_image *image);
+                       struct vkb_upload *upload, struct vkb_image *image);
 
 #endif

@@ -78,4 +78,4 @@ def capture(instance: int, path: str | os.PathLike[str]) -> Iterator[None]:
             else:
                 file.unlink()
     if not captured:
-        raise _core.Error(f"RenderDoc captured nothing. {_HOW}")
+        raise _core.Error(f"RenderDoc made no capture. {_HOW}")

@@ -177,7 +177,9 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
     """
     array = image if isinstance(image, np.ndarray) else _viewed(image, name)
     if type(array) is not np.ndarray and np.ma.is_masked(array):
-        raise ValueError(f"{name}: some of it is masked; fill it first, such as {name}.filled(0)")
+        raise ValueError(
+            f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
+        )
     if array.dtype == np.float64:
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
@@ -209,7 +211,7 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
     """Return the mask as floats of 0 to 1, (H, W), if it has that height and width."""
     array = mask if isinstance(mask, np.ndarray) else _viewed(mask, "mask", ("y", "x"))
     if type(array) is not np.ndarray and np.ma.is_masked(array):
-        raise ValueError("mask: some of it is masked; fill it first, such as mask.filled(0)")
+        raise ValueError("mask: some values are masked; fill them first, such as mask.filled(0)")
     if array.dtype.name not in ("uint8", "bool", "float16", "float32", "float64"):
         cure = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
         raise TypeError(
@@ -244,8 +246,8 @@ def _viewed(
         order = [_dimension(dims, one) for one in dimensions]
         if len(dims) != len(order) or None in order:
             raise ValueError(
-                f"{name}: dimensions {dims} are not {', '.join(dimensions)}; choose of the others "
-                f"first, such as {name}.isel(intensity=0)"
+                f"{name}: dimensions {dims} are not {', '.join(dimensions)}; select one value of "
+                f"the others first, such as {name}.isel(intensity=0)"
             )
         return np.asarray(image.transpose(*order))
     is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
@@ -258,7 +260,7 @@ def _viewed(
     except (TypeError, ValueError, RuntimeError, BufferError) as error:
         raise TypeError(
             f"{name}: an array is needed, not {type(image).__name__}"
-            + (f", of which NumPy says: {error}" if is_viewed else "")
+            + (f"; NumPy: {error}" if is_viewed else "")
         ) from None
 
 
@@ -273,9 +275,9 @@ def _dimension(dims: tuple[Any, ...], name: str) -> Any:
 def _shape_cure(shape: tuple[int, ...]) -> str:
     """Return a hint how to convert an array of this shape to an image; "" if there is none."""
     if len(shape) == 2:
-        return "; of grey make RGB: np.repeat(image[..., None], 3, axis=2)"
+        return "; convert grey to RGB: np.repeat(image[..., None], 3, axis=2)"
     if len(shape) == 3 and shape[2] == 1:
-        return "; of grey make RGB: np.repeat(image, 3, axis=2)"
+        return "; convert grey to RGB: np.repeat(image, 3, axis=2)"
     if len(shape) == 3 and shape[0] in (3, 4):
         return "; move the channels last: np.moveaxis(image, 0, -1)"
     return ""

@@ -1,6 +1,6 @@
-"""Glare under its published names: stages for the field `glare` of any settings.
+"""Glare under its published names: stages for the field `Settings.glare`.
 
-``docs/glare.md`` has the source of each, and the differences from it.
+``docs/glare.md`` has the source of each, and the differences from the source.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def _blender_ghosts(modulation: float = 0.25, iterations: int = 3) -> tuple[Glar
 def _blender_streaks(
     fade: float = 0.9, modulation: float = 0.25, iterations: int = 3, count: int = 4
 ) -> tuple[Glare, ...]:
-    """Return streaks: Blender halves the sum of four taps, and adds up streaks without a mean."""
+    """Return streaks. Blender halves the sum of four taps and does not average the streaks."""
     gain = count / (6.0 - iterations)
     for iteration in range(iterations):
         gain *= sum(fade ** (tap * 4**iteration) for tap in range(4)) / 2
@@ -123,10 +123,10 @@ _URP_SCALE = 1.25**1.5
 #:   ScreenSpaceLensFlare.cs @ 2309d2c2fde8, with an intensity of 1; regular and reversed flares.
 #: - ``"unreal_flare"``: formulas of Unreal Engine's PostProcessLensFlares.cpp, without the bokeh.
 #: - ``"blender_ghosts"``, ``"blender_streaks"``: formulas of the Glare node of Blender 5,
-#:   node_composite_glare.cc, of the same types, at their defaults.
+#:   node_composite_glare.cc, types Ghosts and Streaks, with their defaults.
 #: - ``"anamorphic"``: a long horizontal streak.
-#: - ``"godot_dirt"``: godotengine/godot, tonemap.glsl @ 001c8c9c24dc, the strength of the
-#:   environment's glow map; the picture is made up.
+#: - ``"godot_dirt"``: godotengine/godot, tonemap.glsl @ 001c8c9c24dc, with the default strength of
+#:   the environment's glow map. The picture of the dirt is generated.
 glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
     {
         "filament_flare": _filament(),
@@ -145,7 +145,15 @@ glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
         "blender_ghosts": _blender_ghosts(),
         "blender_streaks": _blender_streaks(),
         "anamorphic": (
-            Streaks(directions=1, threshold=1, fade=0.97, base=6, iterations=3, intensity=0.3),
+            Streaks(
+                directions=1,
+                threshold=1,
+                fade=0.97,
+                base=6,
+                iterations=3,
+                intensity=0.3,
+                halvings=1,
+            ),
         ),
         "godot_dirt": (Dirt(strength=0.8, mode="lerp"),),
     }
@@ -153,7 +161,7 @@ glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
 
 
 def read_glare(glare: object) -> tuple[Glare, ...]:
-    """Return the stages of settings, also of a name of `glares`, as `check_glare` does."""
+    """Return the stages of settings: those of a name in `glares`, or of `check_glare`."""
     if isinstance(glare, str):
         if glare not in glares:
             raise ValueError(f"glare: {glare!r} is not one of {', '.join(glares)}")

@@ -74,13 +74,14 @@ class _Presets(dict[str, "Settings"]):
 #:   up to 4.5 and from 4.6 on.
 #: - ``"blender_bloom"``: the Glare node of Blender 4.5, type Bloom, quality High, its defaults.
 #: - ``"pygfx"``: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
-#: - ``"spencer_photopic"``: the glare of an eye at day, `vkbloom.psf.spencer`. It and the next
-#:   but one and the last describe all light of a point, so that their bloom replaces the picture.
+#: - ``"spencer_photopic"``: the glare of an eye by day, `vkbloom.psf.spencer`. The functions of
+#:   ``"spencer_photopic"``, ``"unreal_convolution"`` and ``"iris_6"`` describe all light of a
+#:   point, so that the bloom replaces the picture.
 #: - ``"blender_fog_glow"``: the Glare node of Blender 4.3, type Fog Glow, `vkbloom.psf.fog_glow`.
 #: - ``"unreal_convolution"``: convolution bloom of Unreal Engine, with its prefilter and the
-#:   energy of its centre, `vkbloom.psf.unreal`; the kernel image is ``"iris_6"``'s.
-#: - ``"camera_lens"``: the scattered light of a lens of 14 surfaces, `vkbloom.psf.harvey_shack`,
-#:   which is 2.5 % of all.
+#:   energy of its centre, `vkbloom.psf.unreal`. The kernel image is that of ``"iris_6"``.
+#: - ``"camera_lens"``: the scattered light of a lens with 14 surfaces, `vkbloom.psf.harvey_shack`,
+#:   which is 2.5 % of all light.
 #: - ``"iris_6"``: diffraction at an iris of six blades at f/8, `vkbloom.psf.aperture`.
 presets: Mapping[str, Settings] = MappingProxyType(
     _Presets(
@@ -114,7 +115,7 @@ presets: Mapping[str, Settings] = MappingProxyType(
             "pygfx": PygfxBloom(),
             "spencer_photopic": Convolution(spencer(), boundary="edge", composite="mix"),
             "blender_fog_glow": Convolution(fog_glow(256), threshold=1.0),
-            # Not normalized: its sums are the kernel's tint.
+            # Not normalized, because the sums of the channels are the kernel's tint.
             "unreal_convolution": Convolution(
                 unreal(aperture(iris(blades=6))), normalize=False, composite="mix"
             ),

@@ -64,7 +64,7 @@ def _arrays_for(
     if out is None:
         return requests.new_arrays(core, plan)
     if not isinstance(out, abc.Mapping):
-        raise TypeError(f"out: a mapping of names to arrays is needed, not {type(out).__name__}")
+        raise TypeError(f"out: {type(out).__name__} is not a mapping of names to arrays")
     names = [name for name, _, _ in plan.outputs]
     for name in out:
         if name not in names:
@@ -96,7 +96,7 @@ def _paired(
         elif count < len(settings):
             one = settings[count]
         else:
-            raise ValueError(f"settings: {len(settings)} are fewer than the images")
+            raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
         work = requests.Work(image_source(image), one)
         # The iterable may overwrite the array when it makes the next image.
         del image
@@ -104,7 +104,7 @@ def _paired(
         del work
         count += 1
     if not isinstance(settings, Settings) and count < len(settings):
-        raise ValueError(f"settings: {len(settings)} are more than the {count} images")
+        raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
 
 
 class Renderer:
@@ -174,9 +174,9 @@ class Renderer:
 
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not isinstance(adapter, str):
-            raise TypeError(f"adapter: a name is needed, not {adapter!r}")
+            raise TypeError(f"adapter: {adapter!r} is not a name")
         if not adapter:
-            raise ValueError('adapter: "" is not a part of a name; "auto" takes the best adapter')
+            raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         variants = os.environ.get("VKBLOOM_FORM") or "auto"
@@ -568,16 +568,18 @@ class Renderer:
         names = check_attachments(attachments)
         if not isinstance(images, abc.Iterable) or isinstance(images, str | bytes | np.ndarray):
             raise TypeError(
-                f"images: several images are needed, not {type(images).__name__}; of one image "
-                "make a list, or call apply"
+                f"images: {type(images).__name__} is not an iterable of images; for one image, "
+                "call apply or pass a list"
             )
         if settings is not None and not isinstance(settings, Settings):
             if not isinstance(settings, abc.Sequence):
-                raise TypeError(f"settings: {settings!r} is not Settings, or a sequence of them")
+                raise TypeError(
+                    f"settings: {settings!r} is not a Settings or a sequence of Settings"
+                )
             settings = [check_settings(one) for one in settings]
             if isinstance(images, abc.Sized) and len(images) != len(settings):
                 raise ValueError(
-                    f"settings: {len(settings)} are not as many as the {len(images)} images"
+                    f"settings: {len(settings)} Settings do not match the {len(images)} images"
                 )
         if self.closed:
             raise ValueError("the renderer is closed")
@@ -922,7 +924,7 @@ class Renderer:
     ) -> Iterator[Frames]:
         # Not a generator, so that arguments are checked at the call and not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
-            raise TypeError(f"settings_seq: several Settings are needed, not {settings_seq!r}")
+            raise TypeError(f"settings_seq: {settings_seq!r} is not an iterable of Settings")
         return self._run_work(
             (requests.Work(source, check_settings(one)) for one in settings_seq), names
         )

@@ -356,7 +356,7 @@ class Settings:
         try:
             fields = json.loads(text)
         except RecursionError:
-            raise ValueError("text: lists and objects stand too deep in each other") from None
+            raise ValueError("text: lists and objects are nested too deeply") from None
         return cls.from_dict(fields)
 
     def _repr_html_(self) -> str:

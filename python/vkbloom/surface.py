@@ -28,16 +28,16 @@ def _window_surface(renderer: Renderer, window: object) -> int:
     """Return the VkSurfaceKHR of a window of glfw, which is a pointer."""
     glfw = import_extra("glfw", "window", "a window")
     if not isinstance(window, ctypes._Pointer):
-        raise TypeError(f"window: {window!r} is not a window of glfw or None")
+        raise TypeError(f"window: {window!r} is not a glfw window or None")
     if renderer.info.bundled:
         raise _core.Error(
-            "the bundled driver opens no windows; set VKBLOOM_DRIVER=system to take the system's"
+            "the bundled driver has no windows; use the system's with VKBLOOM_DRIVER=system"
         )
     handle = ctypes.c_uint64()
     result = glfw.create_window_surface(renderer._core.instance, window, None, ctypes.byref(handle))
     if result != 0:
         raise _core.Error(
-            f"{renderer.info.name} makes no surface of this window (VkResult {result}); "
+            f"{renderer.info.name} cannot create a surface for this window (VkResult {result}); "
             "create the window with the hint CLIENT_API = NO_API"
         )
     return handle.value

@@ -21,13 +21,20 @@ vec4 fetch(ivec2 texel)
     return FIRST != 0 ? above_threshold(value) : value;
 }
 
+vec4 fetch_in_row(ivec2 texel, float part)
+{
+    vec4 value = fetch(texel);
+    return part > 0.0 ? blended(value, fetch(texel + ivec2(1, 0)), part) : value;
+}
+
+// Steps along an axis, and many others, are of integer texels: then half of the fetches, or three of
+// four, would have no weight.
 vec4 sample_moved(vec2 offset)
 {
-    vec2 integer = floor(offset);
+    vec2 integer = floor(offset), part = offset - integer;
     ivec2 texel = PIXEL + ivec2(integer);
-    vec4 four[4] = vec4[4](fetch(texel), fetch(texel + ivec2(1, 0)), fetch(texel + ivec2(0, 1)),
-                           fetch(texel + ivec2(1, 1)));
-    return bilinear(four, offset - integer);
+    vec4 value = fetch_in_row(texel, part.x);
+    return part.y > 0.0 ? blended(value, fetch_in_row(texel + ivec2(0, 1), part.x), part.y) : value;
 }
 
 vec4 shade()

@@ -259,7 +259,7 @@ def test_options_change_a_preset() -> None:
         ("--size 0x8", "size: (0, 8) is out of range"),
         ("--time nan", "time: nan is out of range"),
         ("--frames 0", "'--frames': 0 is not in the range x>=1"),
-        ("--attachments final,glare", "attachments: there is no 'glare' here, only glow"),
+        ("--attachments final,glare", "attachments: unknown framebuffer 'glare'; available: glow"),
         ("--camera-fov 180", "fov is 180.0; over 0 and under 180"),
         ("--glow-intensity -1", "glow_intensity is -1.0; 0 or more"),
         ("--shading flat", "'--shading': 'flat' is not one of 'forward', 'deferred'"),
@@ -496,8 +496,8 @@ def test_an_animation_in_a_gif(tmp_path: Path) -> None:
     ("words", "told"),
     [
         (("--frames", "2", "--attachments", "all"), "a GIF shows one framebuffer"),
-        (("--frames", "2", "--attachments", "depth"), "is no frame of an animation"),
-        (("--fps", "10"), "--fps is for --frames and a GIF"),
+        (("--frames", "2", "--attachments", "depth"), "is not a frame of an animation"),
+        (("--fps", "10"), "--fps needs --frames and a GIF"),
     ],
 )
 def test_what_no_gif_shows(tmp_path: Path, words: tuple[str, ...], told: str) -> None:
@@ -512,7 +512,7 @@ def test_what_no_gif_shows(tmp_path: Path, words: tuple[str, ...], told: str) ->
 def test_render_without_bloom_says_so(tmp_path: Path, words: tuple[str, ...]) -> None:
     result = vkb("render", "-o", tmp_path / "a.png", *SMALL, "--threshold", "2", *words)
     assert result.exit_code == 0
-    assert "nothing lies above the threshold 2" in result.stderr
+    assert "no value is above the threshold 2" in result.stderr
     assert vkb("render", "-o", tmp_path / "a.png", *SMALL, *words).stderr == ""
 
 

@@ -93,7 +93,7 @@ def test_grids(tmp_path: Path) -> None:
     assert "source.emission" in other.stderr
     refused = run("grid", "-o", tmp_path / "h", "--axis", "intensity=0.5,1", "--mask", mask)
     assert refused.exit_code == 2
-    assert "--mask and --emission are for an IMAGE" in refused.stderr
+    assert "--mask and --emission need an IMAGE" in refused.stderr
 
 
 def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
@@ -122,11 +122,11 @@ def test_what_does_not_fit(tmp_path: Path) -> None:
     refused = run("apply", source, out, "--mask", coloured)
     assert refused.exit_code == 1
     assert refused.stderr.count("\n") == 1
-    assert "coloured.png: a mask is grey, and this image has colours" in refused.stderr
+    assert "coloured.png: a mask must be grey, but this image has colours" in refused.stderr
     refused = run("apply", source, out, "--alpha", "blur")
     assert refused.exit_code == 2
     assert "alpha: 'blur' needs an image of 4 channels" in refused.stderr
     assert not out.exists()
     refused = run("explore", "--no-open", "--mask", coloured)
     assert refused.exit_code == 2
-    assert "--mask and --emission are for an IMAGE" in refused.stderr
+    assert "--mask and --emission need an IMAGE" in refused.stderr

@@ -198,7 +198,7 @@ class TestStores:
             (["--reduce", "ssim@blur_scale=3"], "is not a value of the axis"),
             (["--chunk", "blur_scale"], "AXIS=COUNT"),
             (["--size", "3x3"], "the source is not a scene"),
-            (["--attachments", "none"], "request one of them"),
+            (["--attachments", "none"], "request some"),
             (["--sheet", "a.jpg"], "--sheet: a.jpg does not end in .png"),
             (["--curves", "a"], "--curves: a does not end in .png, .svg, .pdf"),
             (
@@ -264,7 +264,7 @@ def test_presets_as_an_axis(tmp_path: Path, image_file: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ((), "nothing varies; give an --axis"),
+        ((), "there is no --axis; give one"),
         (("--axis", "preset=kino", "--intensity", "0.5"), "leave out options of settings"),
         (("--axis", "preset=kino,filament", "--axis", "levels=1,2"), "not all of these presets"),
     ],
@@ -280,7 +280,7 @@ def test_axes_that_cannot_be(
 def test_a_grid_without_bloom_says_so(tmp_path: Path, image_file: Path) -> None:
     words = ("--method", "pyramid", "--axis", "intensity=0.5,1", "--threshold")
     result = run(image_file, *words, "1000", "-o", tmp_path / "a.zarr")
-    assert "nothing lies above the threshold 1000" in result.stderr
+    assert "no value is above the threshold 1000" in result.stderr
     assert run(image_file, *words, "0", "-o", tmp_path / "b.zarr").stderr == ""
 
 
@@ -531,12 +531,12 @@ class TestOptionFiles:
                 1,
                 "a.toml: it contains an integer of more than 64 bits",
             ),
-            ("a.toml", 'axes = {exposure = ";"}', 2, "--axis exposure=;: has no values"),
+            ("a.toml", 'axes = {exposure = ";"}', 2, "--axis exposure=;: there are no values"),
             (
                 "a.toml",
                 'reduce = {p = "psnr@exposure=;"}\naxes = {exposure = [1]}',
                 2,
-                "--axis exposure=;: has no values",
+                "--axis exposure=;: there are no values",
             ),
             ("a.toml", f"chunks = {{exposure = '{'9' * 5000}'}}", 2, "is not AXIS=COUNT"),
             (

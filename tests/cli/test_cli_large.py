@@ -218,7 +218,7 @@ def test_layers_and_parts(
     assert np.array_equal(second, layer)
     monkeypatch.setattr(large, "LARGE", 1)
     first = run(path, "-o", target)
-    assert "the first of its parts 0 first, 1 second" in first.stderr
+    assert "read the first of its parts 0 first, 1 second" in first.stderr
     assert not np.array_equal(vkbloom.read(target), layer)
 
 
@@ -231,7 +231,7 @@ def test_layers_and_parts(
             light(49, 41, 3, "uint8"),
             "emission: shape (49, 41) is not the image's, (50, 41)",
         ),
-        ("mask", light(50, 41, 3, "uint8"), "a mask is grey"),
+        ("mask", light(50, 41, 3, "uint8"), "a mask must be grey"),
     ],
 )
 def test_what_does_not_go_with_it(
@@ -250,7 +250,7 @@ def test_no_bloom_is_told(tmp_path: Path, by_rows: list[int]) -> None:
     path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
     result = run(path, tmp_path / "b.png", "--method", "pyramid", "--threshold", "1")
     assert result.exit_code == 0
-    assert "nothing lies above the threshold 1" in result.stderr
+    assert "no value is above the threshold 1" in result.stderr
     assert by_rows
 
 

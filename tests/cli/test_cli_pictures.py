@@ -62,8 +62,8 @@ class TestSequences:
     @pytest.mark.parametrize(
         ("words", "status", "message"),
         [
-            (["f.*.png", "g.png"], 2, "4 images cannot go into the one file g.png"),
-            (["x.%d.png", "g.%d.png"], 1, "x.%d.png: no image is there"),
+            (["f.*.png", "g.png"], 2, "g.png: one file cannot hold 4 images"),
+            (["x.%d.png", "g.%d.png"], 1, "x.%d.png: no file was found"),
             (["f.0008.png", "./f.0008.png", "out"], 2, "two images have the same name"),
         ],
     )
@@ -145,7 +145,7 @@ def test_quality(tmp_path: Path) -> None:
         assert run(path, tmp_path / f"{quality}.jpg", "--quality", quality).exit_code == 0
     assert (tmp_path / "95.jpg").stat().st_size > (tmp_path / "20.jpg").stat().st_size
     result = run(path, tmp_path / "b.png", "--quality", 90)
-    assert (result.exit_code, "quality: png has none" in result.stderr) == (2, True)
+    assert (result.exit_code, "quality: png has no quality" in result.stderr) == (2, True)
 
 
 class TestJpeg:
@@ -217,7 +217,7 @@ def test_input_colour_is_a_space(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--method", "pyramid", "--threshold", "1"], "nothing lies above the threshold 1; "),
+        (["--method", "pyramid", "--threshold", "1"], "no value is above the threshold 1; "),
         (["--blur-strength", "0", "--method", "separable"], None),
         (["--no-bloom"], None),
         ([], None),

@@ -120,7 +120,7 @@ def test_without_a_display_it_says_so() -> None:
     env = {name: value for name, value in os.environ.items() if name not in names}
     done = view("vkbloom.cli", "view", env=env)
     assert (done.returncode, done.stdout) == (1, "")
-    assert "no window: " in done.stderr
+    assert "no window was opened: " in done.stderr
 
 
 def test_a_scene_s_options_are_refused_with_an_image() -> None:

@@ -66,7 +66,8 @@ def accompanied(renderer: Renderer) -> Arrays:
 
 def glared(renderer: Renderer) -> Arrays:
     """All stages of glare, of another mask the second time."""
-    stages = (vkbloom.Streaks(), vkbloom.Ghosts(), vkbloom.Halo(), vkbloom.Dirt(seed=1))
+    streaks = vkbloom.Streaks(directions=2, base=2, iterations=2)
+    stages = (streaks, vkbloom.Ghosts(), vkbloom.Halo(), vkbloom.Dirt(seed=1))
     settings = vkbloom.Separable(glare=stages)
     mask = picture(*SIZE, 1, seed=2)[..., 0]
     frames = {

@@ -332,7 +332,7 @@ def wrong_ones() -> list[tuple[Any, type[Exception], str]]:
     return [
         ("separable", TypeError, "settings"),
         (Separable(bloom_size=(100_000, 1)), ValueError, "100000 x 1"),
-        (Separable(bloom=False), ValueError, "attachments: there is no 'bloom'"),
+        (Separable(bloom=False), ValueError, "attachments: unknown framebuffer 'bloom'"),
     ]
 
 

@@ -41,15 +41,15 @@ def stage_with(**fields: Any) -> object:
         ({"blur_scale": -1.0}, "blur_scale: -1.0 is out of range, 0.0 to 16.0"),
         ({"blur_scale": float("nan")}, "blur_scale: nan is out of range"),
         ({"blur_scale": "1"}, "real number"),
-        ({"composite": "divide"}, "composite: there is no 'divide'"),
-        ({"composite": 5}, "composite: there is no 5"),
-        ({"format": "bgra8unorm"}, "format: 'bgra8unorm' is no format of bloom buffers"),
-        ({"format": "depth32float"}, "format: 'depth32float' is no format"),
-        ({"format": 5}, "format: 5 is no format"),
+        ({"composite": "divide"}, "composite: unknown value 'divide'"),
+        ({"composite": 5}, "composite: unknown value 5"),
+        ({"format": "bgra8unorm"}, "format: 'bgra8unorm' is not a format of bloom buffers"),
+        ({"format": "depth32float"}, "format: 'depth32float' is not a format"),
+        ({"format": 5}, "format: 5 is not a format"),
         ({"bloom_size": (0, 5)}, r"bloom_size: \(0, 5\) is out of range"),
         ({"bloom_size": 5}, "bloom_size: a tuple is needed, not 5"),
-        ({"method": "gauss"}, "method: there is no 'gauss'"),
-        ({"method": None}, "method: there is no None"),
+        ({"method": "gauss"}, "method: unknown method 'gauss'"),
+        ({"method": None}, "method: unknown method None"),
         ({"weights": ()}, "weights: 0 weights are out of range, 1 to"),
         ({"weights": (1.0,) * 100}, "weights: 100 weights are out of range"),
         ({"weights": 5}, "len|sequence"),
@@ -68,8 +68,8 @@ def stage_with(**fields: Any) -> object:
         ({"layers": 5}, "len|sequence"),
         ({"glare": 5}, "glare: a tuple is needed, not 5"),
         ({"glare": (5,)}, "'int' object has no attribute 'stage'"),
-        ({"glare": (stage_with(stage="rain"),)}, "glare: there is no stage 'rain'"),
-        ({"glare": (stage_with(stage=5),)}, "glare: there is no stage 5"),
+        ({"glare": (stage_with(stage="rain"),)}, "glare: unknown stage 'rain'"),
+        ({"glare": (stage_with(stage=5),)}, "glare: unknown stage 5"),
         ({"glare": (stage_with(fade="1"),)}, "real number"),
         ({"glare": (stage_with(stage="ghosts"),)}, "no attribute 'ghosts'"),
         ({"glare": (stage_with(stage="ghosts", ghosts=5),)}, "ghosts: a tuple is needed"),
@@ -84,7 +84,7 @@ def stage_with(**fields: Any) -> object:
         ),
         (
             {"glare": (stage_with(stage="ghosts", ghosts=((1.0, (1, 1, 1)),) * 17),)},
-            "ghosts: 17 are out of range, 0 to 16",
+            "ghosts: 17 ghosts are out of range, 0 to 16",
         ),
         ({"glare": (stage_with(),) * 6}, "glare: 6 stages are out of range, 0 to 5"),
     ],
@@ -256,12 +256,12 @@ def test_arrays_of_the_wrong_size_or_number(renderer: Renderer) -> None:
     with pytest.raises(ValueError, match="glow: the array has the wrong size"):
         renderer._core.run(source, plans, ((np.zeros(3, np.uint8), *right[1:]),))
     for wrong in (right[1:], (*right, right[0])):
-        with pytest.raises(ValueError, match=f"arrays: {len(wrong)} for 4 framebuffers"):
+        with pytest.raises(ValueError, match=f"{len(wrong)} arrays do not match 4 framebuffers"):
             renderer._core.run(source, plans, (wrong,))
     for arrays in ((), (right, right)):
-        with pytest.raises(ValueError, match="one is needed for each"):
+        with pytest.raises(ValueError, match="do not match"):
             renderer._core.run(source, plans, arrays)
-    with pytest.raises(ValueError, match="one is needed for each"):
+    with pytest.raises(ValueError, match="do not match"):
         renderer._core.run(source, (), ())
     with pytest.raises(TypeError, match="arrays: a tuple is needed"):
         renderer._core.run(source, plans, (list(right),))  # type: ignore[arg-type]
@@ -295,7 +295,7 @@ def test_plans_of_another_source_or_renderer(renderer: Renderer, scene: Scene) -
 def test_plans_with_other_images(renderer: Renderer) -> None:
     source, plans = planned(renderer, Separable(), Separable(bloom_size=(3, 3)))
     assert not plans[0].shares_images(plans[1])
-    with pytest.raises(ValueError, match="not all have the same images"):
+    with pytest.raises(ValueError, match="their images differ"):
         renderer._core.run(source, plans, arrays_for(*plans))
     with pytest.raises(TypeError, match="a Plan is needed"):
         plans[0].shares_images(source)  # type: ignore[arg-type]

@@ -148,10 +148,10 @@ def test_rows_of_an_image(renderer: Renderer) -> None:
         for name, array in zip(("bloom", "final"), arrays, strict=True):
             np.testing.assert_array_equal(array, expected[name][first : first + count])
     for first, count in ((0, 22), (21, 1), (0, 0)):
-        with pytest.raises(ValueError, match="it does not have those rows"):
+        with pytest.raises(ValueError, match="the rows are not within the framebuffer"):
             core.run(source, (plan,), (arrays,), first, count)
     for rows, first in ((image[:8], 14), (image[:8, :30], 0), (image[:8].astype(np.float16), 0)):
-        with pytest.raises(ValueError, match="the rows do not go into the image"):
+        with pytest.raises(ValueError, match="the rows do not fit into the image"):
             core.fill(source, _core.image_source(rows), first)
 
 
@@ -358,9 +358,9 @@ def test_arguments_are_checked_at_the_call(new_renderer: Callable[[], Renderer])
     renderer = new_renderer()
     image = picture(16, 16)
     for images_, settings, error, text in [
-        (image, None, TypeError, "several images"),
-        (7, None, TypeError, "several images"),
-        ([image], [Separable()] * 2, ValueError, "2 are not as many as the 1"),
+        (image, None, TypeError, "an iterable of images"),
+        (7, None, TypeError, "an iterable of images"),
+        ([image], [Separable()] * 2, ValueError, "2 Settings do not match the 1"),
         ([image], 3, TypeError, "settings"),
         ([image], [Separable(), "x"], TypeError, "settings"),
     ]:

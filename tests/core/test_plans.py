@@ -187,7 +187,7 @@ def test_defaults(renderer: Renderer, scene: Scene, plain: Any) -> None:
     [
         ({"size": (16, 9)}, "size: the source is not a scene"),
         ({"shading": "deferred"}, "shading: the source is not a scene"),
-        ({"attachments": ("glare",)}, "attachments: there is no 'glare'"),
+        ({"attachments": ("glare",)}, "attachments: unknown framebuffer 'glare'"),
         ({"settings": Separable(bloom_size=(100_000, 1))}, "100000 x 1"),
     ],
 )

@@ -161,7 +161,7 @@ def test_what_cannot_be_shown(
 
 def test_what_is_no_surface(renderer: Renderer) -> None:
     pytest.importorskip("glfw")
-    with pytest.raises(TypeError, match="window: 'x' is not a window of glfw or None"):
+    with pytest.raises(TypeError, match="window: 'x' is not a glfw window or None"):
         Surface(renderer, "x")
     with pytest.raises(ValueError, match="size"):
         Surface(renderer, size=(0, 1))

@@ -16,7 +16,7 @@ import pytest
 
 import vkbloom
 from tests.framebuffers import decode, make, noise
-from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, presets
+from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, glares, presets
 from vkbloom.explorer.controls import METHODS, as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.explorer.viewer import Viewer
@@ -115,6 +115,24 @@ class TestControls:
                     (made[outer[0]] if outer else made)[key] = end
                     assert settings_from({"method": "convolution", "psf": made})
         assert {field["name"] for field in described["cie_total"]["fields"]} == {"age", "pigment"}
+
+    def test_stages_of_glare(self) -> None:
+        """Every value that a control offers makes a stage; presets are those of `glares`."""
+        described = json.loads(json.dumps(controls(), allow_nan=False))["glare"]
+        assert set(described["presets"]) == set(glares)
+        for name, stage in described["stages"].items():
+            defaults = stage["defaults"]
+            assert defaults["stage"] == name
+            for field in stage["fields"]:
+                assert field["help"], (name, field)
+                for end in field.get("choices", [field.get("from"), field.get("to")]):
+                    glare = [defaults, defaults | {field["name"]: end}][name == "dirt" :]
+                    assert settings_from({"method": "pyramid", "glare": glare})
+                if field["kind"] == "number":
+                    assert field["low"] <= field["from"] < field["to"] <= field["high"]
+                    assert field["integer"] == (type(defaults[field["name"]]) is int)
+        fields = {field["name"] for field in described["stages"]["streaks"]["fields"]}
+        assert {"intensity", "directions", "fade", "halvings"} <= fields
 
     def test_the_ranges_that_were_asked_for(self) -> None:
         fields = {field["name"]: field for field in controls()["methods"]["separable"]["fields"]}
@@ -294,7 +312,7 @@ class TestViewer:
             answer = opened("emission", "glow.exr", glow.read_bytes())
             assert answer["glows"] == {"mask": "mask.png", "emission": "glow.exr"}
             given["emission"] = vkbloom.read(glow)[..., :3]
-        assert "a.png: a mask is grey" in opened("mask", "a.png", file)["error"]
+        assert "a.png: a mask must be grey" in opened("mask", "a.png", file)["error"]
         small = vkbloom.write(tmp_path / "small.png", pixels[:8, :8]).read_bytes()
         assert "is not the image's" in opened("emission", "small.png", small)["error"]
         assert opened("mask")["glows"] == {"emission": "glow.exr"}

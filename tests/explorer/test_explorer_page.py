@@ -204,6 +204,27 @@ def test_point_spread_functions(page: Page) -> None:
     assert field(page, "mask.blades").input_value() == "6"
 
 
+def test_stages_of_glare(page: Page) -> None:
+    """A published glare has controls of each stage; stages can be added."""
+    code = page.locator(".vkb-foot code")
+    page.get_by_label("method").select_option("pyramid")
+    page.get_by_text("More", exact=True).click()
+    field(page, "glare").select_option("three_lensflare")
+    code.filter(has_text="Ghosts(").wait_for()
+    field(page, "glare.0.falloff").fill("8")
+    code.filter(has_text="falloff=8.0").wait_for()
+    field(page, "glare.more").select_option("streaks")
+    field(page, "glare.1.directions").fill("2")
+    code.filter(has_text="directions=2").wait_for()
+    assert field(page, "glare").input_value() == "own"
+    assert "streaks" in page.get_by_label("framebuffer").inner_text()
+    # The published one is as before.
+    field(page, "glare").select_option("three_lensflare")
+    assert field(page, "glare.0.falloff").input_value() == "25"
+    field(page, "glare").select_option("")
+    wait_for_code(page, "vkbloom.Pyramid()")
+
+
 def test_what_is_refused_is_said(page: Page) -> None:
     field(page, "intensity").locator("xpath=following-sibling::input").fill("-1")
     page.get_by_role("alert").get_by_text("intensity: -1").wait_for()

@@ -325,7 +325,7 @@ class TestWrite:
         assert sizes[2] > 4 * sizes[0]
         spec = oiio.ImageBuf(str(tmp_path / "b.jpg")).spec()
         assert spec["jpeg:subsampling"] == "4:4:4"
-        with pytest.raises(ValueError, match="quality: png has none; jpeg, webp, jpegxl have"):
+        with pytest.raises(ValueError, match="png has no quality; jpeg, webp, jpegxl have one"):
             vkbloom.write(tmp_path / "b.png", pixels, quality=90)
         with pytest.raises(ValueError, match="quality: 0 is outside 1 to 100"):
             vkbloom.write(tmp_path / "b.jpg", pixels, quality=0)
@@ -373,7 +373,7 @@ class TestWrite:
             (ValueError, r"array: shape \(3, 4, 5\)", rgb.transpose(2, 0, 1), {}),
             (TypeError, "dtype int64", levels(4, 5, 3).astype(np.int64), {}),
             (ValueError, "encoding: 'sRGB' is not one of", rgb, {"encoding": "sRGB"}),
-            (ValueError, "encoding: 'srgb' is for floats", levels(4, 5, 3), {"encoding": "srgb"}),
+            (ValueError, "encoding: 'srgb' needs floats", levels(4, 5, 3), {"encoding": "srgb"}),
             (ValueError, "bits: 12 is not one of 8, 16, 32", rgb, {"bits": 12}),
             (ValueError, "bits: 16 is not one of 8", levels(4, 5, 3), {"bits": 16}),
             (ValueError, "cannot hold float; try another bits", rgb, {"bits": 32}),

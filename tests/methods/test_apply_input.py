@@ -339,7 +339,7 @@ def test_attachments_come_in_the_order_of_the_data_flow(renderer: Renderer) -> N
     ],
 )
 def test_unknown_attachment(renderer: Renderer, settings: Settings, name: str) -> None:
-    with pytest.raises(ValueError, match=rf"attachments: there is no '{name}'.*final"):
+    with pytest.raises(ValueError, match=rf"attachments: unknown framebuffer '{name}'.*final"):
         renderer.apply(picture(4, 4, 3, "uint8"), settings, attachments=(name,))
 
 
@@ -571,7 +571,7 @@ def test_masked_images(renderer: Renderer) -> None:
     """What lies under a mask is not to be seen."""
     image = picture(5, 6, 3, "float32")
     masked = np.ma.masked_greater(image, float(np.median(image)))
-    with pytest.raises(ValueError, match=r"^image: some of it is masked"):
+    with pytest.raises(ValueError, match=r"^image: some values are masked"):
         renderer.apply(masked)
     assert_same(renderer.apply(masked.filled(0)), renderer.apply(np.where(masked.mask, 0, image)))
     assert_same(renderer.apply(np.ma.masked_invalid(image)), renderer.apply(image))

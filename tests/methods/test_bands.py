@@ -108,11 +108,11 @@ def test_wrong_parts_are_refused(renderer: Renderer) -> None:
         core.plan(image.rows(0, 1).source(), settings, ("down_0",), (30, (), 1))
     with pytest.raises(ValueError, match="has no such rows"):
         core.plan(image.source(), vkbloom.Separable(bloom_scale=0.5), ("final",), (31, (), 1))
-    with pytest.raises(ValueError, match="part: rows 23 to 31 of 30"):
+    with pytest.raises(ValueError, match="part: rows 23 to 31 are not within"):
         plan(("down_0",), (30, (), 23))
-    with pytest.raises(ValueError, match="8 are more than 7"):
+    with pytest.raises(ValueError, match="8 names are out of range"):
         plan(("final",), (8, ("up_0",) * 8, 0))
-    with pytest.raises(ValueError, match="8 are more than 7"):
+    with pytest.raises(ValueError, match="8 levels are out of range"):
         image.source((level,) * 8)
     scene = vkbloom.sources.scene_source(vkbloom.Scene.ufo(), (8, 8), "forward", 0.0)
     with pytest.raises(ValueError, match="only images have bands"):

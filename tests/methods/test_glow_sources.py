@@ -379,7 +379,7 @@ IMAGE = np.zeros((6, 8, 4), np.float32)
         (
             {"mask": np.ma.masked_equal(np.zeros((6, 8)), 0)},
             ValueError,
-            "mask: some of it is masked",
+            "mask: some values are masked",
         ),
         ({"mask": "all"}, TypeError, "mask: an array is needed, not str"),
         (

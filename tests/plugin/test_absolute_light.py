@@ -47,9 +47,9 @@ def test_out_of_range(name: str, value: float) -> None:
 
 
 def test_vdp_needs_both() -> None:
-    with pytest.raises(ValueError, match="nits_per_unit: None is no number; the metric cvvdp"):
+    with pytest.raises(ValueError, match="nits_per_unit: None is not a number; the metric cvvdp"):
         compare(A, B, metrics=["cvvdp"], pixels_per_degree=60)
-    with pytest.raises(ValueError, match="pixels_per_degree: None is no number; ColorVideoVDP"):
+    with pytest.raises(ValueError, match="pixels_per_degree: None is not a number; ColorVideoVDP"):
         reductions.ColorVideoVDP(against=A, nits_per_unit=100)
 
 

@@ -278,7 +278,7 @@ class TestResolution:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"scales": ()}, "scales: empty"),
+            ({"scales": ()}, "scales: there are none"),
             ({"scales": (0.3,)}, "scales: 0.3 makes 14.4 x 14.4 of an image of 48 x 48"),
             ({"scales": (0,)}, "scales: 0 is out of range"),
             ({"light": 0}, "light: 0 is out of range"),

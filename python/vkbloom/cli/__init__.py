@@ -24,7 +24,7 @@ def main() -> None:
         program()
     except SystemExit as error:
         if error.code == INTERRUPTED:
-            # All files are closed. Python would wait for threads, and they for the device.
+            # All files are closed. A normal exit would wait for threads that wait for the device.
             for stream in filter(None, (sys.stdout, sys.stderr)):
                 stream.flush()
             os._exit(INTERRUPTED)

@@ -54,20 +54,20 @@ from vkbloom.settings import Encoding
 @click.command(cls=Command)
 @click.argument("sources", metavar="IN... OUT", nargs=-1, required=True, type=click.Path())
 @click.option(
-    "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, in place of OUT."
+    "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, instead of OUT."
 )
 @click.option(
     "--quality",
     metavar="N",
     type=click.IntRange(1, 100),
-    help="Of JPEG, WebP and JPEG XL [default 98 of JPEG]",
+    help="Quality of JPEG, WebP and JPEG XL [default 98 for JPEG]",
 )
 @click.option(
     "--pipe-format",
     metavar="EXTENSION",
     default="png",
     show_default=True,
-    help="What is written to standard output.",
+    help="Format of standard output.",
 )
 @click.option(
     "--attachments",
@@ -94,8 +94,8 @@ from vkbloom.settings import Encoding
     "--half/--no-half",
     "half",
     default=None,
-    help="Hold large pictures in half floats, which takes half the memory [default of files of 8 "
-    "bits with 64 million pixels and more]",
+    help="Hold large pictures in half floats, which need half the memory [default for 8-bit files "
+    "of at least 64 million pixels]",
 )
 @subimage_option
 @layer_option
@@ -123,46 +123,45 @@ def command(  # noqa: PLR0915  one step after the other
 ) -> None:
     """Add bloom to the image IN and write the result to OUT.
 
-    The formats are those of OpenImageIO, by extension: OpenEXR, Radiance HDR, PNG, JPEG, TIFF and
-    others. IN and OUT may be folders, where names are kept, or printf patterns (f.%04d.exr); IN
-    may be a glob as well, or several files, and either may be - for a pipe.
+    OpenImageIO reads and writes the files; the extension selects the format: OpenEXR, Radiance
+    HDR, PNG, JPEG, TIFF and others. IN and OUT may be folders; the names of the files are kept.
+    They may be printf patterns (f.%04d.exr) or - for a pipe. IN may also be a glob, or several
+    files.
 
-    Without --preset and --method the settings are those of bevy_natural, which other options
-    change.
+    The settings are those of the preset bevy_natural, unless --preset or --method selects others.
+    Further options change them.
 
-    Colours are linear while they bloom. Files of 8 or 16 bit integers are decoded to 32-bit
-    floats of Rec. 709 colours by their ICC profile, their cICP chunk or their gamma, else from
-    sRGB. Files of floats are taken as linear; half stays half, and float stays float.
-    --input-colour says otherwise.
+    Bloom is computed in linear colours. Files of 8 or 16 bit integers are decoded to 32-bit floats
+    with Rec. 709 colours. The decoding uses the ICC profile, the cICP chunk or the gamma of the
+    file, or sRGB if it has none. Files of floats are linear; half stays half, and float stays
+    float. --input-colour overrides this.
 
-    OUT has the number type of IN, or the closest one that its format has: a PNG of a float image
-    has 8 bits. Integers are encoded to sRGB and clipped to 0..1; floats (as in OpenEXR and
-    Radiance HDR) are written linear. --output-colour says otherwise. With an --encoding, the
-    values are encoded already and written as they come. EXIF, resolution and a JPEG's chroma
-    subsampling are kept.
+    OUT has the number type of IN, or the closest one that its format supports: a PNG of a float
+    image has 8 bits. Integers are encoded to sRGB and clipped to 0..1. Floats (as in OpenEXR and
+    Radiance HDR) are written linear. --output-colour overrides this. With --encoding, the values
+    are already encoded and not converted again. EXIF, resolution and a JPEG's chroma subsampling
+    are kept.
 
-    --mask limits what glows, --emission glows in the image's place; of several INs they are for
-    each.
+    --mask limits what glows. --emission glows instead of the image. Both apply to each IN.
 
-    Alpha is kept, unless --alpha says otherwise, and colours are neither multiplied nor divided by
-    it: with --alpha max or blur files of straight colours are multiplied first, and the result is
-    divided. Grey images become RGB
-    and grey again. Of an OpenEXR file whose data window is smaller than its display window, the
-    rest is black; a larger data window takes part, and is kept where OUT can have one. Images
-    are turned upright where the file has an orientation. Of files with several parts the first
-    is read, or --subimage, and of several layers the one that --layer names; channels other than
-    R, G, B and A are left out.
+    Alpha does not change, unless --alpha is given. With --alpha max or blur, straight colours are
+    multiplied by alpha before, and divided by it afterwards. Grey images become RGB and grey again.
+    If the data window of an OpenEXR file is smaller than its display window, the rest is black. A
+    larger data window is used completely, and is kept if the format of OUT supports it. Images are
+    rotated according to the orientation in the file. The first part of a file with several parts is
+    read, or the part of --subimage. --layer selects one of several layers. Channels other than R,
+    G, B and A are ignored.
 
-    Pictures of 16 million pixels and more are read and written by bands of rows, but those of a
-    pipe; --half holds them in half floats.
+    Pictures of at least 16 million pixels are read and written in bands of rows, except from a
+    pipe. --half holds them in half floats.
 
-    OUT is replaced only when the new file is complete. A call that fails leaves no partial file.
+    OUT is replaced when the new file is complete. A call that fails leaves no partial file.
     """
     _check_colours(settings, input_colour, output_colour, raw=raw)
     check_input_colour(input_colour)
     given, out = _arguments(sources, out)
     if out == PIPE and attachments != "final":
-        raise click.UsageError("standard output takes final alone, without --attachments")
+        raise click.UsageError("standard output takes only final; leave out --attachments")
     work = pairs(given, out)
     with as_wrong_use():
         for name in {f"image{Path(target).suffix}" for _, target in work}:
@@ -213,7 +212,7 @@ def command(  # noqa: PLR0915  one step after the other
             if not several:
                 click.echo(f"wrote {target}")
 
-        # Read once, before the first picture that is taken as a whole.
+        # Read once, before the first picture that is not read in bands.
         given_with = functools.cache(
             functools.partial(
                 accompanying, mask, emission, input_colour, raw=raw, is_blended=is_blended
@@ -225,7 +224,7 @@ def command(  # noqa: PLR0915  one step after the other
             renderer: vkbloom.Renderer | None = None
             for is_alone, group in itertools.groupby(work, key=lambda pair: by_rows(pair[0])):
                 files = list(group)
-                # Before the device is opened: the most likely failure comes at once.
+                # Read before the device is opened, so that a wrong file fails at once.
                 first = None if is_alone else taken(files[0][0])
                 if renderer is None:
                     renderer = stack.enter_context(opened_renderer(adapter, validation))
@@ -273,8 +272,8 @@ def _check_colours(
         )
     if settings.encoding != "none" and settings.alpha != "keep":
         raise click.UsageError(
-            f"--alpha {settings.alpha} is for linear colours; leave out --encoding, OUT is encoded "
-            "as its format needs"
+            f"--alpha {settings.alpha} needs linear colours; leave out --encoding: OUT is encoded "
+            "for its format"
         )
     if settings.encoding != "none" and output_colour:
         raise click.UsageError(
@@ -299,12 +298,12 @@ def _arguments(sources: tuple[str, ...], out: str | None) -> tuple[list[str], st
 
 
 def _say(text: str, out: str) -> None:
-    """Print a line where it is not in the way of a picture on standard output."""
+    """Print a line on standard output, or on standard error if the picture is on the former."""
     click.echo(text, err=out == PIPE)
 
 
 def _piped_in(folder: str) -> str:
-    """Return a file with what comes from standard input; formats are told by their content."""
+    """Return a file with the content of standard input, which also tells its format."""
     path = Path(folder, "standard input")
     path.write_bytes(sys.stdin.buffer.read())
     return str(path)
@@ -351,12 +350,12 @@ def _result(
     final: NDArray[Any],
     encoding: Encoding,
 ) -> Picture:
-    """Return the picture with its bloom, with the encoding that its pixels now have."""
+    """Return the picture with its bloom, and with the encoding of the new pixels."""
     done = picture.encoding if encoding == "none" else encoding
     return dataclasses.replace(picture, pixels=final, encoding=done)
 
 
 def _straight(picture: Picture, frames: vkbloom.Frames) -> NDArray[Any]:
-    """Return `final` with colours as the file's were, multiplied by alpha or not."""
+    """Return `final`, divided by alpha if the colours of the file were not multiplied by it."""
     final = frames["final"]
     return divided(final) if frames.settings.alpha != "keep" and has_straight(picture) else final

@@ -50,7 +50,7 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     Raises
     ------
     click.UsageError
-        A word has another form, or names a field that the settings lack.
+        A word has the wrong form, or names a field that the settings do not have.
     """
     types = _types_of([settings])
     lacking = f"the method {settings.method} has no field"
@@ -91,8 +91,8 @@ def preset_named(name: str) -> vkbloom.Settings:
 
 
 def _types_of(settings: Sequence[vkbloom.Settings]) -> dict[str, Any]:
-    """Return the types of the fields that all of them have, and of the time."""
-    # Fields only, not class variables: no axis changes the method.
+    """Return the types of the time and of the fields that all settings have."""
+    # Class variables are left out, because an axis cannot change the method.
     shared = [{field.name for field in dataclasses.fields(one)} for one in settings]
     hints = typing.get_type_hints(type(settings[0]))
     return {"time": float, **{name: hints[name] for name in set.intersection(*shared)}}
@@ -104,7 +104,7 @@ def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any
         return _range(word, parts, room)
     values = [part for part in text.split(";" if ";" in text else ",") if part]
     if not values:
-        raise click.UsageError(f"--axis {word}: has no values; give at least one")
+        raise click.UsageError(f"--axis {word}: there are no values; give at least one")
     # The option's own type converts each value, so that axes and options have one syntax.
     plain = {bool: click.BOOL, str: click.STRING}
     kind = plain[annotation] if annotation in plain else fields.option_type(annotation)
@@ -134,7 +134,7 @@ def _range(word: str, parts: Sequence[str], room: int) -> Sequence[float]:
 
 
 def axis_bounds(words: Sequence[str]) -> dict[str, Sequence[Any]]:
-    """Parse each ``NAME=LOW:HIGH``, or of a choice ``NAME=A,B``, into the bounds of a fit."""
+    """Parse each ``NAME=LOW:HIGH``, or ``NAME=A,B`` for choices, into the bounds of a fit."""
     found: dict[str, Sequence[Any]] = {}
     for word in words:
         name, sign, text = word.partition("=")
@@ -175,7 +175,7 @@ def named_reductions(
     Raises
     ------
     click.UsageError
-        A word has another form.
+        A word has the wrong form.
     OSError, ValueError
         An image file cannot be read.
     """

@@ -63,7 +63,7 @@ def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
 
 
 def _read_psf(word: str) -> PSF:
-    """Read a function with its parameters, such as spencer:state=scotopic, or an image file."""
+    """Parse a function with its parameters, such as spencer:state=scotopic, or an image file."""
     name, _, rest = word.partition(":")
     if name not in psf.__all__:
         return psf.samples(vkbloom.read(word)[..., :3])
@@ -83,7 +83,7 @@ SIZE: Final = _Word("WxH", _read_size)
 
 
 def _read_glare(word: str) -> tuple[Glare, ...]:
-    """Read names of glares, and stages with their fields: streaks:directions=4,angle=45+halo."""
+    """Parse names of glares and stages with fields, as streaks:directions=4,angle=45+halo."""
     if word.lower() in ("", "none"):
         return ()
     found: list[Glare] = []
@@ -157,13 +157,13 @@ class _Dataclass(Protocol):
 
 
 class FieldOption(click.Option):
-    """An option of a field, which `Command` lists under the labels of the classes that have it."""
+    """An option of a field. `Command` lists it under the labels of the classes that have it."""
 
     labels: tuple[str, ...] = ()
 
 
 class Command(click.Command):
-    """A command whose help groups the options of fields: of all, of one class, of several."""
+    """A command whose help groups the options of fields by the classes that have them."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the command's own options, then those of each group."""
@@ -173,7 +173,7 @@ class Command(click.Command):
             if record is not None and isinstance(parameter, click.Option):
                 labels = parameter.labels if isinstance(parameter, FieldOption) else None
                 groups.setdefault(labels, []).append(record)
-        # Those of many classes first, then class by class.
+        # Fields of many classes come first.
         order = sorted((labels for labels in groups if labels), key=lambda labels: -len(labels))
         shared = [labels for labels in order if len(labels) > 1]
         with formatter.section("Options"):
@@ -216,7 +216,7 @@ def _collect(
             annotation = annotations[name]
             option = declaration.metadata.get("option", name)
             field = found.setdefault(name, _Field(annotation, [], option, []))
-            # None is taken by the option where one of the kinds takes it.
+            # The option accepts none if one of the classes does.
             wider = field.annotation | annotation
             if wider not in (field.annotation, annotation):
                 raise TypeError(f"{name} is {field.annotation} as well as {annotation}")
@@ -228,7 +228,7 @@ def _collect(
 
 
 def _option_class(labels: tuple[str, ...] | None) -> type[click.Option]:
-    """Return the class of the options of fields with some labels; None: of no group."""
+    """Return the option class of fields with these labels; None: the options have no group."""
     if labels is None:
         return click.Option
     return type("FieldOption", (FieldOption,), {"labels": labels})

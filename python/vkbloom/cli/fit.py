@@ -1,4 +1,4 @@
-"""``vkbloom fit``: find the settings that give a picture."""
+"""``vkbloom fit``: find the settings whose bloom matches a picture."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from vkbloom.io import safe_writing
     "presets",
     multiple=True,
     type=click.Choice(list(vkbloom.presets)),
-    help=f"Settings to start from; of several each is searched [default {PRESET_OF_IMAGES}]",
+    help=f"Settings to start a search from; may be repeated [default {PRESET_OF_IMAGES}]",
 )
 @click.option(
     "--method",
     "kinds",
     multiple=True,
     type=click.Choice(list(METHODS)),
-    help="A method whose defaults to start from; of several each is searched.",
+    help="A method whose defaults start a search; may be repeated.",
 )
 @click.option(
     "--vary",
@@ -50,22 +50,23 @@ from vkbloom.io import safe_writing
     "--bounds",
     metavar="NAME=LOW:HIGH",
     multiple=True,
-    help="A narrower range of one of them.",
+    help="A narrower range for one of these settings; may be repeated.",
 )
 @click.option(
     "--framebuffer",
     metavar="NAME",
     default="final",
     show_default=True,
-    help="What TARGET is: final, the picture with its bloom, or bloom, the bloom alone.",
+    help="The framebuffer that TARGET shows: final is the picture with its bloom, bloom the bloom "
+    "alone.",
 )
 @click.option(
     "--loss",
     type=click.Choice(get_args(LossName)),
     default="relative",
     show_default=True,
-    help="The figure to make small: norm of the difference over that of TARGET; root mean square; "
-    "the same of logarithms; or mean FLIP.",
+    help="The figure to minimize. relative: norm of the difference divided by the norm of TARGET; "
+    "l2: root mean square of the difference; log: the same for logarithms; flip: mean FLIP.",
 )
 @click.option(
     "--max-calls",
@@ -73,7 +74,7 @@ from vkbloom.io import safe_writing
     type=click.IntRange(min=1),
     default=1000,
     show_default=True,
-    help="The most renders for each start.",
+    help="Limit of the renders of each search.",
 )
 @click.option(
     "-o",
@@ -82,7 +83,7 @@ from vkbloom.io import safe_writing
     type=click.Path(),
     help="Write the pictures, radial profiles and losses as an HTML file.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one list, the best first.")
+@click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss.")
 @input_colour_option
 @layer_option
 @device_options
@@ -104,11 +105,11 @@ def command(
     adapter: str,
     validation: bool,
 ) -> None:
-    """Find the settings with which the bloom of IMAGE is TARGET.
+    """Find the settings with which the bloom of IMAGE matches TARGET.
 
-    Both are files of one size. Their colours are decoded to linear light, as by vkbloom apply. For
-    each preset and method the search starts from its settings; --vary names what may change. The
-    results are printed, the best first, as Python code.
+    Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply.
+    There is one search for each preset and method, which starts from its settings. --vary names the
+    settings that may change. The results are printed as Python code, sorted by loss.
     """
     names = [name.strip().replace("-", "_") for name in vary.split(",") if name.strip()]
     begun = [*(vkbloom.presets[name] for name in presets), *(METHODS[kind]() for kind in kinds)]

@@ -1,4 +1,4 @@
-"""The options for what of an image glows: ``--mask`` and ``--emission``."""
+"""The options for the part of an image that glows: ``--mask`` and ``--emission``."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "--mask",
         metavar="FILE",
         type=click.Path(),
-        help="A grey image of the image's size: what may glow, white all, black nothing. Its "
-        "values are taken as they are, not as colours.",
+        help="A grey image of the same size, which multiplies what glows: white keeps it, black "
+        "removes it. Its values are not decoded.",
     )
     @click.option(
         "--emission",
         metavar="FILE",
         type=click.Path(),
-        help="An image of the image's size that glows in its place, such as a renderer's pass of "
-        "emissive materials. It is decoded like the image.",
+        help="An image of the same size that glows instead of the image, such as a renderer's "
+        "pass of emissive materials. It is decoded like the image.",
     )
     @functools.wraps(command)
     def run(**arguments: object) -> object:
@@ -55,7 +55,7 @@ def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def refuse_glow_of_scene(mask: str | None, emission: str | None) -> None:
     """Raise a UsageError if a scene is given a mask or an emission."""
     if mask or emission:
-        raise click.UsageError("--mask and --emission are for an IMAGE; a scene has its glow mesh")
+        raise click.UsageError("--mask and --emission need an IMAGE; a scene has a glow mesh")
 
 
 def accompanying(
@@ -66,9 +66,9 @@ def accompanying(
     raw: bool = False,
     is_blended: bool = False,
 ) -> Callable[[Array], dict[str, Any]]:
-    """Read both files, and return what gives an image's arguments `mask` and `emission`.
+    """Read both files, and return a function from an image to its `mask` and `emission`.
 
-    `is_blended`: the emission's colours are to be multiplied by its alpha.
+    `is_blended`: multiply the emission's colours by its alpha.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def accompanying(
 
 
 def has_straight(picture: Picture) -> bool:
-    """Whether a picture's file has an alpha by which its colours are not multiplied."""
+    """Whether a picture's file has alpha, and colours that are not multiplied by it."""
     return picture.pixels.shape[2] == 4 and not picture.stored.associated
 
 
@@ -103,5 +103,5 @@ def premultiplied(picture: Picture) -> Picture:
 def uploaded(
     renderer: vkbloom.Renderer, image: Array, arguments: dict[str, Array]
 ) -> Array | vkbloom.Image:
-    """Return what a renderer takes for an image with its mask and its emission."""
+    """Return an image, or a handle of it with its mask and its emission."""
     return renderer.upload(image, **arguments) if arguments else image

@@ -54,8 +54,8 @@ _STORE: Final = ".zarr"
     "--out",
     required=True,
     type=click.Path(),
-    help="NAME.zarr or a URL that fsspec supports: a Zarr store. Anything else: a folder of image "
-    "files.",
+    help="NAME.zarr or a URL that fsspec supports is a Zarr store. Any other name is a folder of "
+    "image files.",
 )
 @click.option(
     "--axis",
@@ -70,8 +70,9 @@ _STORE: Final = ".zarr"
     FILE_OPTION,
     "options_file",
     metavar="FILE",
-    help="A TOML or YAML file with options by their long names; tables settings, camera, axes, "
-    "reduce and chunks; the list images. Options on the command line override it.",
+    help="A TOML or YAML file with options by their long names. It may have the tables settings, "
+    "camera, axes, reduce and chunks, and the list images. Options on the command line override "
+    "it.",
 )
 @click.option("--size", type=SIZE, help="Size of a scene's frames, in pixels [default 1280x720]")
 @click.option(
@@ -129,7 +130,7 @@ _STORE: Final = ".zarr"
     help="Also plot the figures along the axes: a PNG, SVG or PDF.",
 )
 @input_colour_option
-@click.option("--raw", is_flag=True, help="Take the values of 8-bit files as they are.")
+@click.option("--raw", is_flag=True, help="Do not decode the values of 8-bit files.")
 @subimage_option
 @layer_option
 @glow_options
@@ -184,13 +185,13 @@ def command(
     _check_drawing("--curves", curves, (".png", ".svg", ".pdf"))
     chunks = axis_options.chunk_counts(chunk_words)
     if not axis_words and len(images) < 2:
-        raise click.UsageError("nothing varies; give an --axis such as exposure=-1:1:5")
+        raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
     axes = axis_options.axis_values(axis_words, settings)
     begun = None if "preset" in axes else settings
     if begun is None and settings != vkbloom.presets[default_preset(bool(images))]:
         raise click.UsageError(
-            "--axis preset has the settings; leave out options of settings, and vary a field by an "
-            "--axis of its own"
+            "--axis preset sets all settings; leave out options of settings, and vary fields by "
+            "further axes"
         )
     reduce = axis_options.named_reductions(reduce_words, settings)
     pictures = [
@@ -249,7 +250,7 @@ def command(
 
 
 def _note_no_bloom(grid: Grid, adapter: str, validation: bool) -> None:
-    """Say it where both the first and the last point of a grid have no bloom."""
+    """Print a note if the first and the last point of a grid have no bloom."""
     corners = (tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape))
     points = [point for point in map(grid.point, dict.fromkeys(corners)) if point.settings.bloom]
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
@@ -272,7 +273,7 @@ def _check_combination(
 
 
 def _check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:
-    """Check before a long grid that the drawing can be written."""
+    """Check that the drawing can be written, before a long grid is rendered."""
     if file is None:
         return
     path = Path(file)

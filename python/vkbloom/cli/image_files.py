@@ -1,4 +1,4 @@
-"""Read image files that are given as arguments, and print notes about them."""
+"""Read the image files of a command, and print notes about them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vkbloom.io import image_reading
 from vkbloom.io.colour import check_space
 from vkbloom.io.images import Colour, Picture, StoredImage
 
-#: What the colours of a written file can be.
+#: Encodings of a written file.
 COLOURS: Final = ("linear", "srgb")
 
 _STANDARD_ERROR = 2
@@ -40,7 +40,8 @@ def layer_option(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option(
         "--layer",
         metavar="NAME",
-        help="Which layer to read of an OpenEXR file that has several, such as ViewLayer.Combined.",
+        help="The layer to read from an OpenEXR file with several layers, such as "
+        "ViewLayer.Combined.",
     )(command)
 
 
@@ -49,14 +50,14 @@ def input_colour_option(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option(
         "--input-colour",
         metavar="linear|srgb|SPACE",
-        help="What the colours in the file are; SPACE is one of OpenColorIO's built-in "
-        "configuration, such as ACEScg or 'Linear Rec.2020' [default linear for floats; for "
-        "integers what the file says, else srgb]",
+        help="Colour space of the file; SPACE is one of OpenColorIO's built-in configuration, such "
+        "as ACEScg or 'Linear Rec.2020' [default linear for floats; for integers that of the file, "
+        "or srgb if it names none]",
     )(command)
 
 
 def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
-    """Read an image file; the only message of a failure is that of the exception."""
+    """Read an image file; libraries print no messages of their own."""
     with silenced():
         return image_reading.load(path, subimage, layer)
 
@@ -102,7 +103,7 @@ def read_picture(
     Raises
     ------
     click.UsageError
-        `raw` is for 8-bit files, and this is none; there is no such `colour`.
+        `raw` is given and the file does not have 8 bits, or `colour` is unknown.
     OSError, ValueError
         The file cannot be read, or a renderer cannot take its pixels.
     """
@@ -129,24 +130,22 @@ def decoded(
 
 
 def not_of_bytes(source: str, numbers: str) -> click.UsageError:
-    """Return the error for --raw of a file of other numbers than bytes."""
-    return click.UsageError(
-        f"--raw: {source} is not a file of 8-bit integers but of {numbers}; leave out --raw"
-    )
+    """Return the error for --raw with a file that does not have 8-bit integers."""
+    return click.UsageError(f"--raw: {source} has {numbers}, not 8-bit integers; leave out --raw")
 
 
 def note_parts(source: str, stored: StoredImage, layer: str | None) -> None:
-    """Say it if the first of several parts was read, and nobody chose it."""
+    """Print a note if the first of several parts was read without --subimage."""
     if len(stored.parts) > 1 and layer is None and not given("subimage"):
-        note(f"{source}: the first of its {_listed(stored)}; --subimage reads another")
+        note(f"{source}: read the first of its {_listed(stored)}; --subimage reads another")
 
 
 def note_specials(source: str, nan: int, infinite: int) -> None:
-    """Say how many values of a file are not finite, if there are any."""
+    """Print a note with the number of values that are not finite, if there are any."""
     if nan or infinite:
         note(
-            f"{source} has {nan} NaN and {infinite} infinite values; the bloom counts them as 0, "
-            "and their own pixels keep them"
+            f"{source} has {nan} NaN and {infinite} infinite values; they count as 0 in the bloom, "
+            "and stay in the picture"
         )
 
 
@@ -155,13 +154,12 @@ _quiet = threading.Lock()
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Keep the C image libraries, which print messages of their own, off standard error.
+    """Suppress what C libraries print on standard error.
 
-    For damaged files, libpng prints messages itself instead of passing them to OpenImageIO. What
-    this program prints meanwhile goes to where standard error was. Within another call it does
-    nothing.
+    libpng prints messages about damaged files, instead of passing them to OpenImageIO. The output
+    of this program still goes to standard error. A nested call does nothing.
     """
-    # Closed before this process began: descriptor 2 may belong to another file.
+    # Standard error was closed when this process began, so descriptor 2 may be another file.
     if sys.stderr is None or not _quiet.acquire(blocking=False):
         yield
         return
@@ -194,7 +192,7 @@ def _redirected() -> Iterator[None]:
 
 @contextmanager
 def _elsewhere(descriptor: int) -> Iterator[None]:
-    """Write what Python's standard error gets to a descriptor, if it was that of the process."""
+    """Redirect Python's standard error to a descriptor, if it is that of the process."""
     stream = sys.stderr
     try:
         is_own = stream.fileno() == _STANDARD_ERROR

@@ -1,4 +1,4 @@
-"""Images one after the other: some are read and written while the device works on another."""
+"""Sequences of images, which are read and written while the device works on another image."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vkbloom.io.images import Picture
 
 __all__ = ["read_ahead", "rendered", "written_behind"]
 
-# Images that are read before they are asked for, and results that wait to be written.
+# Number of images that are read ahead, and of results that wait to be written.
 _AHEAD: Final = 1
 _BEHIND: Final = 1
 
@@ -23,12 +23,12 @@ Read = TypeVar("Read")
 
 
 def read_ahead(read: Callable[[str], Read], sources: Iterable[str]) -> Iterator[Read]:
-    """Yield what is read of each source; the next one is read meanwhile, in a thread.
+    """Read each source and yield the result; a thread reads the next source at the same time.
 
     Parameters
     ----------
     read : callable
-        Takes a source. What it raises is raised in its turn.
+        Takes a source. Its exceptions are raised when the result would be yielded.
     sources : iterable of str
     """
     context = click.get_current_context()
@@ -54,7 +54,7 @@ def rendered(
     attachments: str | list[str],
     prepared: Callable[[Picture], Any],
 ) -> Generator[tuple[Picture, vkbloom.Frames], None, None]:
-    """Yield each picture with its frames; `prepared` gives what the renderer takes for it."""
+    """Yield each picture with its frames; `prepared` makes the renderer's argument of it."""
     waiting: deque[Picture] = deque()
 
     def pixels() -> Iterator[Any]:
@@ -68,10 +68,10 @@ def rendered(
 
 @contextmanager
 def written_behind() -> Iterator[Callable[[Callable[[], object]], None]]:
-    """Give a function that runs writes in their order, in a thread.
+    """Yield a function that runs writes in their order in a thread.
 
-    It raises what an earlier write raised, and so does leaving. What is written when something else
-    fails is complete.
+    The function and the exit raise the exceptions of earlier writes. If something else fails, the
+    writes that were added are completed.
     """
     with _thread("vkbloom-write") as pool:
         behind: deque[Future[object]] = deque()

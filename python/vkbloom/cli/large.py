@@ -1,4 +1,4 @@
-"""``vkbloom apply`` of pictures that are too large to be held several times: by bands of rows."""
+"""``vkbloom apply`` for pictures that are too large to be copied: by bands of rows."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from vkbloom.io.rows import Rows, opened_rows, written_rows
 
 __all__ = ["Large", "apply_by_rows", "is_large"]
 
-#: Pixels from which on a picture is taken by rows.
+#: Pictures of this many pixels or more are processed in bands.
 LARGE: Final = 1 << 24
-#: Rows and columns that an image of usual devices has at the most. More are taken by rows.
+#: Usual limit of an image's sides on devices. Longer pictures are processed in bands.
 LONGEST_SIDE: Final = 1 << 14
-#: Pixels from which on a file of 8 bits becomes half floats, whose steps are finer than its own.
+#: 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
 HALVED: Final = 1 << 26
 
 
@@ -47,7 +47,7 @@ class Large(NamedTuple):
         `input_colour`.
     raw : bool
     half : bool or None
-        By default floats of files of 8 bits from `HALVED` pixels on become half floats.
+        None: 8-bit files of `HALVED` pixels or more become half floats.
     """
 
     mask: str | None = None
@@ -60,7 +60,7 @@ class Large(NamedTuple):
 
 
 def is_large(path: str, subimage: int = 0, layer: str | None = None) -> bool:
-    """Whether a file is taken by rows; a file that cannot be opened is not."""
+    """Whether a file is processed in bands. False for a file that cannot be opened."""
     try:
         with opened_rows(path, subimage, layer) as rows:
             return rows.size[0] * rows.size[1] >= LARGE or max(rows.size) > LONGEST_SIDE
@@ -79,17 +79,17 @@ def apply_by_rows(
     quality: int | None,
     disable: bool | None,
 ) -> None:
-    """Give a large picture bloom, and write it.
+    """Add bloom to a large picture, and write it.
 
     Parameters
     ----------
     renderer : Renderer
     source, target, colour, quality
-        As for the command.
+        Arguments of the command.
     settings : Settings
     how : Large
     disable : bool, optional
-        Of the progress bar; None: shown on a terminal.
+        Whether to hide the progress bar. None: it is shown on a terminal.
     """
     is_blended = settings.alpha != "keep"
     reading = _Reading(source, how, is_blended)
@@ -130,7 +130,7 @@ def _held_whole(
     height: int,
     bar: tqdm[Any],
 ) -> Iterator[NDArray[Any]]:
-    """Yield the rows of `final` of an image that the device holds."""
+    """Yield bands of `final` of an image that is complete on the device."""
     first = next(bands)
     image = ImageByBands(renderer._core, first, height, settings)
     bar.update(len(first.image))
@@ -142,7 +142,7 @@ def _held_whole(
 
 
 class _Reading:
-    """A picture with its mask and its emission, as often as it is read, and what is said of it.
+    """A picture with its mask and its emission, which can be read several times.
 
     Parameters
     ----------
@@ -169,11 +169,11 @@ class _Reading:
 
     @property
     def height(self) -> int:
-        """Rows in all."""
+        """Number of rows."""
         return self._size[1]
 
     def bands(self) -> Generator[Band]:
-        """Read it from the top to the bottom; notes about it are printed at the first end."""
+        """Yield bands from the top to the bottom; print notes at the end of the first reading."""
         how = self._how
         notes = [_Notes(file) for file in (self._source, how.emission or "", how.mask or "")]
         with ExitStack() as stack:
@@ -201,7 +201,7 @@ class _Reading:
     def _band(
         self, image: NDArray[Any], emission: Rows | None, mask: Rows | None, notes: list[_Notes]
     ) -> Band:
-        """Return rows of the image with the next rows of the others."""
+        """Return rows of the image with the next rows of emission and mask."""
         glow = values = None
         if emission is not None:
             picture = self._decoded(emission.take(len(image)), self._how.colour, notes[1])
@@ -222,7 +222,7 @@ class _Reading:
         return picture
 
     def result(self, final: NDArray[Any], settings: vkbloom.Settings) -> Picture:
-        """Return rows of `final` as a picture like that which was read."""
+        """Return rows of `final` as a picture with the properties of the file."""
         assert self._picture is not None
         if self._is_blended and has_straight(self._picture):
             final = divided(final)
@@ -231,7 +231,7 @@ class _Reading:
 
 
 class _Notes:
-    """What is to be said of a picture, of all bands once."""
+    """Notes about a picture, collected over all bands."""
 
     def __init__(self, file: str) -> None:
         self.file = file

@@ -1,4 +1,4 @@
-"""What a window shows, as keys and the mouse change it; without a window of its own."""
+"""The state of a window with live controls, and how keys and the mouse change it."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ S              writes all framebuffers to files
 Q, Escape      close\
 """
 
-# The first of these that the settings have.
+# A key changes the first of these fields that the settings have.
 _SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "size")
 _STRENGTHS: Final = ("blur_strength", "intensity")
 _SCALE_RANGE: Final = (0.1, 2.0)
 _STEP: Final = 0.1
 _TURN_SECONDS: Final = 8.0
-_DEGREES: Final = 0.4  # for a pixel that the mouse is dragged
-_ZOOM: Final = 0.9  # the distance for a step of the wheel
+_DEGREES: Final = 0.4  # rotation per pixel of mouse movement
+_ZOOM: Final = 0.9  # factor of the distance per step of the wheel
 
 
 def _after(value: object, values: Mapping[str, Any]) -> Any:
@@ -52,12 +52,12 @@ class Live:
     shading : {"forward", "deferred"}
         Of a scene.
     framebuffer : str
-        What is shown.
+        Name of the framebuffer that is shown.
     time : float
-        Of the animation, in turns.
+        Time of the animation, in periods.
     paused, closed : bool
     screenshot : bool
-        Whether one is asked for.
+        Whether to write a screenshot after the next frame.
     """
 
     settings: Settings
@@ -111,7 +111,7 @@ class Live:
         self._see(rotation=(about_x - y * _DEGREES, about_y + x * _DEGREES, about_z))
 
     def scroll(self, steps: float) -> None:
-        """Move the camera to the scene, or away from it."""
+        """Move the camera towards the scene, or away from it."""
         x, y, z = self.source.camera.position
         self._see(position=(x, y, z * _ZOOM**steps))
 
@@ -125,7 +125,7 @@ class Live:
             self.time = (self.time + seconds / _TURN_SECONDS) % 1.0
 
     def title(self, seconds: float) -> str:
-        """Return the line of values; `seconds`: of a frame."""
+        """Return the text of the title; `seconds` is the time of a frame."""
         names = [*self._of(_SCALES), *self._of(_STRENGTHS)] if self.settings.bloom else []
         parts = [
             f"{self.framebuffer}: {self.settings.method}",

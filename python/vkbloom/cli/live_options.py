@@ -24,7 +24,7 @@ def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Call
     """Add IMAGE and its options, and those of the device, the scene and the settings.
 
     The command gets the pixels of IMAGE as `image`, which is None for a scene. `image_has_size`:
-    ``--size`` is also for an IMAGE.
+    ``--size`` may be given with an IMAGE.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -46,7 +46,9 @@ def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Call
                 return command(image=None, **arguments)
             for name, option in _OF_SCENE.items():
                 if given(name) and not (name == "size" and image_has_size):
-                    raise click.UsageError(f"{option} is for a scene; leave it out with an IMAGE")
+                    raise click.UsageError(
+                        f"{option} is only for scenes; leave it out with an IMAGE"
+                    )
             image = read_picture(source, subimage, None, layer=layer).pixels
             return command(image=image, **arguments)
 

@@ -1,4 +1,4 @@
-"""Say it where settings give no bloom: the picture looks as without."""
+"""Notes for settings with which the bloom is zero."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ __all__ = ["brightest_of", "is_without", "only", "reason", "with_bloom"]
 
 
 def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | list[str]:
-    """Return framebuffers to ask for: the bloom as well, unless it is turned off."""
+    """Return the framebuffers to request: also the bloom, unless it is turned off."""
     if isinstance(names, str):
         return names
     return [*names, *["bloom"] * (settings.bloom and "bloom" not in names)]
 
 
 def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
-    """Return the frames with those framebuffers alone; "all" are all."""
+    """Return frames with only these framebuffers; "all": with all."""
     if isinstance(names, str) or set(frames) == set(names):
         return frames
     return vkbloom.Frames(
@@ -33,20 +33,20 @@ def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
 
 
 def is_without(frames: vkbloom.Frames) -> bool:
-    """Whether there is a bloom, and it is zero everywhere."""
+    """Whether the frames have a bloom that is zero everywhere."""
     return "bloom" in frames and not frames["bloom"][:, :, :3].any()
 
 
 def brightest_of(pixels: NDArray[Any]) -> float:
-    """Return the largest finite value of an image, 255 of uint8 being 1."""
+    """Return the largest finite value of an image; uint8 is scaled to 0..1."""
     colours = pixels[:, :, :3]
     scale = np.float32(255 if pixels.dtype == np.uint8 else 1)
     return float(np.max(colours, initial=0, where=np.isfinite(colours)) / scale)
 
 
 def reason(settings: vkbloom.Settings, brightest: float | None = None) -> str:
-    """Say that the bloom is zero, and what is known of why."""
+    """Return a text that the bloom is zero, with the reason if it is known."""
     text = "the bloom is zero everywhere"
     if settings.threshold is not None:
-        text += f": nothing lies above the threshold {settings.threshold:g}"
+        text += f": no value is above the threshold {settings.threshold:g}"
     return text if brightest is None else f"{text}; the brightest value is {brightest:.3g}"

@@ -97,12 +97,12 @@ def _yaml(content: bytes) -> object:
     except yaml.YAMLError as error:
         raise ValueError(str(error)) from error
     except (LookupError, AttributeError, TypeError) as error:
-        # Such as "!!bool 3".
+        # An example is "!!bool 3".
         raise ValueError(f"a value does not fit its tag ({error})") from error
 
 
 def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, int]:
-    """Return about how long a value is when it is written as options, and how deeply it nests.
+    """Return an estimate of a value's length as options, and the depth of its nesting.
 
     A YAML alias refers to a value without copying it; each value is measured once here, before
     writing it out could multiply it.

@@ -107,7 +107,7 @@ def given(name: str) -> bool:
 
 @click.group(
     cls=Program,
-    # A call without a command is wrong use: one line, not the help text.
+    # A call without a command prints one line instead of the help text.
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -32,9 +32,9 @@ from vkbloom.settings import SHADINGS, Shading
     "--out",
     required=True,
     type=click.Path(),
-    help="The file or folder to write to. NAME.exr: one file with all framebuffers; NAME.png and "
-    "others: a file for each; no extension: a folder of PNG files. A framebuffer that the format "
-    "cannot hold is written as .exr.",
+    help="The file or folder to write to. NAME.exr is one file with all framebuffers. Other "
+    "formats have a file for each framebuffer. A name without extension is a folder of PNG files. "
+    "A framebuffer that the format cannot hold is written as .exr.",
 )
 @click.option(
     "--size", type=SIZE, default="1280x720", show_default=True, help="Size of the frame, in pixels."
@@ -57,7 +57,7 @@ from vkbloom.settings import SHADINGS, Shading
     type=click.IntRange(min=1, max=100),
     default=25,
     show_default=True,
-    help="Frames a second of a GIF.",
+    help="Frames per second of a GIF.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @click.option(
@@ -89,7 +89,7 @@ def command(
     if is_gif and (wanted == "all" or len(names) > 1):
         raise click.UsageError("a GIF shows one framebuffer; name one with --attachments")
     if given("rate") and not is_gif:
-        raise click.UsageError("--fps is for --frames and a GIF; leave it out")
+        raise click.UsageError("--fps needs --frames and a GIF; leave it out")
     loaded = scene()
     written: list[Path] = []
     seconds: dict[str, list[float]] = {}
@@ -106,7 +106,7 @@ def command(
                     settings,
                     size,
                     time=time + index / (count or 1),
-                    # Of an animation, the first frame shows whether there is a bloom.
+                    # The first frame of an animation shows whether there is a bloom.
                     attachments=names if index else no_bloom.with_bloom(names, settings),
                     shading=shading,
                 )

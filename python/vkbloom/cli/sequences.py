@@ -1,4 +1,4 @@
-"""Which files a command reads and writes: one, a numbered sequence, a glob, a folder or a pipe."""
+"""The files that a command reads and writes: single files, sequences, globs, folders, pipes."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     sources : sequence of str
         Files, printf patterns (``f.%04d.exr``), globs, folders, or "-".
     target : str
-        A file; of several sources a folder, where names are kept, or a printf pattern, which gets
-        the numbers of the sources' pattern, else 0, 1, 2 and so on.
+        A file, a folder or a printf pattern. In a folder, files keep their names. A pattern gets
+        the numbers of the sources' pattern, or 0, 1, 2 and so on.
 
     Raises
     ------
     FileNotFoundError
-        Nothing fits a pattern, a glob or a folder.
+        No file matches a pattern or a glob, or a folder is empty.
     click.UsageError
-        Several sources go into one file.
+        There are several sources for one file.
     """
     found = [pair for source in sources for pair in _expanded(source)]
     is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
@@ -51,19 +51,19 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
         written = [target]
     else:
         raise click.UsageError(
-            f"{len(found)} images cannot go into the one file {target}; name a folder or a "
-            "pattern such as f.%04d.png"
+            f"{target}: one file cannot hold {len(found)} images; name a folder or a pattern such "
+            "as f.%04d.png"
         )
     if PIPE in (name for name, _ in found) and written != [target]:
-        raise click.UsageError("standard input goes into one file or standard output")
+        raise click.UsageError("standard input needs one file, or standard output, as OUT")
     if len(set(written)) < len(written):
-        raise click.UsageError(f"{target}: two images have the same name; name a pattern")
+        raise click.UsageError(f"{target}: two images have the same name; use a pattern")
     return [(name, file) for (name, _), file in zip(found, written, strict=True)]
 
 
 def _expanded(source: str) -> list[tuple[str, int | None]]:
-    """Return the files that a word stands for, with their numbers where it is a pattern."""
-    # A file whose name happens to look like a pattern is that file.
+    """Return the files of a word, with their numbers if the word is a pattern."""
+    # The name of an existing file may look like a pattern.
     if source == PIPE or os.path.isfile(source):
         return [(source, None)]
     folder, name = os.path.split(source)
@@ -90,12 +90,12 @@ def _expanded(source: str) -> list[tuple[str, int | None]]:
     else:
         return [(source, None)]
     if not found:
-        raise FileNotFoundError(f"{source}: no image is there")
+        raise FileNotFoundError(f"{source}: no file was found")
     return found
 
 
 def _filled(pattern: str, number: int | None) -> str:
-    """Return the name of a pattern with its number."""
+    """Return the file name of a pattern with this number."""
     return _NUMBER.sub(
         lambda form: f"{number:{form[1]}{form[2]}d}", os.path.basename(pattern), count=1
     )

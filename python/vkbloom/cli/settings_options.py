@@ -16,7 +16,7 @@ from vkbloom.settings import methods
 
 #: Settings class of each method, by the method's name.
 METHODS: Final = methods()
-#: The preset that settings start from without --preset and --method.
+#: The preset for images if there is no --preset and no --method.
 PRESET_OF_IMAGES: Final = "bevy_natural"
 _PRESET_OF_SCENES: Final = "tutorial"
 # Names of the commands' arguments for image files; explore and grid may be called without one.
@@ -29,13 +29,13 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @click.option(
         "--preset",
         type=click.Choice(list(vkbloom.presets)),
-        help="Settings to begin with, under the name of where they were published "
+        help="Published settings to start from "
         f"[default {PRESET_OF_IMAGES} for images, {_PRESET_OF_SCENES} for scenes]",
     )
     @click.option(
         "--method",
         type=click.Choice(list(METHODS)),
-        help="How the bloom is blurred, with that method's defaults [default the preset's]",
+        help="The method of the blur, with its defaults [default the preset's]",
     )
     @_glare_options
     @fields.options({"": vkbloom.Settings}, "shared")
@@ -60,12 +60,14 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add options for stages beside those of --glare; the argument `added` has them."""
+    """Add options for stages; the command's argument `added` has the stages."""
 
-    @click.option("--streaks", type=click.IntRange(1, 16), help="Adds so many streaks to --glare")
-    @click.option("--ghosts", is_flag=True, help="Adds ghosts to --glare")
-    @click.option("--halo", is_flag=True, help="Adds a halo to --glare")
-    @click.option("--dirt", type=click.Path(), help="Adds dirt, the picture of a file, to --glare")
+    @click.option("--streaks", type=click.IntRange(1, 16), help="Add this many streaks to --glare")
+    @click.option("--ghosts", is_flag=True, help="Add ghosts to --glare")
+    @click.option("--halo", is_flag=True, help="Add a halo to --glare")
+    @click.option(
+        "--dirt", type=click.Path(), help="Add dirt, with the picture of a file, to --glare"
+    )
     @functools.wraps(command)
     def run(
         streaks: int | None, ghosts: bool, halo: bool, dirt: str | None, **rest: object
@@ -86,7 +88,7 @@ def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def default_preset(is_image: bool) -> str:
-    """Return the name of what settings start from without --preset and --method."""
+    """Return the preset that is used if there is no --preset and no --method."""
     return PRESET_OF_IMAGES if is_image else _PRESET_OF_SCENES
 
 

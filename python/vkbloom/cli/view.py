@@ -19,9 +19,9 @@ from vkbloom.cli.live import HELP, Live
 from vkbloom.cli.live_options import live_options
 from vkbloom.settings import SHADINGS, Shading
 
-_LARGEST: Final = (1600, 900)  # of the window that an image opens
-_TITLE_SECONDS: Final = 0.5  # between two lines of values
-_WAIT_SECONDS: Final = 0.1  # while nothing can be seen
+_LARGEST: Final = (1600, 900)  # size of a window for an image
+_TITLE_SECONDS: Final = 0.5  # between updates of the title
+_WAIT_SECONDS: Final = 0.1  # while the window is hidden
 _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"123456789")
 
 
@@ -82,7 +82,7 @@ def command(
 
 @contextlib.contextmanager
 def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
-    """Open a window without an API of its own."""
+    """Open a window without an OpenGL context."""
     glfw.ERROR_REPORTING = "ignore"  # The last error is asked for.
     try:
         window = None
@@ -90,14 +90,16 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
             glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
             window = glfw.create_window(*size, "vkbloom", None, None)
         if not window:
-            raise vkbloom.Error(f"no window: {glfw.get_error()[1].decode(errors='replace')}")
+            raise vkbloom.Error(
+                f"no window was opened: {glfw.get_error()[1].decode(errors='replace')}"
+            )
         yield window
     finally:
         glfw.terminate()
 
 
 def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> None:
-    """Have keys and the mouse change the state."""
+    """Connect keys and the mouse to the state."""
     keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
     last = [0.0, 0.0]
 

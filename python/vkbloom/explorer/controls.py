@@ -9,6 +9,7 @@ from typing import Any, Final, Literal
 
 from vkbloom import _core
 from vkbloom.explorer.functions import functions
+from vkbloom.explorer.stages import glare_controls
 from vkbloom.explorer.steps import slider_step
 from vkbloom.fields import field_range
 from vkbloom.glare.base import Glare
@@ -68,8 +69,9 @@ def controls() -> dict[str, Any]:
         "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
         range from "low" to "high", and "integer"; choices have "choices", and may have a name for
         "none" of them. "functions": the point-spread functions of a convolution, as from
-        `functions`. "presets": settings by name, as from `Settings.to_dict`. "look": the fields
-        that keep their values when another preset or method is selected.
+        `functions`. "glare": as from `glare_controls`. "presets": settings by name, as from
+        `Settings.to_dict`. "look": the fields that keep their values when another preset or method
+        is selected.
     """
     return {
         "methods": {
@@ -77,6 +79,7 @@ def controls() -> dict[str, Any]:
             for name, kind in METHODS.items()
         },
         "functions": functions(),
+        "glare": glare_controls(),
         "presets": {name: settings.to_dict() for name, settings in presets.items()},
         "look": _LOOK,
     }

@@ -906,7 +906,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     });
     show(value);
     first.dataset.field = field.name;
-    const words = field.name.split(".").at(-1).replaceAll("_", " ");
+    const words = field.label ?? field.name.split(".").at(-1).replaceAll("_", " ");
     const text = make("span", { textContent: words });
     const row = make("label", { className: `vkb-field vkb-${field.kind}`, title: field.help });
     row.append(text, make("span", { className: "vkb-parts" }, ...parts));
@@ -940,6 +940,41 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     return [choice, ...parameters.filter((row) => row !== null)];
   }
 
+  // The choice of stages of glare, also of one more, and the numbers of each. Objects of presets are
+  // copied, not changed.
+  function glareRows(field, own) {
+    const { stages, presets } = setup.glare;
+    const take = (next) => {
+      settings[editing].glare = next;
+      buildFields();
+      fields.querySelector(`[data-field="${field.name}"]`).focus();
+    };
+    const same = (name) => JSON.stringify(presets[name]) === JSON.stringify(own);
+    const name = own.length ? (field.choices.find(same) ?? "own") : null;
+    const choices = name === "own" ? ["own", ...field.choices] : field.choices;
+    const choice = fieldRow({ ...field, choices }, name, (next) => {
+      if (next !== "own") take(next ? presets[next] : []);
+    });
+    const more = { name: "glare.more", label: "more glare", kind: "choice", optional: true };
+    const adding = fieldRow(
+      { ...more, none: "none", choices: Object.keys(stages), help: "Adds a stage" },
+      null,
+      (next) => next && take([...own, stages[next].defaults]),
+    );
+    const numbers = own.flatMap((stage, place) =>
+      stages[stage.stage].fields.map((one) => {
+        const label = `${stage.stage}: ${one.name.replaceAll("_", " ")}`;
+        const row = { ...one, label, name: `glare.${place}.${one.name}` };
+        return fieldRow(row, stage[one.name], (value) => {
+          const now = [...settings[editing].glare];
+          now[place] = { ...now[place], [one.name]: value };
+          settings[editing].glare = now;
+        });
+      }),
+    );
+    return [choice, ...numbers, adding];
+  }
+
   function buildFields({ keepPreset = false } = {}) {
     const wasOpen = fields.querySelector("details")?.open ?? false;
     if (!keepPreset) presetSelect.value = "";
@@ -947,6 +982,10 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     methodSelect.value = current.method;
     const rows = { true: [], false: [] };
     for (const field of setup.methods[current.method].fields) {
+      if (field.name === "glare") {
+        rows[field.first].push(...glareRows(field, current.glare));
+        continue;
+      }
       const row = fieldRow(field, current[field.name], (value) => {
         settings[editing][field.name] = value;
       });

@@ -215,7 +215,7 @@ def _unpacked(message: bytes) -> tuple[bytes, list[bytes]]:
     """Return the header and the file of a message from `_packed`."""
     (length,) = struct.unpack_from("<I", message)
     if length > _LARGEST_MESSAGE:
-        raise ValueError(f"message: its header has {length} bytes")
+        raise ValueError(f"message: the length {length} of its header is out of range")
     return message[4 : 4 + length], [message[4 + length :]]
 
 

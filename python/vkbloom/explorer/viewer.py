@@ -380,7 +380,7 @@ def _read(name: str, files: Sequence[bytes], *, is_mask: bool = False) -> NDArra
     from vkbloom.io.array_files import read  # noqa: PLC0415
 
     if len(files) != 1:
-        raise ValueError("open: the content of one file is needed")
+        raise ValueError("open: the message does not have the content of one file")
     with tempfile.TemporaryDirectory() as folder:
         # The file name may be anything. Only its extension is used, for the format.
         path = Path(folder, f"image{PurePath(name).suffix[:8]}")
@@ -407,7 +407,7 @@ def _described(error: BaseException) -> str:
 
 def _place(at: object) -> tuple[float, float]:
     if not (isinstance(at, list | tuple) and len(at) == 2):
-        raise TypeError(f"at: (x, y) is needed, not {at!r:.80}")
+        raise TypeError(f"at: {at!r:.80} is not (x, y)")
     for part in at:
         check_number("at", part, 0, 1)
     return float(at[0]), float(at[1])

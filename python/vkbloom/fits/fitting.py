@@ -158,7 +158,7 @@ def fit(
     """
     candidates = [settings] if isinstance(settings, Settings) else list(settings)
     if not candidates:
-        raise ValueError("settings: empty; give at least one Settings")
+        raise ValueError("settings: there are none; give at least one")
     names = _checked_names(vary)
     measured = loss_named(loss)
     check_index("max_calls", max_calls, 1, 10_000_000)
@@ -202,7 +202,7 @@ class _Stage:
 def _checked_names(vary: Sequence[str]) -> tuple[str, ...]:
     names = (vary,) if isinstance(vary, str) else tuple(vary)
     if not names:
-        raise ValueError("vary: empty; name at least one field")
+        raise ValueError("vary: there are no fields; name at least one")
     if len(set(names)) < len(names):
         raise ValueError(f"vary: {', '.join(names)} has a field twice")
     return names

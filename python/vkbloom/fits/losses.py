@@ -45,7 +45,7 @@ class Measure:
     def __post_init__(self) -> None:
         if self.loss in ("relative", "log") and not self.target.max() > 0:
             raise ValueError(
-                f'target: it is black, which the loss {self.loss!r} has no scale for; use "l2"'
+                f'target: it is black, so the loss {self.loss!r} is undefined; use "l2"'
             )
 
     @property

@@ -1,4 +1,4 @@
-"""The weights of a pyramid that come closest to a point-spread function."""
+"""The level weights of a pyramid that approximates a point-spread function."""
 
 from __future__ import annotations
 
@@ -43,30 +43,30 @@ def fit_pyramid(
     Parameters
     ----------
     psf : PSF
-        The mean of its channels counts.
+        The target; the mean of its channels is used.
     levels : int
         Number of levels, 1 to 16.
     size : (int, int)
-        Width and height of the frame in pixels, whose middle the point is in.
+        Width and height of the frame in pixels. The point is in the middle.
     pixels_per_degree : float, optional
         As for `PSF.array`.
     radius : float
-        Of the pyramid's tent, 0 to 16.
+        Radius of the pyramid's tent, 0 to 16.
     direct : bool
-        Whether a share of the light stays where it is: ``composite`` is "mix" then, and
-        ``intensity`` the share that blooms. For functions of the eye and of lenses, which are of
-        all light and have a sharp peak. False: the bloom alone is the function.
+        Whether to keep a share of the light unblurred. ``composite`` is "mix" then, and
+        ``intensity`` is the share that is blurred. Use it for functions with a sharp peak that
+        describe all light, such as those of the eye. False: the bloom approximates the function.
     loss : {"relative", "log"}
-        "relative": of the differences as they are, which the peak decides. "log": of the
-        differences as shares of the function, from 1e-4 of its peak on.
+        "relative": of the differences; the peak dominates. "log": of the differences divided by
+        the function, or by 1e-4 of its peak where the function is smaller.
     renderer : Renderer, optional
         Default: a new one.
 
     Returns
     -------
     FitResult
-        `settings` are a `Pyramid`, whose buffers are floats. `calls` counts a render for each
-        level and one for the result.
+        `settings` is a `Pyramid` whose buffers are floats. `calls` is the number of renders: one
+        for each level and two for the losses.
 
     Raises
     ------
@@ -79,8 +79,8 @@ def fit_pyramid(
 
     See Also
     --------
-    fit : Finds all other settings.
-    psf.measured : The way back, from settings to a function.
+    fit : Finds other settings.
+    psf.measured : Makes a function from settings.
 
     Notes
     -----

@@ -160,7 +160,7 @@ def space_of(
         kind = _kind(settings, name)
         if kind is None:
             raise ValueError(
-                f"vary: {name!r} is not a number, a flag or a choice; set it, or fit weights by "
+                f"vary: {name!r} is not a number, a flag or a choice; fit weights by "
                 "vkbloom.fit_pyramid"
             )
         if kind == "choice":
@@ -225,16 +225,14 @@ def _number(
             raise TypeError(f"bounds: {field.name}: {given!r} is not a pair (low, high)")
         low, high = (check_number(f"bounds: {field.name}", end, low, high) for end in given)
         if not low < high:
-            raise ValueError(f"bounds: {field.name}: {low:g} is not under {high:g}")
+            raise ValueError(f"bounds: {field.name}: {low:g} is not less than {high:g}")
     elif field.name == "threshold":
         high = min(high, max(limits[0], 1e-3))
     elif field.metadata.get("unit") == "pixel":
         high = min(high, max(limits[1], low + 1))
     value = _begun(settings, field.name)
     if value is None:
-        raise ValueError(
-            f"vary: {field.name}: None is not a number to start from; replace it by one"
-        )
+        raise ValueError(f"vary: {field.name}: None is not a number; set a number to start from")
     default = field.default if isinstance(field.default, int | float) else 0.0
     usual = max(abs(float(default)), abs(float(value))) or 1.0
     is_wide = low >= 0 and high - low > _WIDE * usual

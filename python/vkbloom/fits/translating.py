@@ -112,7 +112,7 @@ def translate(
     check_settings(settings)
     start = to() if isinstance(to, type) and issubclass(to, Settings) else to
     if not isinstance(start, Settings):
-        raise TypeError(f"to: {to!r} is not a Settings, or a class of them")
+        raise TypeError(f"to: {to!r} is not a Settings or a class of settings")
     image = lights(check_size("size", size))
     names = _knobs(start) if vary is None else vary
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()

@@ -1,4 +1,4 @@
-"""What all stages of glare share, and the stages of settings."""
+"""The base classes of the stages of glare, and functions for the field `Settings.glare`."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def stage_field(name: str, default: float | None = None, unit: str = "1") -> Any
 class Glare:
     """Base class of the stages of glare; use a stage's class, such as `Streaks`.
 
-    Stages are frozen and hashable. Their light is added to the bloom: with s the scene, b the
-    bloom, i its intensity and g_k, i_k the framebuffer and the intensity of each stage, ``final``
-    is made of s and i b + sum of i_k g_k in place of i b. `Dirt` multiplies this sum.
+    Stages are frozen and hashable. Their light is added to the bloom: the composite adds
+    i b + sum of i_k g_k instead of i b. Here b is the bloom and i its intensity; g_k and i_k are
+    the framebuffer and the intensity of stage k. `Dirt` multiplies this sum.
 
     Raises
     ------
@@ -122,19 +122,18 @@ class Glare:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class GlareLight(Glare):
-    """Base class of the stages that have light; use a stage's class, such as `Streaks`.
+    """Base class of the stages that add light; use a stage's class, such as `Streaks`.
 
     Parameters
     ----------
     intensity : float
         Factor of the stage's light, 0 to 65504.
     threshold : float
-        What is subtracted from each channel of what the stage reads, 0 to 65504; negative
-        differences become 0. If alpha is blurred, it is multiplied by the factor of the brightest
-        channel.
+        Subtracted from each channel that the stage reads, 0 to 65504. Negative differences become
+        0. If alpha is blurred, it is multiplied by the factor of the brightest channel.
     halvings : int
-        How often the size of the bloom buffers is halved for the stage, 0 to 4, by the 13 taps of
-        `Pyramid`. Each halving makes the stage four times as fast, and its light coarser.
+        Number of times that the stage's input is halved, 0 to 4, by the 13 taps of `Pyramid`. Each
+        halving makes the stage four times as fast, and its light coarser.
 
     See Also
     --------
@@ -143,14 +142,14 @@ class GlareLight(Glare):
     Notes
     -----
     A stage reads what glows: ``glow``, with threshold, mask and emission. Published methods apply
-    threshold and mask later than that, so that for the stages they are applied by themselves, by
-    the formulas of `Settings`. Outside of the picture there is no light. The framebuffers of stages
-    are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
+    threshold and mask in a later pass. With them, the stages have a threshold pass of their own,
+    which uses the formulas of `Settings`. Texels outside of the picture are black. The framebuffers
+    of stages are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
 
     Examples
     --------
     >>> vkbloom.Streaks(intensity=2, threshold=1).halvings
-    1
+    2
     """
 
     intensity: float = stage_field("intensity")
@@ -169,14 +168,14 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
     Parameters
     ----------
     glare : Glare, mapping, a sequence of them, or None
-        A mapping is what `Glare.to_dict` gave; None is no stage.
+        A mapping is the result of `Glare.to_dict`. None: no stages.
 
     Raises
     ------
     ValueError
         There are too many stages, or a mapping does not describe a stage.
     TypeError
-        Something else is among them.
+        A stage is neither a Glare nor a mapping.
     """
     if glare is None:
         return ()
@@ -191,7 +190,7 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
             raise TypeError(f"glare: {one!r} is not a stage, such as Streaks()")
         found.append(stage)
     if sum(stage.stage == "dirt" for stage in found) > 1:
-        raise ValueError("glare: there is more than one stage of dirt")
+        raise ValueError("glare: there is more than one Dirt; give one")
     if len(found) > _core.MAX_STAGES:
         raise ValueError(f"glare: {len(found)} stages are out of range, 0 to {_core.MAX_STAGES}")
     return tuple(found)

@@ -18,19 +18,19 @@ DirtMode = Literal["multiply", "lerp"]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Dirt(Glare):
-    """A picture of dirt on the lens, by which bloom and glare are multiplied.
+    """A picture of dirt on the lens, which multiplies bloom and glare.
 
     Parameters
     ----------
     image : array-like, shape (H, W) or (H, W, 3), or None
-        Linear and finite; it is copied, as float32, and enlarged bilinearly to the frame. None: a
-        picture of 480 x 270 that is made from the seed.
+        The dirt D: linear and finite values, which are copied to float32 and enlarged bilinearly to
+        the frame. None: a picture of 480 x 270 pixels, made from `seed`.
     seed : int
-        0 to 65535.
+        Seed of the picture that is made, 0 to 65535.
     strength : float
-        The s of the formulas, 0 to 16; with "lerp" 0 to 1.
+        The s of the formulas, 0 to 16; with the mode "lerp" 0 to 1.
     mode : {"multiply", "lerp"}
-        With the light L and the dirt D, L D s or L (1 + s (D - 1)).
+        The light L becomes L D s, or L (1 + s (D - 1)).
 
     Raises
     ------
@@ -41,11 +41,11 @@ class Dirt(Glare):
 
     See Also
     --------
-    Settings : Takes it among `glare`, once at the most.
+    Settings : Takes at most one Dirt in `glare`.
 
     Notes
     -----
-    Source: "multiply" as in google/filament, colorGrading.mat @ 263d042924de; "lerp" as in
+    Source: "multiply" from google/filament, colorGrading.mat @ 263d042924de; "lerp" from
     godotengine/godot, tonemap.glsl @ 001c8c9c24dc (the glow map).
 
     Examples
@@ -96,7 +96,7 @@ class Dirt(Glare):
         return CoreKernel(*_core_dirt(self.replace_look()))
 
     def replace_look(self) -> Dirt:
-        """Return the dirt with the defaults of all that its picture does not depend on."""
+        """Return the dirt with defaults in the fields that do not change its picture."""
         return Dirt(image=self.image, seed=self.seed)
 
 

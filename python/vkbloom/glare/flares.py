@@ -12,24 +12,26 @@ from vkbloom.glare.base import GlareLight, stage_field
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Ghosts(GlareLight):
-    """Pictures of what glows, mirrored and scaled about the centre, as reflections in a lens make.
+    """Reflections in a lens: copies of what glows, mirrored and scaled about the centre.
 
     Parameters
     ----------
     scales : sequence of float
-        Up to 16 scales s_k, -16 to 16. Negative ones mirror; sizes above 1 make ghosts smaller.
+        Up to 16 scales s_k, -16 to 16. A negative scale mirrors the copy. A copy has 1 / abs(s_k)
+        times the size of the picture.
     tints : sequence of (float, float, float)
-        Red, green and blue factor of each ghost, or one for all.
+        Factors of red, green and blue for each ghost, or one tint for all ghosts.
     maximum : float
-        Largest value of a channel that a ghost reads, after the threshold, 0 to 65504.
+        Limit of each channel that a ghost reads, after the threshold, 0 to 65504.
     falloff : float
-        Exponent of the fall towards the border of what a ghost shows, 0 to 64; 0: none.
+        Exponent of the attenuation towards the border of a copy, 0 to 64. 0: no attenuation.
     radius : float
-        Where this fall ends, as a share of the picture's sides, 0.001 to 4.
+        Distance from the copy's centre at which the attenuation ends in 0, as a share of the
+        picture's sides, 0.001 to 4.
     vignette : float
-        How much the ghosts are kept out of the middle, 0 to 1.
+        Attenuation of the ghosts in the middle of the picture, 0 to 1.
     aberration : float
-        How far red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
+        Distance by which red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
     **glare
         The fields of `GlareLight`.
 
@@ -39,17 +41,18 @@ class Ghosts(GlareLight):
 
     Notes
     -----
-    With p the place of a pixel, 0 to 1 along both sides, and c what glows,
+    With the position p of a pixel, 0 to 1 along both sides, and the glow c,
 
         q_k = 1/2 + s_k (p - 1/2)
         ghosts(p) = v(p) sum over k of tint_k w(q_k) min(max(c(q_k) - threshold, 0), maximum)
 
-    with w(q) = max(0, 1 - abs(q - 1/2) / radius)^falloff, and for (x, y) = 2 p - 1
-    v(p) = 1 + vignette (min((x^2 + y^2)^2, 1) - 1). Red is read at q + a, blue at q - a, with a of
-    the length `aberration` towards the centre.
+    with w(q) = max(0, 1 - abs(q - 1/2) / radius)^falloff, and with (x, y) = 2 p - 1,
+    v(p) = 1 + vignette (min((x^2 + y^2)^2, 1) - 1). Red is read at q + a and blue at q - a, where a
+    points towards the centre and has the length `aberration`.
 
-    Source: Chapman, "Pseudo Lens Flare", 2013; the weights as in three.js (LensflareNode.js),
-    Blender and Unity (LensFlareScreenSpaceCommon.hlsl), the aberration as in Filament (flare.mat).
+    Source: Chapman, "Pseudo Lens Flare", 2013. The weights are those of three.js
+    (LensflareNode.js), Blender and Unity (LensFlareScreenSpaceCommon.hlsl), the aberration is
+    Filament's (flare.mat).
 
     Examples
     --------
@@ -71,13 +74,14 @@ class Ghosts(GlareLight):
     radius: float = stage_field("radius", default=0.75)
     vignette: float = stage_field("vignette")
     aberration: float = stage_field("aberration")
-    halvings: int = stage_field("halvings", default=2)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         scales = check_floats("scales", self.scales)
         if not 1 <= len(scales) <= _core.MOST_GHOSTS:
-            raise ValueError(f"scales: {len(scales)} are out of range, 1 to {_core.MOST_GHOSTS}")
+            raise ValueError(
+                f"scales: {len(scales)} scales are out of range, 1 to {_core.MOST_GHOSTS}"
+            )
         for scale in scales:
             check_number("scales", scale, -16, 16)
         try:
@@ -86,8 +90,8 @@ class Ghosts(GlareLight):
             raise TypeError(f"tints: {self.tints!r} is not a sequence of (r, g, b)") from None
         if len(tints) not in (1, len(scales)) or any(len(tint) != 3 for tint in tints):
             raise ValueError(
-                f"tints: {self.tints!r} is not one (r, g, b), or one for each of the "
-                f"{len(scales)} scales"
+                f"tints: {self.tints!r} is not one (r, g, b) or {len(scales)} of them, one for "
+                "each scale"
             )
         for tint in tints:
             for factor in tint:
@@ -97,36 +101,36 @@ class Ghosts(GlareLight):
 
     @property
     def ghosts(self) -> tuple[tuple[float, tuple[float, float, float]], ...]:
-        """The scale and the tint of each."""
+        """The scale and the tint of each ghost."""
         tints = self.tints if len(self.tints) > 1 else self.tints * len(self.scales)
         return tuple(zip(self.scales, tints, strict=True))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Halo(GlareLight):
-    """A ring around the centre of the picture, from what glows near the centre.
+    """A ring around the centre of the picture, made from the glow near the centre.
 
     Parameters
     ----------
     radius : float
-        Of the ring, in heights of the picture, 0.001 to 4.
+        Radius of the ring in heights of the picture, 0.001 to 4.
     width : float
-        From the middle of the ring to where it ends, in heights of the picture, 0.001 to 4.
+        Distance from the middle of the ring to its ends in heights of the picture, 0.001 to 4.
     maximum : float
-        Largest value of a channel that the halo reads, after the threshold, 0 to 65504.
+        Limit of each channel that the halo reads, after the threshold, 0 to 65504.
     aberration : float
-        How far red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
+        Distance by which red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
     **glare
         The fields of `GlareLight`.
 
     See Also
     --------
-    Ghosts : Mirrored and scaled pictures.
+    Ghosts : Mirrored and scaled copies of the picture.
 
     Notes
     -----
-    With p the place of a pixel and d its distance from the centre, in heights of the picture, and u
-    the direction from p to the centre, halo(p) is
+    With the position p of a pixel, its distance d from the centre in heights of the picture, and
+    the direction u from p to the centre, halo(p) is
 
         (1 - smoothstep(0, 1, abs(d - radius) / width)) c'(p + radius u)
 
@@ -151,4 +155,3 @@ class Halo(GlareLight):
     width: float = stage_field("width")
     maximum: float = stage_field("maximum")
     aberration: float = stage_field("aberration")
-    halvings: int = stage_field("halvings", default=2)

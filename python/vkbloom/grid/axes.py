@@ -179,8 +179,8 @@ def read_axes(
         raise ValueError("axes: preset and settings exclude each other; give one of them")
     if whole and settings is not None:
         raise ValueError(
-            f"settings: the axis {next(iter(whole))} has the settings; leave the argument out, and "
-            "vary a field by an axis of its own"
+            f"settings: the axis {next(iter(whole))} sets all settings; leave the argument out, "
+            "and vary fields by further axes"
         )
     bases = [one for axis in whole.values() for one in settings_of(axis)] or [
         check_settings(settings)

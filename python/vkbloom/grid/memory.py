@@ -48,9 +48,9 @@ def check_fits(grid: Grid, variables: Mapping[str, Variable]) -> None:
     left = _memory_left()
     if left is not None and size > left:
         raise MemoryError(
-            f"a grid of {points} points with {', '.join(variables)} takes {_gigabytes(size)}, and "
-            f"{_gigabytes(left)} of memory are left: grid_to_zarr writes it to a store, and "
-            "attachments=() keeps figures of `reduce` alone"
+            f"a grid of {points} points with {', '.join(variables)} needs {_gigabytes(size)} of "
+            f"memory, but {_gigabytes(left)} are free; write a store with grid_to_zarr, or keep "
+            "only the figures of reduce with attachments=()"
         )
 
 

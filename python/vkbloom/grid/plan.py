@@ -211,7 +211,7 @@ def ask(
         if not callable(reduction):
             raise TypeError(f"reduce: {name}: {reduction!r} is not callable")
     if names == () and not reductions:
-        raise ValueError("attachments: empty, and there are no reductions; request one of them")
+        raise ValueError("attachments: there are neither attachments nor reductions; request some")
     grid = Grid(
         checked, check_settings(settings), found, "all" if names is None else names, reductions
     )
@@ -419,8 +419,8 @@ def _refuse(
         what = f"{found[0]} {found[1]}" if found else "not there"
         told.append(f"{what} at {where}")
     raise ValueError(
-        f"axes: along {names}, {name} has no one shape and dtype: {'; '.join(told)}. Ask for "
-        "attachments that are the same at all points, or for a grid each"
+        f"axes: {name} changes its shape or dtype along {names}: {'; '.join(told)}; request "
+        "attachments that are the same at all points, or make a grid for each"
     )
 
 

@@ -429,7 +429,7 @@ class ColorVideoVDP(Comparing):
     >>> ColorVideoVDP(against=final, pixels_per_degree=60)
     Traceback (most recent call last):
         ...
-    ValueError: nits_per_unit: None is no number; ColorVideoVDP needs it
+    ValueError: nits_per_unit: None is not a number; ColorVideoVDP needs one
     >>> ColorVideoVDP.units
     'JOD'
     """
@@ -441,7 +441,7 @@ class ColorVideoVDP(Comparing):
         super().__post_init__()
         for name in ("nits_per_unit", "pixels_per_degree"):
             if getattr(self, name) is None:
-                raise ValueError(f"{name}: None is no number; ColorVideoVDP needs it")
+                raise ValueError(f"{name}: None is not a number; ColorVideoVDP needs one")
         if find_spec("pycvvdp") is None:
             warnings.warn(
                 "ColorVideoVDP is left out: it needs pycvvdp, pip install vkbloom[cvvdp]",

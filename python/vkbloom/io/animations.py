@@ -43,8 +43,8 @@ def animation(file: Path, rate: int) -> Iterator[Callable[[NDArray[Any]], None]]
         nonlocal shape
         if array.dtype != np.uint8 or array.ndim != 3 or array.shape != (shape or array.shape):
             raise ValueError(
-                f"{file}: {array.dtype} of shape {array.shape} is no frame of an animation; name "
-                "a framebuffer of uint8"
+                f"{file}: {array.dtype} of shape {array.shape} is not a frame of an animation; "
+                "name a framebuffer of uint8"
             )
         height, width, channels = array.shape
         spec = oiio.ImageSpec(width, height, channels, "uint8")

@@ -222,7 +222,7 @@ def write(
         raise ValueError(
             f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
             if is_float
-            else f"encoding: {encoding!r} is for floats; {values.dtype} is written as it is"
+            else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
         )
     if bits is not None and (bits not in _FLOATS or not is_float):
         own = 8 * values.dtype.itemsize

@@ -19,7 +19,7 @@ def grey_mask(pixels: NDArray[Any], file: str) -> NDArray[Any]:
         It has colours; the error names the file.
     """
     if (pixels[..., :3] != pixels[..., :1]).any():
-        raise ValueError(f"{file}: a mask is grey, and this image has colours")
+        raise ValueError(f"{file}: a mask must be grey, but this image has colours")
     return pixels[..., 0]
 
 

@@ -84,7 +84,7 @@ def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     kind = oiio.ImageOutput.create(f"image{Path(path).suffix}").format_name()
     if kind not in _LOSSY:
-        raise ValueError(f"quality: {kind} has none; {', '.join(_LOSSY)} have")
+        raise ValueError(f"quality: {kind} has no quality; {', '.join(_LOSSY)} have one")
 
 
 def save(

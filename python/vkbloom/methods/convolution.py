@@ -22,52 +22,52 @@ from vkbloom.settings import Settings
 __all__ = ["Boundary", "Convolution", "PSFLike"]
 
 Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
-#: What a kernel can be given as: a function, what its `to_dict` gave, or an array.
+#: The types of a kernel: a function, the result of its `to_dict`, or an array.
 PSFLike = PSF | Mapping[str, Any] | ArrayLike
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Convolution(Settings):
-    """A convolution with any point-spread function, by Fourier transforms.
+    """A convolution with a point-spread function, by Fourier transforms.
 
     Parameters
     ----------
     psf : PSF, or array-like, shape (h, w) or (h, w, 3)
-        What a point becomes; by default `vkbloom.psf.spencer`. An array is copied, as float32,
-        and is a `vkbloom.psf.samples`; its point is at [h // 2, w // 2].
+        The point-spread function; by default `vkbloom.psf.spencer`. An array is copied to float32
+        and becomes a `vkbloom.psf.samples`. Its point is at [h // 2, w // 2].
     normalize : bool
         Whether each channel of the kernel is divided by its sum.
     boundary : {"zero", "edge", "wrap", "wrap_x"}
-        What lies outside of the bloom buffers: nothing; their edge; themselves again; the edge
-        above and below, and themselves again at the sides, as in panoramas.
+        The texels outside of the bloom buffers. "zero": black. "edge": the nearest texel. "wrap":
+        the buffers are repeated. "wrap_x": repeated along x and "edge" along y, for panoramas.
     pixels_per_degree : float or None
-        Scale of functions of the angle. None: the frame's longer side spans 50 degrees. Functions
-        that are defined in pixels do not use it.
+        Scale of functions whose unit is "degree". None: the frame's longer side spans 50 degrees.
     kernel_size : (int, int) or None
-        Width and height of the kernel in pixels of ``final``. None: of an array its own, of
-        others twice the frame's less one, so that every pixel reaches every other one.
+        Width and height of the kernel in pixels of ``final``. None: the own size of an array;
+        otherwise (2 W - 1, 2 H - 1) for a frame of W x H, so that the light of every pixel reaches
+        every other pixel.
     **settings
         The fields of `Settings`.
 
     Raises
     ------
     ValueError
-        A field is out of its range. When it is used: a channel of the kernel has no sum above 0
-        that it could be divided by.
+        A field is out of its range. `Renderer.plan` and its callers raise it if `normalize` is
+        True and the sum of a channel is not above 0.
     TypeError
         A field has the wrong type.
 
     See Also
     --------
     vkbloom.psf : The point-spread functions.
-    Pyramid : A blur for wide spreads that takes less time.
+    Pyramid : A wide blur that takes less time.
 
     Notes
     -----
-    bloom[y, x] = sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)]. ``kernel`` is
-    K in pixels of the bloom buffers: where these have another size than the frame, each of their
-    pixels gets what its area covers. All is computed in single floats, whatever the format of the
-    bloom buffers; a value beyond 1e28 counts as that.
+    bloom[y, x] = sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)]. The framebuffer
+    ``kernel`` is K in pixels of the bloom buffers. If these have another size than the frame, K is
+    resampled by area. The computation uses single floats for every format of the bloom buffers.
+    Values are limited to -1e28..1e28.
 
     Examples
     --------
@@ -116,7 +116,7 @@ class Convolution(Settings):
         Returns
         -------
         dict
-            Plain values that JSON can hold.
+            Values that JSON can represent.
         """
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         values["glare"] = [stage.to_dict() for stage in self.glare]
@@ -124,10 +124,10 @@ class Convolution(Settings):
 
     @property
     def prefilter(self) -> tuple[float, float, float]:
-        """What the glow is filtered by before the convolution: of `vkbloom.psf.unreal`.
+        """min, max and mult of the prefilter of `vkbloom.psf.unreal`.
 
-        min, max and mult: a luminance L above min becomes min(mult (L - min) + min, max). Nothing
-        is changed where min is above max.
+        Before the convolution, a luminance L above min becomes min(mult (L - min) + min, max).
+        There is no prefilter if min is above max.
         """
         none = (1.0, 0.0, 1.0)
         return cast("tuple[float, float, float]", getattr(self.psf, "prefilter", none))
@@ -135,7 +135,7 @@ class Convolution(Settings):
     def kernel(
         self, frame: tuple[int, int], buffers: tuple[int, int] | None = None
     ) -> NDArray[np.float64]:
-        """Return the kernel that a frame's glow is convolved with.
+        """Return the kernel for a frame.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class Convolution(Settings):
         Returns
         -------
         ndarray of float64, shape (h, w, 3)
-            In pixels of the bloom buffers. Do not change it: it is kept.
+            The kernel in pixels of the bloom buffers. It is cached and read-only.
 
         Raises
         ------
@@ -157,12 +157,12 @@ class Convolution(Settings):
         return _kernel(self._shape, frame, buffers or frame)
 
     def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
-        """Return the same for the core."""
+        """Return the kernel as the core reads it."""
         pixels, serial, is_grey = _core_kernel(self._shape, frame, buffers)
         return CoreKernel(pixels, serial, is_grey, self.prefilter)
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
-        """Return about the kernel's width and height; (1, 1) where only the kernel tells them."""
+        """Return estimates of the kernel's width and height; (1, 1) if they are not known yet."""
         if self.kernel_size is None and isinstance(self.psf, SampledPSF):
             return 1, 1
         sides = self.kernel_size or tuple(2 * side - 1 for side in frame)
@@ -173,7 +173,7 @@ class Convolution(Settings):
 
     @property
     def _shape(self) -> Convolution:
-        """The settings with the defaults of all that the kernel does not depend on."""
+        """The settings with defaults in the fields that do not change the kernel."""
         return Convolution(
             self.psf,
             normalize=self.normalize,

@@ -1,8 +1,9 @@
 """Point-spread functions: how the light of a point is distributed over a picture.
 
-Of the eye (`spencer`, `cie_general`, `cie_total`), of lenses (`harvey_shack`, `airy`, `aperture`
-with `iris`), of renderers (`fog_glow`, `unreal`), of settings (`measured`), and `gaussian` and
-`samples`. All are a `PSF`, and `vkbloom.Convolution` makes a bloom of any of them.
+There are functions of the eye (`spencer`, `cie_general`, `cie_total`), of lenses (`harvey_shack`,
+`airy`, `aperture` with `iris`), of renderers (`fog_glow`, `unreal`) and of settings (`measured`).
+`gaussian` and `samples` are general. All are subclasses of `PSF`. `vkbloom.Convolution` convolves
+an image with any of them.
 """
 
 from __future__ import annotations

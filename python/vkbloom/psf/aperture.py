@@ -17,7 +17,7 @@ from vkbloom.psf.values import ArrayValue
 
 __all__ = ["aperture", "iris"]
 
-# Samples of the diffraction pattern for each period of the finest detail that it can have.
+# Samples of the diffraction pattern per period of its highest frequency.
 _PADDING = 4
 _SPECTRUM = tuple(range(390, 731, 10))
 # XYZ to linear sRGB (IEC 61966-2-1).
@@ -32,22 +32,22 @@ _SRGB = np.array(
 
 @dataclasses.dataclass(frozen=True)
 class iris:
-    """The mask of a camera's iris, for `aperture`: what lets light through.
+    """The mask of a camera's iris, for `aperture`.
 
     Parameters
     ----------
     blades : int
         Number of straight blades, 3 to 64.
     rotation : float
-        In degrees, counter-clockwise; at 0 a corner is on the right.
+        In degrees, counter-clockwise. With 0, a corner is on the right.
     roundness : float
-        0: straight edges, 1: a circle.
+        Shape of the edges, 0 (straight) to 1 (a circle).
     dust : int
         Number of opaque specks, 0 to 10000.
     scratches : int
         Number of thin opaque lines, 0 to 10000.
     seed : int
-        Of the places of dust and scratches.
+        Seed of the positions of dust and scratches.
     size : int
         Side of the mask in samples, 8 to 4096. The aperture's circle touches all sides.
 
@@ -57,10 +57,10 @@ class iris:
 
     Notes
     -----
-    NumPy sees an array of float32, shape (size, size), 1 where light passes and 0 elsewhere, with
-    edges of 4 x 4 samples. The edge of a polygon is at the distance
-    cos(pi / n) / cos(angle to the middle of the edge) of the radius, and `roundness` mixes it with
-    the circle's, 1.
+    NumPy converts it to an array of float32, shape (size, size): 1 where light passes, 0 elsewhere.
+    Edges are the mean of 4 x 4 samples. With a radius of 1, the distance of a polygon's edge from
+    the centre is cos(pi / n) / cos(angle to the middle of the edge). `roundness` interpolates
+    between this distance and 1.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class iris:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of the mask: (size, size)."""
+        """The shape of the mask, (size, size)."""
         return self.size, self.size
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
@@ -142,39 +142,39 @@ def _mask(made: iris) -> NDArray[np.float32]:
 
 
 def _near(centre: float, radius: float, count: int) -> slice:
-    """Return the samples of -1..1 that are within a distance of a place."""
+    """Return the samples of -1..1 whose distance from the centre is at most the radius."""
     first, last = ((place + 1) * count / 2 for place in (centre - radius, centre + radius))
     return slice(max(0, math.floor(first)), min(count, math.ceil(last)))
 
 
 @dataclasses.dataclass(frozen=True)
 class aperture(SampledPSF):
-    """Diffraction of an aperture of any shape, in white light or some wavelengths, in pixels.
+    """Diffraction of an aperture of any shape, in white light or single wavelengths, in pixels.
 
     Parameters
     ----------
     mask : iris, or array-like, shape (n, n)
-        What lets light through, 0 to 1, over the square around the aperture.
+        Transmission, 0 to 1, of the square around the aperture.
     f_number : float
-        Focal length by the side of the mask, above 0.
+        Focal length divided by the side of the mask, above 0.
     pixel_pitch : float
         Distance of the pixels on the sensor in um, above 0.
     wavelengths : sequence of float or None
-        In nm, 380 to 780; one alone is grey. None: 390 to 730 in steps of 10.
+        In nm, 380 to 780. A single wavelength is shown in grey. None: 390 to 730 in steps of 10.
 
     See Also
     --------
     iris : Makes masks.
-    airy : The circle at one wavelength, as a formula.
+    airy : The formula for a circle at one wavelength.
 
     Notes
     -----
-    With A the mask's Fourier transform, P(u) = ``|A(u)|^2`` and the wavelength w, the intensity at
-    the place r is P(r / (w f_number)) / w^2, here integrated over each pixel. The wavelengths are
-    summed with the CIE 1931 colour matching functions and equal energy, converted to linear sRGB,
-    and each channel divided by its sum, so that white light stays white. Saturated spectral colours
-    lie outside of sRGB: single values can be below 0. The pattern of n samples ends n / 2 periods
-    from the centre.
+    A is the mask's Fourier transform, and P(u) = ``|A(u)|^2``. At the position r and the wavelength
+    w, the intensity is P(r / (w f_number)) / w^2. It is integrated over each pixel. The wavelengths
+    have equal energy. They are summed with the CIE 1931 colour matching functions and converted to
+    linear sRGB. Each channel is divided by its sum, so that white light stays white. Saturated
+    spectral colours are outside of sRGB, so single values can be negative. The pattern of n samples
+    ends n / 2 periods from the centre.
 
     Source of the colour matching functions: the fits of Wyman, Sloan, Shirley, "Simple Analytic
     Approximations to the CIE XYZ Color Matching Functions", JCGT 2(2), 2013.
@@ -202,8 +202,8 @@ class aperture(SampledPSF):
                 check_number("wavelengths", length, 380, 780)
             if not lengths or not (_colours(lengths).sum(axis=0) > 0).all():
                 raise ValueError(
-                    f"wavelengths: {self.wavelengths!r} have no red, green and blue of sRGB in "
-                    "their sum; give one, or add others"
+                    f"wavelengths: the sum of {self.wavelengths!r} is not above 0 in each channel "
+                    "of sRGB; give one wavelength, or add others"
                 )
             object.__setattr__(self, "wavelengths", lengths)
 
@@ -221,7 +221,7 @@ def _check_mask(mask: Any) -> iris | ArrayValue:
     if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
         raise ValueError(f"mask: shape {array.shape} is not (n, n)")
     if not ((array >= 0) & (array <= 1)).all() or not array.any():
-        raise ValueError("mask: its values are not 0 to 1, some of them above 0")
+        raise ValueError("mask: its values are not between 0 and 1, or all of them are 0")
     return held
 
 
@@ -250,10 +250,10 @@ def _pattern(psf: aperture) -> Array:
 
 
 def _sums(mask: Array) -> Array:
-    """Return the integral of the diffraction pattern over the rectangles from its first corner.
+    """Return the integrals of the diffraction pattern over rectangles that start at its corner.
 
-    Its finest detail is known, so that the integrals over the cells of the Fourier transform are
-    exact: the product with a sinc in the domain of the autocorrelation.
+    The pattern is band-limited. So the integrals over the cells of the Fourier transform are exact:
+    a product with a sinc in the domain of the autocorrelation.
     """
     side = _PADDING * len(mask)
     correlation = np.fft.irfft2(np.abs(np.fft.rfft2(mask, (side, side))) ** 2, (side, side))
@@ -263,9 +263,9 @@ def _sums(mask: Array) -> Array:
 
 
 def _between(sums: Array, places: Array) -> Array:
-    """Return the differences of the sums at places along the first axis.
+    """Return the differences of the sums between neighbouring places along the first axis.
 
-    Between two cells the sums are cubic, and outside of them constant.
+    The sums are interpolated by cubics between the cells, and constant outside of them.
     """
     at = np.clip(places, 0, len(sums) - 1)
     lower = np.minimum(at.astype(np.intp), len(sums) - 2)
@@ -285,7 +285,7 @@ def _between(sums: Array, places: Array) -> Array:
 
 
 def _colours(lengths: tuple[float, ...] | tuple[int, ...]) -> Array:
-    """Return the linear sRGB of each wavelength, (N, 3); one alone is shown in grey."""
+    """Return the linear sRGB of each wavelength, (N, 3). A single wavelength is grey."""
     if len(lengths) == 1:
         return np.ones((1, 3))
     nm = np.array(lengths, np.float64)

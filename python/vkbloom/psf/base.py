@@ -1,4 +1,4 @@
-"""What all point-spread functions have."""
+"""The base class of the point-spread functions."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ FRAME_DEGREES = 50.0
 class PSF(abc.ABC):
     """Base class of the point-spread functions of `vkbloom.psf`.
 
-    A point-spread function says how the light of one point is distributed over a picture. The ones
-    that are defined in degrees (`unit` "degree") are densities per steradian, and need
-    `pixels_per_degree` to become pixels; the others are defined in pixels. Two of them are equal,
-    and have the same hash, if they have the same class and the same parameters.
+    A point-spread function describes how the light of one point is distributed over a picture. If
+    its `unit` is "degree", it is a density per steradian, and `pixels_per_degree` converts it to
+    pixels. Otherwise it is defined in pixels. Two functions are equal, and have the same hash, if
+    their classes and parameters are equal.
 
     Attributes
     ----------
@@ -57,14 +57,14 @@ class PSF(abc.ABC):
 
     @abc.abstractmethod
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
-        """Return the energy that falls on each pixel.
+        """Return the energy of each pixel.
 
         Parameters
         ----------
         size : (int, int)
             Width and height in pixels.
         pixels_per_degree : float, optional
-            Default: the longer side spans 50 degrees. Not used where `unit` is "pixel".
+            Default: the longer side spans 50 degrees. Ignored if `unit` is "pixel".
 
         Returns
         -------
@@ -74,8 +74,8 @@ class PSF(abc.ABC):
 
         See Also
         --------
-        kernel : For the convolution of a frame.
-        save : Writes it to a file.
+        kernel : Returns the kernel for the convolution of a frame.
+        save : Writes the array to a file.
 
         Examples
         --------
@@ -88,13 +88,13 @@ class PSF(abc.ABC):
 
     @abc.abstractmethod
     def energy(self) -> Array:
-        """Return the sum of all that the function distributes.
+        """Return the total energy of the function.
 
         Returns
         -------
         ndarray of float64, shape (3,)
-            Linear RGB: of degrees the integral over the hemisphere, of pixels the sum over all of
-            the plane.
+            Linear RGB. The integral over the hemisphere if `unit` is "degree", the sum over the
+            plane if it is "pixel".
 
         See Also
         --------
@@ -119,7 +119,7 @@ class PSF(abc.ABC):
         Returns
         -------
         ndarray of float64, shape (N, 3)
-            Linear RGB; `energy` where the circle is large enough.
+            Linear RGB. It rises to `energy` with the radius.
 
         See Also
         --------
@@ -163,15 +163,15 @@ class PSF(abc.ABC):
         size: tuple[int, int] | None = None,
         pixels_per_degree: float | None = None,
     ) -> Array:
-        """Return the kernel that a frame is convolved with.
+        """Return the kernel for the convolution of a frame.
 
         Parameters
         ----------
         frame : (int, int)
             Width and height of the frame in pixels.
         size : (int, int), optional
-            Width and height of the kernel. Default: twice the frame's, less one, so that every
-            pixel reaches every other one.
+            Width and height of the kernel. Default: (2 width - 1, 2 height - 1) of the frame, so
+            that the light of every pixel reaches every other pixel.
         pixels_per_degree : float, optional
             Default: the frame's longer side spans 50 degrees.
 
@@ -181,7 +181,7 @@ class PSF(abc.ABC):
 
         See Also
         --------
-        array : An array of any size.
+        array : Returns an array of any size.
 
         Examples
         --------
@@ -204,19 +204,19 @@ class PSF(abc.ABC):
         Parameters
         ----------
         path : str or path-like
-            An OpenEXR file, which renderers load as kernel, or another file of floats.
+            An OpenEXR file, which renderers can load as a kernel, or another file of floats.
         size, pixels_per_degree
-            As of `array`.
+            The arguments of `array`.
 
         Returns
         -------
         Path
-            The file, of float32 RGB.
+            The file, which has float32 RGB.
 
         Raises
         ------
         ValueError, OSError, ModuleNotFoundError
-            As of `vkbloom.write`.
+            The errors of `vkbloom.write`.
 
         See Also
         --------
@@ -241,7 +241,7 @@ class PSF(abc.ABC):
         Returns
         -------
         dict
-            Plain values that JSON can hold.
+            Values that JSON can represent.
 
         See Also
         --------
@@ -259,12 +259,12 @@ class PSF(abc.ABC):
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """Make a function of what `to_dict` gave.
+        """Make a function from the result of `to_dict`.
 
         Parameters
         ----------
         fields : mapping of str to object
-            Missing ones are the defaults.
+            Values by parameter. Missing parameters have their defaults.
 
         Returns
         -------
@@ -275,7 +275,7 @@ class PSF(abc.ABC):
         ValueError
             There is no such function or parameter, or a value is out of range.
         TypeError
-            `fields` is no mapping, or a value has the wrong type.
+            `fields` is not a mapping, or a value has the wrong type.
 
         See Also
         --------
@@ -310,7 +310,7 @@ class PSF(abc.ABC):
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Make a function of JSON text that `to_json` gave.
+        """Make a function from the result of `to_json`.
 
         Parameters
         ----------
@@ -323,7 +323,7 @@ class PSF(abc.ABC):
         Raises
         ------
         ValueError, TypeError
-            The text is no JSON object, or as for `from_dict`.
+            The text is not a JSON object, or an error of `from_dict`.
 
         See Also
         --------
@@ -340,7 +340,7 @@ class PSF(abc.ABC):
         return cls.from_dict(json.loads(text))
 
     def _repr_png_(self) -> bytes:
-        """Return a picture of six decades below the peak, 256 x 256, in a logarithmic scale."""
+        """Return a picture of 256 x 256, logarithmic, with six decades below the peak."""
         from vkbloom.views import pictures  # noqa: PLC0415  costs start-up time
 
         values = self.array((256, 256))
@@ -388,7 +388,7 @@ def _leaves(kind: type[Any]) -> list[type[Any]]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a parameter as JSON can hold it."""
+    """Return a parameter as values that JSON can represent."""
     if isinstance(value, ArrayValue):
         return value.to_plain()
     if hasattr(value, "to_dict"):

@@ -1,4 +1,4 @@
-"""Bessel functions of the first kind, of which NumPy has none."""
+"""Bessel functions of the first kind, which NumPy lacks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 __all__ = ["bessel"]
 
-# From here on the asymptotic series is exact to 1e-15, below it the integral is.
+# The asymptotic series is exact to 1e-15 from here on, the integral below.
 _FAR = 25.0
 _NODES = 32
 _TERMS = 9
@@ -16,9 +16,9 @@ _TERMS = 9
 def bessel(order: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return J_order(x), exact to 1e-14.
 
-    Small x: J_n(x) = 1 / pi times the integral of cos(n t - x sin t) over 0..pi, by the midpoint
-    rule, which converges exponentially for a periodic integrand. Large x: Hankel's asymptotic
-    expansion (NIST Digital Library of Mathematical Functions, 10.9.2 and 10.17.3).
+    For small x, J_n(x) is 1 / pi times the integral of cos(n t - x sin t) over 0..pi. The midpoint
+    rule converges exponentially here, because the integrand is periodic. For large x, Hankel's
+    asymptotic expansion is used (NIST Digital Library of Mathematical Functions, 10.9.2, 10.17.3).
 
     Parameters
     ----------

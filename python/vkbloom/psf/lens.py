@@ -27,12 +27,12 @@ class gaussian(PSF):
 
     See Also
     --------
-    airy : What diffraction makes of a point.
+    airy : The image of a point by diffraction.
 
     Notes
     -----
-    exp(-r^2 / (2 sigma^2)) / (2 pi sigma^2), integrated over the pixels. Its encircled energy is
-    1 - exp(-r^2 / (2 sigma^2)), its MTF exp(-2 (pi sigma f)^2).
+    The density is exp(-r^2 / (2 sigma^2)) / (2 pi sigma^2). It is integrated over the pixels. The
+    encircled energy is 1 - exp(-r^2 / (2 sigma^2)), and the MTF exp(-2 (pi sigma f)^2).
 
     Examples
     --------
@@ -57,7 +57,7 @@ class gaussian(PSF):
     def _shares(self, side: int) -> Array:
         """Return the integral over each pixel of a line."""
         edges = np.arange(side + 1) - side // 2 - 0.5
-        # By the complement, whose small values are exact.
+        # Differences of the complementary error function keep the precision of small values.
         tails = np.array([math.erfc(abs(edge) / (self.sigma * math.sqrt(2))) / 2 for edge in edges])
         shares = np.abs(np.diff(tails))
         shares[side // 2] = 1 - tails[side // 2] - tails[side // 2 + 1]
@@ -81,7 +81,7 @@ class airy(PSF):
     Parameters
     ----------
     f_number : float
-        Focal length by the aperture's diameter, above 0.
+        Focal length divided by the aperture's diameter, above 0.
     wavelength : float
         In nm, above 0.
     pixel_pitch : float
@@ -93,9 +93,9 @@ class airy(PSF):
 
     Notes
     -----
-    The intensity (2 J1(x) / x)^2, x = pi r / (wavelength f_number), divided by its integral. Its
-    encircled energy is 1 - J0(x)^2 - J1(x)^2; its MTF, with v = f wavelength f_number, is
-    2 / pi (arccos v - v sqrt(1 - v^2)) up to v = 1 and 0 above.
+    With x = pi r / (wavelength f_number), the density is (2 J1(x) / x)^2 divided by its integral.
+    The encircled energy is 1 - J0(x)^2 - J1(x)^2. With v = f wavelength f_number, the MTF is
+    2 / pi (arccos v - v sqrt(1 - v^2)) for v up to 1, and 0 above.
 
     Source: Born and Wolf, "Principles of Optics", 8.5.2.
 
@@ -149,14 +149,14 @@ class airy(PSF):
 
 @dataclasses.dataclass(frozen=True)
 class harvey_shack(RadialPSF):
-    """Veiling glare of a camera lens: the light that its surfaces scatter.
+    """Veiling glare of a camera lens, which is the light that its surfaces scatter.
 
     Parameters
     ----------
     s : float
         Slope of the scatter, -10 to 0.
     b : float
-        Scatter of one surface 0.01 rad from the specular direction, per steradian, above 0.
+        Scatter of one surface per steradian, at 0.01 rad from the specular direction, above 0.
     l : float
         Roll-off angle in rad, above 0.
     surfaces : int
@@ -164,12 +164,13 @@ class harvey_shack(RadialPSF):
 
     See Also
     --------
-    airy : Diffraction, the other limit of a lens.
+    airy : Diffraction at the aperture of a lens.
 
     Notes
     -----
-    N b0 (1 + (sin theta / l)^2)^(s / 2) cos theta with b0 = b (100 l)^s. It describes the
-    scattered share alone, 2.5 % with the defaults: a picture is mixed with it, by that share.
+    With b0 = b (100 l)^s, the density is N b0 (1 + (sin theta / l)^2)^(s / 2) cos theta. It
+    describes only the scattered share of the light, which is 2.5 % with the defaults. Use this
+    share as the intensity of a mix.
 
     Source: Ritt, "Laser Safety Calculations for Imaging Sensors" and "Estimation of Lens Stray
     Light with Regard to the Incapacitation of Imaging Sensors", Sensors 20(21), 6308, 2020.

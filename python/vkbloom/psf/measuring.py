@@ -1,4 +1,4 @@
-"""The point spread of this package's own settings as a point-spread function."""
+"""The point-spread function of settings."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ __all__ = ["measured"]
 
 @dataclasses.dataclass(frozen=True)
 class measured(SampledPSF):
-    """What settings make of one pixel of 1, by `vkbloom.reference`; defined in pixels.
+    """The bloom of one pixel of 1, computed by `vkbloom.reference`, defined in pixels.
 
     Parameters
     ----------
     settings : Settings
-        Linear ones: without a threshold. Those that depend on the place give the spread of a pixel
-        in the middle.
+        Settings without a threshold, which would not be linear. If the spread depends on the
+        position, it is that of the pixel in the middle.
     size : (int, int)
-        Width and height of the image that the pixel is in the middle of.
+        Width and height of the image. The pixel is at (width // 2, height // 2).
 
     Raises
     ------
     TypeError
-        `settings` are none.
+        `settings` is not a Settings.
     ValueError
-        They have a threshold, or `size` is not a pair of at least 1.
+        The settings have a threshold, or `size` is not a pair of integers of at least 1.
 
     See Also
     --------
@@ -74,7 +74,7 @@ def _spread(psf: measured) -> Array:
     from vkbloom import reference  # noqa: PLC0415  costs start-up time
 
     width, height = psf.size
-    # A glow of doubles: nothing is clamped.
+    # Values of doubles are not clamped.
     point = np.zeros((height, width, 3))
     point[height // 2, width // 2] = 1
     spread = reference.blur(point, psf.settings, format="rgba32float")

@@ -1,4 +1,4 @@
-"""Point-spread functions that depend on the distance alone, integrated over pixels and circles."""
+"""Point-spread functions that depend only on the distance, and their integrals."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from vkbloom.psf.bessel import bessel
 
 __all__ = ["RadialPSF", "integrate_pixels"]
 
-# (distance in pixels from which on, nodes along a side of a pixel): the smooth outer parts need
-# few; the inner ones may have a core or a halo that is narrower than a pixel.
+# (first distance in pixels, nodes along a side of a pixel). The outer parts are smooth and need
+# few nodes. The inner parts may have a core or a halo that is narrower than a pixel.
 _RINGS = ((0.0, 16), (24.0, 4), (96.0, 2))
-# The centre is divided into nine, the middle one of these again, and so on.
+# The centre pixel is divided into nine squares, the middle one of them again, and so on.
 _LEVELS = 24
-# Pixels that are integrated together: enough for NumPy, few enough for the processor's cache.
+# Pixels per NumPy call: many, to make the calls' overhead small, but few enough for the cache.
 _AT_ONCE = 1024
 _DEGREE = math.pi / 180
 
@@ -34,11 +34,11 @@ def integrate_pixels(
     Parameters
     ----------
     density : callable
-        Takes distances in pixels, of any shape, and returns (C, ...): energy per square pixel.
+        Takes distances in pixels, of any shape, and returns energies per square pixel, (C, ...).
     size : (int, int)
         Width and height.
     period : float
-        Of the density's oscillation, in pixels.
+        Period of the density's oscillation in pixels.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def integrate_pixels(
         The centre is at [height // 2, width // 2].
     """
     width, height = check_size("size", size)
-    # All four quadrants are alike; this one has the pixels right and below.
+    # The quadrants are equal. This one is to the right of the point and below it.
     rows, columns = (np.arange(1 + side // 2, dtype=np.float64) for side in (height, width))
     y, x = np.meshgrid(rows, columns, indexing="ij")
     distance = np.hypot(x, y)
@@ -58,7 +58,7 @@ def integrate_pixels(
         chosen = (distance >= start) & (distance < end)
         quadrant[:, chosen] = _product(density, x[chosen], y[chosen], 1.0, max(count, least))
     quadrant[:, 0, 0] = centre
-    # An even side has one pixel more before the centre than behind it.
+    # An even side has one more pixel before the centre than after it.
     mirrored = [np.abs(np.arange(side) - side // 2) for side in (height, width)]
     return np.ascontiguousarray(np.moveaxis(quadrant[:, mirrored[0]][:, :, mirrored[1]], 0, -1))
 
@@ -66,7 +66,7 @@ def integrate_pixels(
 def _product(
     density: Callable[[Array], Array], x: Array, y: Array, side: float, count: int
 ) -> Array:
-    """Integrate over squares around the places (x, y) by Gauss and Legendre's product rule."""
+    """Integrate over squares around (x, y) by the product rule of Gauss and Legendre."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     across, down = (part.ravel() for part in np.meshgrid(nodes, nodes))
     shares = np.outer(weights, weights).ravel() * side**2 / 4
@@ -81,7 +81,7 @@ def _product(
 
 
 def _centre(density: Callable[[Array], Array]) -> Array:
-    """Integrate over the centre pixel: squares around it, each a third of the one before."""
+    """Integrate over the centre pixel, by rings of squares that get smaller by thirds."""
     total: Array | float = 0.0
     for level in range(1, 1 + _LEVELS):
         side = 3.0**-level
@@ -92,15 +92,15 @@ def _centre(density: Callable[[Array], Array]) -> Array:
 
 
 class RadialPSF(PSF):
-    """A density per steradian that depends on the angle alone.
+    """A density per steradian that depends only on the angle.
 
     See Also
     --------
-    PSF : Has the methods.
+    PSF : Documents the methods.
     """
 
     unit = "degree"
-    #: Angles in degrees where the density bends or has a narrow halo.
+    #: Largest step of the integration in degrees.
     finest: ClassVar[float] = 0.05
 
     @abc.abstractmethod
@@ -137,8 +137,8 @@ class RadialPSF(PSF):
 
         def per_pixel(distance: Array) -> Array:
             theta = distance / scale
-            # Pixels are equal steps of the angle: the rings of the sphere are shorter than those
-            # of a plane.
+            # Pixels are equal steps of the angle. A ring on the sphere is shorter than the ring
+            # of the same radius in a plane.
             ring = np.sinc(theta / 180) * (_DEGREE / scale) ** 2
             values = np.moveaxis(self.density(np.minimum(theta, 90)), -1, 0)
             return values * np.where(theta <= 90, ring, 0)
@@ -158,7 +158,7 @@ class RadialPSF(PSF):
 
     def mtf(self, frequencies: ArrayLike) -> Array:  # noqa: D102  as of PSF
         cycles = check_radii("frequencies", frequencies)
-        # No panel is longer than half a period.
+        # Panels are at most half a period long.
         finest = min(self.finest, 0.5 / max(cycles.max(initial=0), 1.0))
         theta, weights = _nodes(_edges(finest))
         rings = (self._rings(theta) * weights[..., np.newaxis]).reshape(-1, 3)
@@ -173,7 +173,7 @@ class RadialPSF(PSF):
 
 
 def _edges(finest: float) -> Array:
-    """Return panels of 0..90 degrees: in proportion to the angle, no longer than `finest`."""
+    """Return panels of 0..90 degrees, with lengths in proportion to the angle, up to `finest`."""
     steps = np.arange(0, 90, finest)
     return np.unique(np.concatenate([[0.0], np.geomspace(1e-7, 90, 300), steps[1:]]))
 

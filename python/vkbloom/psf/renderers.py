@@ -1,4 +1,4 @@
-"""Point-spread functions of renderers, and of this package's own settings."""
+"""Point-spread functions of renderers."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ class fog_glow(SampledPSF):
     Parameters
     ----------
     size : int
-        Side of the square kernel in pixels, 2 to 4096; Blender's are powers of 2, 64 to 512.
+        Side of the square kernel in pixels, 2 to 4096. Blender has powers of 2, 64 to 512.
 
     See Also
     --------
-    spencer : What Blender has since version 4.4.
+    spencer : The function in Blender since version 4.4.
 
     Notes
     -----
-    With s the size, u = 2 x / s - 1, v likewise and r = (u^2 + v^2) s / 4:
-    exp(-9 r^(1/8)) (1/2 + cos(pi u) / 2) (1/2 + cos(pi v) / 2), at the centres of the pixels as
-    Blender has it. Its sum is not 1; Blender divides by it.
+    With the size s, u = 2 x / s - 1, v = 2 y / s - 1 and r = (u^2 + v^2) s / 4, the value of a
+    pixel is exp(-9 r^(1/8)) (1/2 + cos(pi u) / 2) (1/2 + cos(pi v) / 2). As in Blender, it is not
+    integrated over the pixel. The sum is not 1; Blender divides by it.
 
     Source: Blender 4.3, source/blender/compositor/operations/COM_GlareFogGlowOperation.cc.
 
@@ -57,7 +57,7 @@ class fog_glow(SampledPSF):
 
     def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
         u = 2 * np.arange(self.size) / self.size - 1
-        # So that an odd side has its point at the centre, too.
+        # Puts the point of an odd side at its centre.
         u = u - u[self.size // 2]
         radius = (u**2 + u[:, np.newaxis] ** 2) * self.size / 4
         window = (1 + np.cos(np.pi * u)) / 2
@@ -67,34 +67,35 @@ class fog_glow(SampledPSF):
 
 @dataclasses.dataclass(frozen=True)
 class unreal(SampledPSF):
-    """A kernel image as Unreal Engine's convolution bloom uses it, defined in pixels.
+    """The kernel that Unreal Engine's convolution bloom makes from an image, defined in pixels.
 
     Parameters
     ----------
     image : array-like, shape (h, w) or (h, w, 3), or PSF
-        The kernel, finite and at least 0; an array is copied, as float32. Of a function that is
-        defined in pixels its own array, without negative values.
+        The kernel image K, finite and at least 0. An array is copied to float32. A function must be
+        defined in pixels; its negative values become 0.
     center : (float, float) or None
-        Place of the point in the image as shares of its width and height. None: the brightest
-        texel.
+        Position of the point in the image, as shares of its width and height, 0 to 1. None: the
+        brightest texel.
     size : float
-        Longer side of the kernel as a share of the frame's longer side, above 0 to 4.
+        Longer side of the kernel as a share of the frame's longer side, 0.001 to 4.
     prefilter : (float, float, float)
-        min, max and mult: a luminance (Rec. 709) L above min becomes
-        min(mult (L - min) + min, max) before the convolution. Off where max < min.
+        min, max and mult, each at least 0. Before the convolution, a luminance L (Rec. 709) above
+        min becomes min(mult (L - min) + min, max). There is no prefilter if max < min.
     scatter : float
-        Share of the light that leaves its pixel, as a factor of what the image says, 0 to 1000.
+        The s of the formulas, which multiplies the share of light that leaves its pixel, 0 to 1000.
 
     See Also
     --------
-    samples : An array as it is.
+    samples : The kernel is the array itself.
 
     Notes
     -----
-    M is the largest value just outside of the 3 x 3 texels around the point, C the sum over these
-    of max(K - M, 0), S the sum of K' = min(K, M), T = C + S. A pixel keeps sat((T - s S) / T) of
-    its light, and K' / S distributes sat(s S / T) of it; each channel is multiplied by T by the
-    largest T. K' is resized by the areas that texels and pixels share.
+    M is the largest value of the texels around the 3 x 3 texels of the point. C is the sum of
+    max(K - M, 0) over the 3 x 3 texels. S is the sum of K' = min(K, M) over the image, and
+    T = C + S. A pixel keeps the share clamp((T - s S) / T, 0, 1) of its light. K' / S distributes
+    the share clamp(s S / T, 0, 1). All this is done for each channel. Then each channel is
+    multiplied by its T, divided by the largest T. K' is resampled by area.
 
     Source: Unreal Engine 5, Engine/Shaders/Private/Bloom/ and
     Engine/Source/Runtime/Renderer/Private/PostProcess/PostProcessFFTBloom.cpp.
@@ -119,12 +120,12 @@ class unreal(SampledPSF):
         if self.center is not None:
             center = check_floats("center", self.center)
             if len(center) != 2 or not all(0 <= share <= 1 for share in center):
-                raise ValueError(f"center: {self.center!r} is not a pair of numbers, 0 to 1")
+                raise ValueError(f"center: {self.center!r} is not a pair of numbers of 0 to 1")
             object.__setattr__(self, "center", center)
         object.__setattr__(self, "size", check_number("size", self.size, 0.001, 4))
         prefilter = check_floats("prefilter", self.prefilter)
         if len(prefilter) != 3 or min(prefilter) < 0:
-            raise ValueError(f"prefilter: {self.prefilter!r} is not min, max, mult of at least 0")
+            raise ValueError(f"prefilter: {self.prefilter!r} is not (min, max, mult) of at least 0")
         object.__setattr__(self, "prefilter", prefilter)
         object.__setattr__(self, "scatter", check_number("scatter", self.scatter, 0, 1000))
 
@@ -152,7 +153,7 @@ class unreal(SampledPSF):
 
 @functools.lru_cache(maxsize=2)
 def _scattered(psf: unreal, longer_side: float) -> Array:
-    """Return the kernel of a frame with that longer side."""
+    """Return the kernel for a frame with this longer side."""
     image = _image_of(psf)
     row, column = _place(image, psf.center)
     centre = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
@@ -165,7 +166,7 @@ def _scattered(psf: unreal, longer_side: float) -> Array:
     spread_sum = spread.sum(axis=(0, 1))
     total = kept + spread_sum
     if not (total > 0).any():
-        raise ValueError("image: it is black but for one texel's surroundings")
+        raise ValueError("image: it is black except for one texel")
     share = np.clip(psf.scatter * spread_sum / np.maximum(total, 1e-30), 0, 1)
     tint = total / total.max()
     pixels = longer_side * psf.size / max(image.shape[:2])
@@ -181,11 +182,11 @@ def _check_image(image: Any) -> SampledPSF | ArrayValue:
         image = PSF.from_dict(image)
     if isinstance(image, PSF):
         if not isinstance(image, SampledPSF):
-            raise ValueError(f"image: {image!r} is no array; use its array(size)")
+            raise ValueError(f"image: {image!r} is not defined in pixels; use its array(size)")
         return image
     held = check_values("image", image)
     if (held.array < 0).any() or not held.array.any():
-        raise ValueError("image: its values are not at least 0, some of them above 0")
+        raise ValueError("image: some values are below 0, or all of them are 0")
     return held
 
 
@@ -197,7 +198,7 @@ def _image_of(psf: unreal) -> Array:
 
 
 def _place(image: Array, center: tuple[float, float] | None) -> tuple[int, int]:
-    """Return row and column of the point."""
+    """Return the row and the column of the point."""
     height, width = image.shape[:2]
     if center is not None:
         return (

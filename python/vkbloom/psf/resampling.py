@@ -1,4 +1,4 @@
-"""Energy per pixel for pixels of another size."""
+"""Kernels for pixels of another size."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ __all__ = ["box_resample", "integrals"]
 
 
 def box_resample(kernel: Array, point: tuple[int, int], scale: tuple[float, float]) -> Array:
-    """Return a kernel whose pixels are other ones: each gets what its area covers of the old ones.
+    """Resample a kernel: a new pixel gets the energy of the area that it covers.
 
     Parameters
     ----------
     kernel : ndarray of float64, shape (h, w, C)
         Energy per pixel.
     point : (int, int)
-        Row and column of its point.
+        Row and column of the kernel's point.
     scale : (float, float)
-        Height and width of an old pixel in new ones, above 0.
+        Height and width of an old pixel in new pixels, above 0.
 
     Returns
     -------
     ndarray of float64, shape (H, W, C)
-        With the same sums; H and W are odd, and the point is in the middle.
+        The sum of each channel is unchanged. H and W are odd, and the point is in the middle.
     """
     rows, columns = (_edges(*axis) for axis in zip(kernel.shape[:2], point, scale, strict=True))
     return np.ascontiguousarray(integrals(integrals(kernel, rows, 0), columns, 1))
 
 
 def integrals(values: Array, edges: Array, axis: int) -> Array:
-    """Return the integrals between places along an axis, of values that are constant per pixel.
+    """Integrate between edges along an axis; values are constant within a pixel.
 
     Parameters
     ----------
     values : ndarray of float64
     edges : ndarray of float64, shape (N,)
-        Ascending; pixel n lies between n and n + 1, and outside there is nothing.
+        Ascending. Pixel n lies between n and n + 1. Values outside of the array are 0.
     axis : int
 
     Returns
@@ -57,8 +57,8 @@ def integrals(values: Array, edges: Array, axis: int) -> Array:
 
 
 def _edges(count: int, point: int, scale: float) -> Array:
-    """Return the edges of the new pixels in old ones."""
+    """Return the edges of the new pixels, in old pixels."""
     reach = max(point + 0.5, count - point - 0.5) * scale
-    # Rounding must not add a pixel of nothing.
+    # Rounding must not add an empty pixel.
     pixels = max(0, math.ceil(reach - 0.5 - 1e-9))
     return np.asarray((np.arange(-pixels, pixels + 2) - 0.5) / scale + point + 0.5)

@@ -16,22 +16,22 @@ __all__ = ["SampledPSF", "check_values", "samples"]
 
 
 class SampledPSF(PSF):
-    """A point-spread function whose energy per pixel is an array of a size of its own.
+    """A point-spread function that is an array of energies per pixel, of a fixed size.
 
     See Also
     --------
-    samples : One that is given as an array.
+    samples : A function that is given as an array.
     """
 
     unit = "pixel"
 
     @abc.abstractmethod
     def own_array(self) -> Array:
-        """Return the energy per pixel in the function's own size, (h, w, 3), zero outside.
+        """Return the energy per pixel in the function's own size, (h, w, 3). Outside it is 0.
 
         See Also
         --------
-        array : An array of any size.
+        array : Returns an array of any size.
 
         Examples
         --------
@@ -93,11 +93,12 @@ class samples(SampledPSF):
     Parameters
     ----------
     values : array-like, shape (h, w) or (h, w, 3)
-        Energy per pixel, finite; the point is at [h // 2, w // 2]. It is copied, as float32.
+        Energies per pixel, which must be finite. The point is at [h // 2, w // 2]. The array is
+        copied to float32.
 
     See Also
     --------
-    unreal : A kernel image as Unreal Engine uses it.
+    unreal : A kernel image for Unreal Engine's convolution bloom.
 
     Examples
     --------
@@ -138,7 +139,7 @@ def check_values(name: str, values: Any) -> ArrayValue:
             f"{name}: shape {array.shape} is not (h, w) or (h, w, 3) with sides of at least 1"
         )
     if not np.isfinite(array).all():
-        raise ValueError(f"{name}: some numbers are not finite, as float32")
+        raise ValueError(f"{name}: some numbers are not finite as float32")
     return held
 
 

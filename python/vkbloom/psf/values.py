@@ -1,4 +1,4 @@
-"""Arrays that are values: copied, read-only, compared and hashed by what they hold."""
+"""Read-only arrays that are compared and hashed by their values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ArrayValue:
     Parameters
     ----------
     array : array-like
-        Anything that NumPy can view, or what `to_plain` gave. It is copied.
+        Anything that NumPy can convert, or the result of `to_plain`. It is copied.
     """
 
     __slots__ = ("_hash", "array")
@@ -52,7 +52,7 @@ class ArrayValue:
         return f"<array of shape {self.array.shape}, {self._hash & 0xFFFFFFFF:08x}>"
 
     def to_plain(self) -> dict[str, Any]:
-        """Return shape and compressed values, as JSON can hold them."""
+        """Return the shape and the compressed values, in a form that JSON can represent."""
         data = zlib.compress(self.array.astype("<f4").tobytes())
         return {"shape": list(self.array.shape), "zlib": base64.b64encode(data).decode("ascii")}
 

@@ -369,10 +369,12 @@ def mip_levels(faces: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     levels = [faces]
     mean = _finite(faces)
     while mean.shape[1] > 1:
-        side = mean.shape[1] // 2
-        quads = mean[:, : 2 * side, : 2 * side].reshape(6, side, 2, side, 2, -1)
+        end = mean.shape[1] // 2 * 2
         # Multiplied before the sum, so that four of the largest float32 do not overflow.
-        mean = (quads * np.float32(0.25)).sum(axis=(2, 4))
+        quarters = mean[:, :end, :end] * np.float32(0.25)
+        # Two sums, since a sum over two axes is ten times as slow.
+        rows = quarters[:, ::2] + quarters[:, 1::2]
+        mean = rows[:, :, ::2] + rows[:, :, 1::2]
         levels.append(_as_dtype(mean, faces.dtype))
     return tuple(levels)
 
@@ -406,7 +408,8 @@ def _with_alpha(image: NDArray[Any]) -> NDArray[Any]:
 def _finite(image: NDArray[Any]) -> NDArray[np.float32]:
     """Return `image` in float32. NaN and infinity become 0, since a mean would spread them."""
     values = image.astype(np.float32)
-    values[~np.isfinite(values)] = 0.0
+    if image.dtype.kind == "f":
+        values[~np.isfinite(values)] = 0.0
     return values
 
 

@@ -180,7 +180,7 @@ def stability(
     check_number("steps", steps, 1e-3, 1e3)
     check_index("settle", settle, 0, 1_000_000)
     if settle and not temporal:
-        raise ValueError(f"settle: {settle} is not 0; only a temporal bloom has to settle")
+        raise ValueError(f"settle: {settle} is not 0; only a temporal bloom needs frames to settle")
     probe = probe or _wide(texel)
     if texel + 2 > min(probe.size):
         raise ValueError(f"probe: a path of {texel} pixels leaves an image of {probe.size}")

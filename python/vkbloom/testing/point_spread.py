@@ -385,7 +385,7 @@ def response(
     """
     __tracebackhide__ = True
     if not len(values):
-        raise ValueError("values: empty; give at least one")
+        raise ValueError("values: there are none; give at least one")
     rows = []
     for value in values:
         one = functools.partial(bloom, **{parameter: value})

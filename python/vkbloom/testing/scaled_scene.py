@@ -211,7 +211,7 @@ def assert_resolution_independent(
 
 def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, int], ...]:
     if not len(scales):
-        raise ValueError("scales: empty; give at least one")
+        raise ValueError("scales: there are none; give at least one")
     found = []
     for scale in scales:
         check_number("scales", scale, 1e-3, 1e3)

@@ -171,7 +171,7 @@ def compare(
         if number is not None and not 0 < as_float(name, number) < math.inf:
             raise ValueError(f"{name}: {number!r} is out of range, finite and above 0")
         if number is None and "cvvdp" in metrics:
-            raise ValueError(f"{name}: None is no number; the metric cvvdp needs it")
+            raise ValueError(f"{name}: None is not a number; the metric cvvdp needs one")
     if data_range is not None and not 0 < data_range < math.inf:
         raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
     a, b = _checked("a", a), _checked("b", b)
