@@ -90,9 +90,7 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
             glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
             window = glfw.create_window(*size, "vkbloom", None, None)
         if not window:
-            raise vkbloom.Error(
-                f"no window was opened: {glfw.get_error()[1].decode(errors='replace')}"
-            )
+            raise vkbloom.Error(f"no window was opened: {glfw.get_error()[1].decode()}")
         yield window
     finally:
         glfw.terminate()
