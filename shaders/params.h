@@ -84,13 +84,12 @@
     VEC4S(B, kernel, LINE_VEC4S)
 
 // The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as in
-// LINE_BLOCK. `columns` are those that an invocation of strip.comp writes.
+// LINE_BLOCK.
 #define FUSED_BLOOM_BLOCK(B, READS, INPUT, VEC4S) \
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
     INPUT(B, int, vertical_radius) \
     INPUT(B, int, horizontal_radius) \
-    INPUT(B, int, columns) \
     VEC4S(B, vertical, FUSED_VEC4S) \
     VEC4S(B, horizontal, FUSED_VEC4S)
 
@@ -342,17 +341,17 @@
 
 // Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line and of a fused bloom.
 // A line up to LINE_SHORT_RADIUS is compiled for its radius.
-#define LINE_RADIUS         64
-#define LINE_SHORT_RADIUS   8
-#define LINE_OUTPUTS        8
-#define LINE_VEC4S          34
-#define STRIP_RADIUS        4
-#define STRIP_COLUMNS       240
-#define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
-#define HALVE_COLUMNS       4
-#define HALVE_ROWS          16
-#define DOUBLE_COLUMNS      4
-#define DOUBLE_ROWS         32
+#define LINE_RADIUS            64
+#define LINE_SHORT_RADIUS      8
+#define LINE_OUTPUTS           8
+#define LINE_VEC4S             34
+#define STRIP_RADIUS           4
+#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
+#define STRIP_ROWS             135
+#define HALVE_COLUMNS          4
+#define HALVE_ROWS             16
+#define DOUBLE_COLUMNS         4
+#define DOUBLE_ROWS            32
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8
@@ -378,9 +377,11 @@
 #define FFT_INVOCATIONS 64
 #define FFT_ROW_COLUMNS 8
 #define FFT_MOST_RADIX  64
-// The most where the other elements are in shared memory.
-#define FFT_MOST_GROUP_RADIX 16
-#define FFT_LIMIT            1e28
+// The most where the other elements are in shared memory; and the most where a length can have
+// fewer, since fewer registers let more workgroups run at a time.
+#define FFT_MOST_GROUP_RADIX  16
+#define FFT_USUAL_GROUP_RADIX 10
+#define FFT_LIMIT             1e28
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -395,7 +396,7 @@
 // makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
 // GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are
 // the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of GROUP_WIDTH
-// lines, and they exchange EXCHANGED floats of each element at once.
+// lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -432,8 +433,7 @@
     CONSTANT(32, RADIX_3, radix_3) \
     CONSTANT(33, RADIX_4, radix_4) \
     CONSTANT(34, GROUP_WIDTH, group_width) \
-    CONSTANT(35, GROUP_HEIGHT, group_height) \
-    CONSTANT(36, EXCHANGED, exchanged)
+    CONSTANT(35, GROUP_HEIGHT, group_height)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

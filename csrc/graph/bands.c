@@ -48,8 +48,9 @@ static double reach_of(const struct vkb_graph *graph, const struct vkb_pass_row 
     return (double)pass->reach * height / least;
 }
 
-// Whether the images of a pass may begin at any of their rows.
-static bool places_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+// Whether bands of the pass may start at any row. Its shader then computes positions from the
+// complete heights.
+static bool starts_anywhere(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     const uint32_t height = graph->images[pass->targets[0]].height;
     bool same = true;
@@ -60,7 +61,8 @@ static bool places_rows(const struct vkb_graph *graph, const struct vkb_pass_row
         || (pass->band_rows == VKB_BAND_ANY_ROW && pass->constants.sampling == SAMPLING_FETCH);
 }
 
-// Makes bands start at an even row of an image.
+// Halving and doubling pair rows, so that bands must start at an even row of the image. False if
+// only the first band does.
 static bool align(struct vkb_bands *bands, uint32_t image_height, uint32_t height)
 {
     const uint32_t own = 2 * (height / common_divisor(height, image_height));
@@ -70,15 +72,15 @@ static bool align(struct vkb_bands *bands, uint32_t image_height, uint32_t heigh
     return step < height;
 }
 
-// A pass that runs band by band: its reach, and the sizes of its images.
-static bool include(const struct vkb_graph *graph, const struct vkb_pass_row *pass, uint32_t height,
-                    double *reach, struct vkb_bands *bands)
+// Adds the reach of a pass, and aligns the bands to its images. False if it cannot run by bands.
+static bool add_pass(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                     uint32_t height, double *reach, struct vkb_bands *bands)
 {
     bool fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->depth == VKB_NO_IMAGE
              && !pass->constants.dither && pass->constants.sampling != SAMPLING_FILTER;
 
     *reach += reach_of(graph, pass, height);
-    if (places_rows(graph, pass))
+    if (starts_anywhere(graph, pass))
         return fits;
     for (uint32_t i = 0; fits && i < pass->read_count; ++i)
         fits = align(bands, graph->images[pass->reads[i]].height, height);
@@ -110,19 +112,20 @@ bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t he
         const bool writes_tall = is_tall(graph, pass->targets[0], height);
         if (!writes_tall && !reads_tall(graph, pass, height))
             continue;
-        if (!include(graph, pass, height, writes_tall ? &after : &before, bands))
+        if (!add_pass(graph, pass, height, writes_tall ? &after : &before, bands))
             return false;
         for (uint32_t read = 0; writes_tall && read < pass->read_count; ++read) {
             const uint32_t image = pass->reads[read];
             if (is_tall(graph, image, height) || is_among(image, bands->levels, bands->level_count))
                 continue;
-            // An image that is read back and given again must be one that the host can give.
+            // The image is read back and given again, and there is a limit of such inputs.
             if (bands->level_count == GATHERED_LEVELS || bands->head == VKB_NO_IMAGE)
                 return false;
             bands->levels[bands->level_count++] = image;
         }
     }
-    // A pass that reads and writes images of full height may be in either part.
+    // A pass that reads and writes images of full height may run before or after the smaller
+    // images.
     bands->reach = (uint32_t)ceil(before + after);
     for (uint32_t i = 0; i < bands->level_count; ++i)
         if (graph->images[bands->levels[i]].format == VKB_FORMAT_RG11B10_UFLOAT)
@@ -189,7 +192,7 @@ static void keep_images(struct vkb_graph *graph, const bool *wanted, uint32_t *p
         struct vkb_image_row *row = &graph->images[i];
         if (!wanted[i])
             continue;
-        // No pass writes an image of this name, by which the image is cached.
+        // Images are cached by name. The names of images that passes write are taken.
         if (row->input >= VKB_INPUT_LEVEL)
             snprintf(row->name, sizeof row->name, "level_%d", row->input - VKB_INPUT_LEVEL);
         graph->images[kept] = *row;
@@ -208,8 +211,8 @@ struct rows {
     uint32_t first, end;
 };
 
-// The rows of an image that belong to a band of the source. A given image has all that the band may
-// read; an image that is rendered, those that depend on the band alone.
+// The rows of an image for a band of the source. An image that is given contains all rows that the
+// band may read. An image that is rendered contains only the rows that depend on no other band.
 static struct rows rows_of(const struct vkb_image_row *image, const struct vkb_part *part)
 {
     const uint64_t first = (uint64_t)part->first * image->height,
@@ -237,7 +240,7 @@ static void set_rows(const struct vkb_graph *graph, const struct vkb_part *part,
     const struct rows to = rows_of(target, part), from = rows_of(source, part);
     struct vkb_params_rows rows = {.target_height = (int)(to.end - to.first)};
 
-    if (places_rows(graph, pass))
+    if (starts_anywhere(graph, pass))
         rows = (struct vkb_params_rows){
             .target_height = (int)target->height,
             .source_height = (int)source->height,
@@ -248,15 +251,14 @@ static void set_rows(const struct vkb_graph *graph, const struct vkb_part *part,
     vkb_params_set_rows(pass->block, &rows, &pass->params);
 }
 
-// Gives the passes and images of a graph the rows of a band.
-static bool shorten(struct vkb_graph *graph, const struct vkb_part *part, struct vkb_error *error)
+static bool set_band(struct vkb_graph *graph, const struct vkb_part *part, struct vkb_error *error)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         struct vkb_pass_row *pass = &graph->passes[i];
         bool split = is_split(&graph->images[pass->targets[0]], part);
         for (uint32_t read = 0; read < pass->read_count; ++read)
             split = split || is_split(&graph->images[pass->reads[read]], part);
-        if (split && !places_rows(graph, pass))
+        if (split && !starts_anywhere(graph, pass))
             return vkb_fail(error, VKB_ERROR_VALUE, "part: %s has no such rows", pass->name);
         set_rows(graph, part, pass);
     }
@@ -294,5 +296,5 @@ bool vkb_graph_take(struct vkb_graph *graph, const struct vkb_part *part, struct
     }
     vkb_free(wanted);
     vkb_free(places);
-    return found && (part->rows > 0 ? shorten(graph, part, error) : check_inputs(graph, error));
+    return found && (part->rows > 0 ? set_band(graph, part, error) : check_inputs(graph, error));
 }

@@ -80,18 +80,26 @@ struct vkb_fft_line vkb_fft_line(uint32_t least)
     return best;
 }
 
-bool vkb_fft_group_radices(uint32_t length, uint32_t *radices_found)
+// Splits the length into the fewest stages, of radices of up to `most`.
+static bool split_group(uint32_t length, uint32_t most, uint32_t *found)
 {
-    uint32_t first = 0, stages = 0;
-    bool found = false;
+    uint32_t first = 0;
 
     for (uint32_t i = 0; i < VKB_FFT_STAGES; ++i)
-        radices_found[i] = 1;
-    while (radix_of(first) > FFT_MOST_GROUP_RADIX)
+        found[i] = 1;
+    while (radix_of(first) > most)
         ++first;
-    while (is_smooth(length) && !found && stages < VKB_FFT_STAGES)
-        found = split(length, first, ++stages, radices_found);
-    return found;
+    for (uint32_t stages = 1; stages <= VKB_FFT_STAGES; ++stages)
+        if (split(length, first, stages, found))
+            return true;
+    return false;
+}
+
+bool vkb_fft_group_radices(uint32_t length, uint32_t *found)
+{
+    return is_smooth(length)
+        && (split_group(length, FFT_USUAL_GROUP_RADIX, found)
+            || split_group(length, FFT_MOST_GROUP_RADIX, found));
 }
 
 static const enum vkb_shader shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_comp);

@@ -18,7 +18,7 @@ struct vkb_fft_line vkb_fft_line(uint32_t least);
 
 // The radices of a length for stages in shared memory, VKB_FFT_STAGES of up to FFT_MOST_GROUP_RADIX
 // each, the longest first. False: there are none.
-bool vkb_fft_group_radices(uint32_t length, uint32_t *radices);
+bool vkb_fft_group_radices(uint32_t length, uint32_t *found);
 
 // How the lines lie, and which of their elements exist before the transform.
 struct vkb_fft_axis {

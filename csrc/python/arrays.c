@@ -74,6 +74,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_pages_spec = {
     .name = "vkbloom._core.Pages",
     .basicsize = sizeof(struct pages_object),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .flags = VKB_TYPE_FLAGS,
     .slots = slots,
 };

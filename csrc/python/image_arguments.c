@@ -16,7 +16,8 @@ char vkb_element_code(const Py_buffer *view)
 
 bool vkb_has_element(const Py_buffer *view, const char *codes)
 {
-    char code = vkb_element_code(view);
+    const char code = vkb_element_code(view);
+
     return code && strchr(codes, code);
 }
 
@@ -39,6 +40,22 @@ static bool has_sides(const Py_buffer *view)
         && view->shape[1] <= INT32_MAX;
 }
 
+static struct vkb_input input_of(const Py_buffer *view, enum vkb_format format)
+{
+    const bool has_channels = view->ndim == 3;
+
+    return (struct vkb_input){
+        .memory = view->buf,
+        .row_stride = view->strides[0],
+        .pixel_stride = view->strides[1],
+        .channel_stride = has_channels ? view->strides[2] : view->itemsize,
+        .format = format,
+        .width = (uint32_t)view->shape[1],
+        .height = (uint32_t)view->shape[0],
+        .channels = has_channels ? (uint32_t)view->shape[2] : 1,
+    };
+}
+
 bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
 {
     const Py_buffer *view = &image->view;
@@ -53,16 +70,7 @@ bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *im
         PyErr_Format(PyExc_ValueError, "%s: a shape of (H, W, 3) or (H, W, 4) is needed", name);
         return false;
     }
-    image->input = (struct vkb_input){
-        .memory = view->buf,
-        .row_stride = view->strides[0],
-        .pixel_stride = view->strides[1],
-        .channel_stride = view->strides[2],
-        .format = vkb_pixel_format(vkb_element_code(view)),
-        .width = (uint32_t)view->shape[1],
-        .height = (uint32_t)view->shape[0],
-        .channels = (uint32_t)view->shape[2],
-    };
+    image->input = input_of(view, vkb_pixel_format(vkb_element_code(view)));
     return true;
 }
 
@@ -80,16 +88,7 @@ bool vkb_read_mask(PyObject *array, struct vkb_held_image *image)
         PyErr_SetString(PyExc_ValueError, "mask: a shape of (H, W) is needed");
         return false;
     }
-    image->input = (struct vkb_input){
-        .memory = view->buf,
-        .row_stride = view->strides[0],
-        .pixel_stride = view->strides[1],
-        .channel_stride = sizeof(float),
-        .format = VKB_FORMAT_R32_FLOAT,
-        .width = (uint32_t)view->shape[1],
-        .height = (uint32_t)view->shape[0],
-        .channels = 1,
-    };
+    image->input = input_of(view, VKB_FORMAT_R32_FLOAT);
     return true;
 }
 

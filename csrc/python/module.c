@@ -238,6 +238,15 @@ void vkb_free_object(PyObject *object)
     Py_DECREF(type);
 }
 
+void vkb_dealloc(PyObject *object)
+{
+    const inquiry clear = (inquiry)PyType_GetSlot(Py_TYPE(object), Py_tp_clear);
+
+    PyObject_GC_UnTrack(object);
+    clear(object);
+    vkb_free_object(object);
+}
+
 static bool add_type(PyObject *module, PyType_Spec *spec, const char *name, PyObject **type)
 {
     *type = PyType_FromModuleAndSpec(module, spec, NULL);

@@ -25,6 +25,12 @@ struct vkb_module_state *vkb_module_state(PyObject *module);
 void *vkb_new_object(PyObject *type);
 // Frees an object whose members have been released, and releases its type: the end of tp_dealloc.
 void vkb_free_object(PyObject *object);
+// tp_dealloc of the types whose tp_clear releases all members.
+void vkb_dealloc(PyObject *object);
+
+// Python cannot create objects of types with these flags.
+#define VKB_TYPE_FLAGS \
+    (Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE | Py_TPFLAGS_DISALLOW_INSTANTIATION)
 
 // Raises the exception class of the error; returns NULL.
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);

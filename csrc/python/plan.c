@@ -530,7 +530,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_plan_spec = {
     .name = "vkbloom._core.Plan",
     .basicsize = sizeof(struct vkb_plan_object),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
-           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .flags = VKB_TYPE_FLAGS | Py_TPFLAGS_HAVE_GC,
     .slots = slots,
 };

@@ -393,13 +393,6 @@ static int clear(PyObject *object)
     return 0;
 }
 
-static void dealloc(PyObject *object)
-{
-    PyObject_GC_UnTrack(object);
-    clear(object);
-    vkb_free_object(object);
-}
-
 static PyMethodDef methods[] = {
     {"wait", wait_for, METH_NOARGS,
      "wait() -> ([timings, ...], (NaNs, infinities of the input)). Waits until the device has "
@@ -408,7 +401,7 @@ static PyMethodDef methods[] = {
 };
 
 static PyType_Slot slots[] = {
-    {Py_tp_dealloc, dealloc},
+    {Py_tp_dealloc, vkb_dealloc},
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
     {Py_tp_methods, methods},
@@ -419,7 +412,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_submission_spec = {
     .name = "vkbloom._core.Submission",
     .basicsize = sizeof(struct submission),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
-           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .flags = VKB_TYPE_FLAGS | Py_TPFLAGS_HAVE_GC,
     .slots = slots,
 };

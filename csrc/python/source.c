@@ -288,13 +288,6 @@ static int clear(PyObject *object)
     return 0;
 }
 
-static void dealloc(PyObject *object)
-{
-    PyObject_GC_UnTrack(object);
-    clear(object);
-    vkb_free_object(object);
-}
-
 static PyObject *is_resident(PyObject *object, void *unused)
 {
     (void)unused;
@@ -307,7 +300,7 @@ static PyGetSetDef attributes[] = {
 };
 
 static PyType_Slot slots[] = {
-    {Py_tp_dealloc, dealloc},
+    {Py_tp_dealloc, vkb_dealloc},
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
     {Py_tp_getset, attributes},
@@ -318,7 +311,6 @@ static PyType_Slot slots[] = {
 PyType_Spec vkb_source_spec = {
     .name = "vkbloom._core.Source",
     .basicsize = sizeof(struct vkb_source_object),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_IMMUTABLETYPE
-           | Py_TPFLAGS_DISALLOW_INSTANTIATION,
+    .flags = VKB_TYPE_FLAGS | Py_TPFLAGS_HAVE_GC,
     .slots = slots,
 };

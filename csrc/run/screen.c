@@ -11,10 +11,14 @@ static bool create_headless(const struct vkb_device *device, VkSurfaceKHR *surfa
     const VkHeadlessSurfaceCreateInfoEXT info = {
         .sType = VK_STRUCTURE_TYPE_HEADLESS_SURFACE_CREATE_INFO_EXT,
     };
+    const VkDriverId driver = device->adapter.driver_id;
+    const bool mesa = driver == VK_DRIVER_ID_MESA_LLVMPIPE || driver == VK_DRIVER_ID_MESA_RADV
+                   || driver == VK_DRIVER_ID_INTEL_OPEN_SOURCE_MESA;
 
-    // The loader offers the extension if any installed driver has it. It gives the others a surface
-    // that they do not know, with which NVIDIA's driver 580 ends the process.
-    if (!vk->vkCreateHeadlessSurfaceEXT || !strstr(device->adapter.driver_info, "Mesa"))
+    // The loader offers the extension if any installed driver has it, and Vulkan does not tell
+    // which. The loader passes the surface to the other drivers, too, and NVIDIA's driver 580
+    // crashes then.
+    if (!vk->vkCreateHeadlessSurfaceEXT || !mesa)
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "a surface without a window needs VK_EXT_headless_surface, which the "
                         "driver of %s lacks; Mesa's lavapipe 25 has it",

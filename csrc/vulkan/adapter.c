@@ -60,6 +60,7 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     *adapter = (struct vkb_adapter_info){
         .physical = physical,
         .device_type = plain.deviceType,
+        .driver_id = driver.driverID,
         .api_version = plain.apiVersion,
         .driver_version = plain.driverVersion,
         .queue_family = find_queue_family(instance, physical),

@@ -12,6 +12,7 @@ struct vkb_adapter_info {
     VkPhysicalDeviceType device_type;
     char driver[VK_MAX_DRIVER_NAME_SIZE];
     char driver_info[VK_MAX_DRIVER_INFO_SIZE];
+    VkDriverId driver_id;  // 0 before Vulkan 1.2
     uint32_t api_version;
     uint32_t driver_version;
     uint8_t driver_uuid[VK_UUID_SIZE];

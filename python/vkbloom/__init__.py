@@ -29,47 +29,48 @@ from vkbloom._core import (
     ValidationError,
 )
 from vkbloom.adapter import AdapterInfo, adapters
-from vkbloom.explorer import explore
 from vkbloom.frames import Frames
-from vkbloom.glare.base import Glare, GlareLight
-from vkbloom.glare.dirt import Dirt
-from vkbloom.glare.flares import Ghosts, Halo
-from vkbloom.glare.streaks import Streaks
-from vkbloom.glares import glares
 from vkbloom.image import Image
-from vkbloom.methods.bevy import BevyBloom
-from vkbloom.methods.blender import BlenderGlare
-from vkbloom.methods.convolution import Convolution
-from vkbloom.methods.filament import FilamentBloom
-from vkbloom.methods.godot import GodotBloom
-from vkbloom.methods.kino import KinoBloom
 from vkbloom.methods.mip_chain import DualKawase, Pyramid
-from vkbloom.methods.pygfx import PygfxBloom
 from vkbloom.methods.separable import TUTORIAL, Separable, gaussian_weights
-from vkbloom.methods.unity import HdrpBloom, UrpBloom
-from vkbloom.methods.unreal import UnrealBloom
-from vkbloom.plans import Pass, Plan
-from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings
-from vkbloom.surface import Surface
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from vkbloom import psf, reference
+    from vkbloom.explorer import explore
     from vkbloom.fits import FitResult, fit, fit_pyramid, translate
+    from vkbloom.glare.base import Glare, GlareLight
+    from vkbloom.glare.dirt import Dirt
+    from vkbloom.glare.flares import Ghosts, Halo
+    from vkbloom.glare.streaks import Streaks
     from vkbloom.grid import reductions
     from vkbloom.grid.checking import GridReport, check_grid
     from vkbloom.grid.curves import response_curves
     from vkbloom.grid.sheet import contact_sheet
     from vkbloom.grid.zarr_grid import grid_to_zarr
     from vkbloom.io.array_files import read, write
+    from vkbloom.methods.bevy import BevyBloom
+    from vkbloom.methods.blender import BlenderGlare
+    from vkbloom.methods.convolution import Convolution
+    from vkbloom.methods.filament import FilamentBloom
+    from vkbloom.methods.godot import GodotBloom
+    from vkbloom.methods.kino import KinoBloom
+    from vkbloom.methods.pygfx import PygfxBloom
+    from vkbloom.methods.unity import HdrpBloom, UrpBloom
+    from vkbloom.methods.unreal import UnrealBloom
+    from vkbloom.named_glares import glares
+    from vkbloom.named_settings import presets
+    from vkbloom.plans import Pass, Plan
     from vkbloom.scene import Camera, Scene
+    from vkbloom.surface import Surface
 
 #: Version of the installed package, read from its metadata on first access.
 __version__: str
 
-# Imported on first use, because a program that only calls `apply` needs none of them.
+# Imported on first use, because a program that only calls `apply` needs none of them. A module must
+# not have the name of something else that is public: its import would take the name.
 _LATE_MODULES = {
     "psf": "vkbloom.psf",
     "reductions": "vkbloom.grid.reductions",
@@ -77,15 +78,37 @@ _LATE_MODULES = {
     "scene": "vkbloom.scene",
 }
 _LATE = {
+    "BevyBloom": "vkbloom.methods.bevy",
+    "BlenderGlare": "vkbloom.methods.blender",
     "Camera": "vkbloom.scene",
+    "Convolution": "vkbloom.methods.convolution",
+    "Dirt": "vkbloom.glare.dirt",
+    "FilamentBloom": "vkbloom.methods.filament",
     "FitResult": "vkbloom.fits",
+    "Ghosts": "vkbloom.glare.flares",
+    "Glare": "vkbloom.glare.base",
+    "GlareLight": "vkbloom.glare.base",
+    "GodotBloom": "vkbloom.methods.godot",
     "GridReport": "vkbloom.grid.checking",
+    "Halo": "vkbloom.glare.flares",
+    "HdrpBloom": "vkbloom.methods.unity",
+    "KinoBloom": "vkbloom.methods.kino",
+    "Pass": "vkbloom.plans",
+    "Plan": "vkbloom.plans",
+    "PygfxBloom": "vkbloom.methods.pygfx",
     "Scene": "vkbloom.scene",
+    "Streaks": "vkbloom.glare.streaks",
+    "Surface": "vkbloom.surface",
+    "UnrealBloom": "vkbloom.methods.unreal",
+    "UrpBloom": "vkbloom.methods.unity",
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
+    "explore": "vkbloom.explorer",
     "fit": "vkbloom.fits",
     "fit_pyramid": "vkbloom.fits",
+    "glares": "vkbloom.named_glares",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
+    "presets": "vkbloom.named_settings",
     "read": "vkbloom.io.array_files",
     "response_curves": "vkbloom.grid.curves",
     "translate": "vkbloom.fits",

@@ -5,9 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import importlib
-import json
 import os
-from pathlib import Path
 from types import ModuleType
 
 from vkbloom import _core
@@ -79,7 +77,7 @@ def bundled_driver() -> str:
     if chosen == "system":
         return ""
     if chosen:
-        return _library_of(Path(chosen)) if chosen.endswith(".json") else chosen
+        return _library_of(chosen) if chosen.endswith(".json") else chosen
     package = _package()
     return "" if package is None else str(package.LIBRARY)
 
@@ -105,12 +103,15 @@ def _package() -> ModuleType | None:
         return None
 
 
-def _library_of(manifest: Path) -> str:
+def _library_of(manifest: str) -> str:
     """Return the library that a driver's manifest names; a relative path starts at its folder."""
+    import json  # noqa: PLC0415  costs start-up time
+
     try:
-        library: str = json.loads(manifest.read_text(encoding="utf-8"))["ICD"]["library_path"]
+        with open(manifest, encoding="utf-8") as file:
+            library: str = json.load(file)["ICD"]["library_path"]
         # The system searches for a name without a folder.
-        return os.fspath(manifest.parent / library) if "/" in library else library
+        return os.path.join(os.path.dirname(manifest), library) if "/" in library else library
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"VKBLOOM_DRIVER: {manifest} is not a driver's manifest") from error
 

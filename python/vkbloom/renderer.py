@@ -15,7 +15,6 @@ from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
 from vkbloom.image import Image
-from vkbloom.plans import Pass, Plan, framebuffers
 from vkbloom.settings import Settings, Shading, check_settings
 from vkbloom.sources import image_kind, image_source, is_image, scene_source
 from vkbloom.version import installed_version
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
+    from vkbloom.plans import Plan
     from vkbloom.scene import Scene
 
 _SCENE_SIZE = (1280, 720)
@@ -749,6 +749,8 @@ class Renderer:
         >>> {name: shape for name, (shape, _) in plan.outputs.items() if name.startswith("down")}
         {'down_0': (128, 128, 4), 'down_1': (64, 64, 4)}
         """
+        from vkbloom.plans import Pass, Plan, framebuffers  # noqa: PLC0415  costs start-up time
+
         settings = check_settings(settings)
         names = check_attachments(attachments)
         kind: str = shading

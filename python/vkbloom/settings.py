@@ -21,7 +21,6 @@ from vkbloom.fields import (
     number_field,
 )
 from vkbloom.glare.base import Glare, replaced_stages, stage_field_of
-from vkbloom.glares import read_glare
 
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
@@ -167,6 +166,8 @@ class Settings:
             raise TypeError("Settings is abstract; use a method, such as Separable")
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
+            if value is field.default:
+                continue  # `replace` makes settings often, with few other values
             optional = str(field.type).endswith("None")
             if field.name in _core.VALUES and not (value is None and optional):
                 self._check_value(field, value)
@@ -182,7 +183,10 @@ class Settings:
             self._check_name("format", BLOOM_FORMATS)
         if self.bloom_size is not None:
             object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
-        object.__setattr__(self, "glare", read_glare(self.glare))
+        if not isinstance(self.glare, tuple) or self.glare:
+            from vkbloom.named_glares import read_glare  # noqa: PLC0415  costs start-up time
+
+            object.__setattr__(self, "glare", read_glare(self.glare))
 
     def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
         """Check a number and store it as a Python number; NumPy scalars print differently."""
@@ -230,6 +234,8 @@ class Settings:
         """
         nested = {name: changes.pop(name) for name in [*changes] if "." in name}
         if nested:
+            from vkbloom.named_glares import read_glare  # noqa: PLC0415  costs start-up time
+
             changes["glare"] = replaced_stages(read_glare(changes.get("glare", self.glare)), nested)
         return dataclasses.replace(self, **changes)
 

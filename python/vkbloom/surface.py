@@ -69,8 +69,6 @@ class Surface:
     ----------
     size : (int, int)
         Width and height in pixels; (0, 0) while a window is minimized.
-    timings : dict of str to float
-        Seconds of the passes that ran for the frame before the last two, as of `Frames.timings`.
 
     Raises
     ------
@@ -128,7 +126,6 @@ class Surface:
         self._renderer, self._window = renderer, window
         self._screen = renderer._core.open_screen(handle, mailbox)
         self._pending: deque[_core.Submission] = deque()
-        self.timings: dict[str, float] = {}
 
     @property
     def size(self) -> tuple[int, int]:
@@ -211,7 +208,7 @@ class Surface:
             raise ValueError(f"attachment: {attachment!r} has no colours to show")
         linear = dtype != "uint8" and not (attachment == "final" and settings.encoding != "none")
         if len(self._pending) == _FRAMES_IN_FLIGHT:
-            ((self.timings,), _) = self._pending.popleft().wait()
+            self._pending.popleft().wait()
         submission = core.show(given, plan, self._screen, width, height, linear)
         if submission:
             self._pending.append(submission)

@@ -28,13 +28,12 @@ layout(set = 0, binding = 3) uniform writeonly image2D target;
 const int LENGTH = RADIX_1 * RADIX_2 * RADIX_3 * RADIX_4;
 // A float more after each 32, so that invocations use different banks of the shared memory.
 const int PITCH = LENGTH + (LENGTH >> 5);
-// Of two components.
-const int AT_ONCE = EXCHANGED > 1 ? 2 : 1;
 const bool IS_ROW = DIRECTION == DIRECTION_HORIZONTAL;
 const bool MULTIPLIES = STAGE == STAGE_GREY || STAGE == STAGE_COLOURS;
 
-// Invocations without a butterfly read beyond the line.
-shared float exchanged[GROUP_WIDTH * EXCHANGED * PITCH + GROUP_HEIGHT + 1];
+// One float of each element: of more, fewer workgroups would run at a time. Invocations without a
+// butterfly read beyond the line.
+shared float exchanged[GROUP_WIDTH * PITCH + GROUP_HEIGHT + 1];
 
 // A radix is the product of two that transform_held has.
 int first_factor(int radix)
@@ -65,9 +64,9 @@ vec4 load_source(ivec2 at)
 // The number of the line, and of this invocation's butterfly.
 int across, number;
 
-int slot(int component, int place)
+int slot(int place)
 {
-    return (int(gl_LocalInvocationID.x) * EXCHANGED + component) * PITCH + place + (place >> 5);
+    return int(gl_LocalInvocationID.x) * PITCH + place + (place >> 5);
 }
 
 // Those without one do all but store: a condition about many values costs more than it saves.
@@ -89,16 +88,14 @@ int first_result(int radix, int before)
     return number / before * before * radix + number % before;
 }
 
-// Leaves the components from `part` on of the last butterfly's results for other invocations.
-void leave(int part, int count, int radix, int before)
+// Leaves a component of the last butterfly's results for other invocations.
+void leave(int component, int radix, int before)
 {
     int first = first_result(radix, before);
     barrier();
     if (has_butterfly(radix)) {
-        [[unroll]] for (int i = 0; i < radix; ++i) {
-            [[unroll]] for (int c = 0; c < count; ++c)
-                exchanged[slot(c, first + i * before)] = held[place_of(i, radix)][part + c];
-        }
+        [[unroll]] for (int i = 0; i < radix; ++i)
+            exchanged[slot(first + i * before)] = held[place_of(i, radix)][component];
     }
     barrier();
 }
@@ -106,12 +103,10 @@ void leave(int part, int count, int radix, int before)
 // From the results of a butterfly to the elements of the next.
 void exchange(int radix, int before, int next)
 {
-    [[unroll]] for (int part = 0; part < 4; part += EXCHANGED) {
-        leave(part, EXCHANGED, radix, before);
-        [[unroll]] for (int i = 0; i < next; ++i) {
-            [[unroll]] for (int c = 0; c < EXCHANGED; ++c)
-                held[i][part + c] = exchanged[slot(c, number + i * (LENGTH / next))];
-        }
+    [[unroll]] for (int component = 0; component < 4; ++component) {
+        leave(component, radix, before);
+        [[unroll]] for (int i = 0; i < next; ++i)
+            held[i][component] = exchanged[slot(number + i * (LENGTH / next))];
     }
 }
 
@@ -226,12 +221,11 @@ void store_separated(int radix)
 {
     vec2 mirrors[FFT_MOST_GROUP_RADIX];
     [[unroll]] for (int pair = 0; pair < 2; ++pair) {
-        [[unroll]] for (int part = 0; part < 2; part += AT_ONCE) {
-            leave(2 * pair + part, AT_ONCE, radix, LENGTH / radix);
+        [[unroll]] for (int part = 0; part < 2; ++part) {
+            leave(2 * pair + part, radix, LENGTH / radix);
             [[unroll]] for (int i = 0; i < radix; ++i) {
                 int frequency = place_at(i, radix);
-                [[unroll]] for (int c = 0; c < AT_ONCE; ++c)
-                    mirrors[i][part + c] = exchanged[slot(c, frequency == 0 ? 0 : LENGTH - frequency)];
+                mirrors[i][part] = exchanged[slot(frequency == 0 ? 0 : LENGTH - frequency)];
             }
         }
         [[unroll]] for (int i = 0; i < radix; ++i) {

@@ -127,6 +127,17 @@ def test_complete_lines(gpu: Renderer) -> None:
     np.testing.assert_allclose(bloom, reference.apply(image, settings)["bloom"], atol=1e-5)
 
 
+@pytest.mark.parametrize("boundary", ["edge", "wrap"])
+def test_lines_of_many_invocations(gpu: Renderer, boundary: Any) -> None:
+    """A line of 4320 elements would have 720 invocations; a longer one has fewer.
+
+    With a period of that length it cannot be longer.
+    """
+    width = 4320 if boundary == "wrap" else 4201
+    settings = Convolution(kernel_of(101, 2), boundary=boundary)
+    assert_close(gpu, image_of(width, 3), settings)
+
+
 def test_lines_that_shared_memory_cannot_hold(gpu: Renderer) -> None:
     """They run stage by stage, which needs more images."""
     image = np.zeros((1, 16000, 3), np.float32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import copy
 import json
 import math
 import struct
@@ -134,3 +135,21 @@ def load_or_refuse(path: Path, content: bytes) -> Mesh | None:
             message = str(error)
     assert path.name in message
     return None
+
+
+def refusals(path: Path, original: Any, chosen: list[tuple[Any, ...]], step: int) -> int:
+    """Put odd values at places of a document, and return how many of the documents are refused.
+
+    One of `step` values is put at each place, since all of them take long; the next place has the
+    next ones.
+    """
+    refused = 0
+    for number, (*parents, last) in enumerate(chosen):
+        for value in ODD_VALUES[number % step :: step]:
+            changed = copy.deepcopy(original)
+            place = changed
+            for key in parents:
+                place = place[key]
+            place[last] = value
+            refused += load_or_refuse(path, json.dumps(changed).encode()) is None
+    return refused

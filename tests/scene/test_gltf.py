@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import math
 import struct
@@ -22,13 +21,13 @@ from tests.scene.gltf_documents import (
     FLOAT,
     INT,
     NORMALS,
-    ODD_VALUES,
     POSITIONS,
     SHORT,
     Document,
     load_or_refuse,
     nested,
     places,
+    refusals,
     triangle,
 )
 from vkbloom.scene import Mesh, gltf_file
@@ -592,18 +591,8 @@ def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None
     original = json.loads(document.as_gltf())
     path = tmp_path / "mesh.gltf"
     assert load_or_refuse(path, json.dumps(original).encode()) is not None
-    refused = 0
-    for number, (*parents, last) in enumerate(places(original)):
-        # A third of the values at each place, another third at the next: all of them take long.
-        for value in ODD_VALUES[number % 3 :: 3]:
-            changed = copy.deepcopy(original)
-            place = changed
-            for key in parents:
-                place = place[key]
-            place[last] = value
-            refused += load_or_refuse(path, json.dumps(changed).encode()) is None
     # Most of them break something; were all let through, the checks would be off.
-    assert refused > 400
+    assert refusals(path, original, places(original), step=3) > 400
 
 
 # The original meshes

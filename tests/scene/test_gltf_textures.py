@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import copy
 import dataclasses
 import json
 import math
@@ -22,12 +21,12 @@ from numpy.typing import NDArray
 from tests.scene.gltf_documents import (
     BYTE,
     FLOAT,
-    ODD_VALUES,
     SHORT,
     TYPES,
     Document,
     load_or_refuse,
     places,
+    refusals,
 )
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene
@@ -530,20 +529,10 @@ def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None
     original = json.loads(document.as_gltf())
     path = tmp_path / "mesh.gltf"
     assert load_or_refuse(path, json.dumps(original).encode()) is not None
-    refused = 0
     tops = ("materials", "textures", "images", "samplers")
     chosen = [keys for keys in places(original) if keys[0] in tops]
-    for number, (*parents, last) in enumerate(chosen):
-        # Half of the values at each place, the other half at the next.
-        for value in ODD_VALUES[number % 2 :: 2]:
-            changed = copy.deepcopy(original)
-            place = changed
-            for key in parents:
-                place = place[key]
-            place[last] = value
-            refused += load_or_refuse(path, json.dumps(changed).encode()) is None
     # Most of them break something; were all let through, the checks would be off.
-    assert refused > 100
+    assert refusals(path, original, chosen, step=2) > 100
 
 
 def test_decoding_is_the_curves_definition() -> None:

@@ -16,8 +16,8 @@ import vkbloom
 from vkbloom import psf
 from vkbloom.cli.program import given
 from vkbloom.glare.base import Glare
-from vkbloom.glares import glares
 from vkbloom.methods.convolution import PSFLike
+from vkbloom.named_glares import glares
 from vkbloom.psf.base import PSF
 from vkbloom.views.descriptions import described_parameters
 

@@ -28,7 +28,6 @@ Q, Escape      close\
 # A key changes the first of these fields that the settings have.
 _SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "size")
 _STRENGTHS: Final = ("blur_strength", "intensity")
-_SCALE_RANGE: Final = (0.1, 2.0)
 _STEP: Final = 0.1
 _TURN_SECONDS: Final = 8.0
 _DEGREES: Final = 0.4  # rotation per pixel of mouse movement
@@ -77,7 +76,7 @@ class Live:
         if key == "b":
             self.settings = self.settings.replace(bloom=not self.settings.bloom)
         elif key in ("up", "down"):
-            self._step(_SCALES, _STEP if key == "up" else -_STEP, *_SCALE_RANGE)
+            self._step(_SCALES, _STEP if key == "up" else -_STEP, 0.1, 2.0)
         elif key in ("right", "left"):
             self._step(_STRENGTHS, _STEP if key == "right" else -_STEP, 0.0, math.inf)
         elif key in "123456789" and int(key) <= len(names):

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.image_files import note
 from vkbloom.cli.live import HELP, Live
 from vkbloom.cli.live_options import live_options
 from vkbloom.settings import SHADINGS, Shading
@@ -77,7 +76,7 @@ def command(
                 else:
                     frames = renderer.apply(live.source, live.settings)
                 for path in frames.save(Path(out, time.strftime("%Y%m%d-%H%M%S"))):
-                    note(f"Wrote {path}")
+                    click.echo(f"Wrote {path}")
 
 
 @contextlib.contextmanager

@@ -13,8 +13,8 @@ from vkbloom.explorer.stages import glare_controls
 from vkbloom.explorer.steps import slider_step
 from vkbloom.fields import field_range
 from vkbloom.glare.base import Glare
-from vkbloom.glares import glares
-from vkbloom.presets import presets
+from vkbloom.named_glares import glares
+from vkbloom.named_settings import presets
 from vkbloom.psf.base import PSF
 from vkbloom.settings import Settings, methods
 from vkbloom.views.descriptions import described_parameters

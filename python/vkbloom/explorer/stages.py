@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from vkbloom import _core
 from vkbloom.explorer.steps import slider_step
 from vkbloom.glare.base import Glare, GlareLight, stages
-from vkbloom.glares import glares
+from vkbloom.named_glares import glares
 from vkbloom.views.descriptions import described_parameters
 
 __all__ = ["glare_controls"]

@@ -40,8 +40,8 @@ from vkbloom.checks import check_emission, check_image, check_mask, check_number
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.io.glows import alike, grey_mask
+from vkbloom.named_settings import presets
 from vkbloom.plans import Pass
-from vkbloom.presets import presets
 from vkbloom.renderer import Renderer
 from vkbloom.settings import SHADINGS, check_settings, check_shading
 from vkbloom.sources import image_source, scene_source

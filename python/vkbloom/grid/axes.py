@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import check_time
 from vkbloom.glare.base import stage_field_of
-from vkbloom.presets import presets
+from vkbloom.named_settings import presets
 from vkbloom.settings import Settings, check_settings
 from vkbloom.views.descriptions import described_parameters
 

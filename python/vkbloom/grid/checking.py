@@ -13,7 +13,7 @@ import numpy as np
 
 from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import check_summed
-from vkbloom.grid.identity import FORMAT, chunk_in, short
+from vkbloom.grid.identity import chunk_in
 from vkbloom.grid.keys import Keys, open_keys
 from vkbloom.grid.order import Block, Index, blocks
 from vkbloom.grid.plan import Variable
@@ -21,13 +21,13 @@ from vkbloom.grid.store import (
     DIGESTS,
     DONE,
     ROOT,
+    checked_identity,
     chunk_key,
     describe,
     digest,
     read_json,
     read_marks,
     reason,
-    stored_identity,
 )
 
 __all__ = ["GridReport", "check_grid"]
@@ -126,13 +126,7 @@ def check_grid(store: Any) -> GridReport:
         if not any(key.startswith(f"{DONE}/") for key in held):
             raise ValueError(f"{keys.name}: its content is not a grid of vkbloom")
         return GridReport(0, 0, (f"{_state_of(ROOT, content)}, which describes the grid",))
-    own = stored_identity(root)
-    if own is None:
-        raise ValueError(f"{keys.name}: its content is not a grid of vkbloom")
-    if own.get("format") != FORMAT:
-        raise ValueError(
-            f"{keys.name}: its format version {short(own.get('format'))} is not {FORMAT}"
-        )
+    own = checked_identity(root, keys.name)
     try:
         stored = _read_stored(own, root)
     except (KeyError, TypeError, AttributeError, ValueError):

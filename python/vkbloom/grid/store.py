@@ -39,6 +39,7 @@ __all__ = [
     "ROOT",
     "GridStore",
     "GridWriter",
+    "checked_identity",
     "chunk_key",
     "describe",
     "digest",
@@ -310,15 +311,7 @@ class GridStore:
         asked = identity(self.grid, self.layout, self.chunk)
         root = read_json(self.keys.read(ROOT))
         if root is not None:
-            stored = stored_identity(root)
-            if stored is None:
-                raise ValueError(f"{self.keys.name}: its content is not a grid of vkbloom")
-            if stored.get("format") != FORMAT:
-                raise ValueError(
-                    f"{self.keys.name}: its format version {short(stored.get('format'))} is not "
-                    f"{FORMAT}"
-                )
-            found = differences(stored, asked)
+            found = differences(checked_identity(root, self.keys.name), asked)
             if found:
                 raise ValueError(f"{self.keys.name}: contains another grid; {'; '.join(found)}")
         # The arrays name their grid too. A process that was killed early may have written none.
@@ -448,6 +441,17 @@ def stored_identity(root: Mapping[str, Any]) -> dict[str, Any] | None:
     """Return the grid's identity from the group's metadata; None if there is none."""
     found = _attributes(root).get(IDENTITY)
     return found if isinstance(found, dict) else None
+
+
+def checked_identity(root: Mapping[str, Any], store: str) -> dict[str, Any]:
+    """Return the grid's identity, or raise ValueError if there is none of this version."""
+    found = stored_identity(root)
+    if found is None:
+        raise ValueError(f"{store}: its content is not a grid of vkbloom")
+    version = found.get("format")
+    if version != FORMAT:
+        raise ValueError(f"{store}: its format version {short(version)} is not {FORMAT}")
+    return found
 
 
 def _attributes(metadata: Mapping[str, Any]) -> Mapping[str, Any]:

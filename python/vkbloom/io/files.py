@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vkbloom.checks import import_extra
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io import image_reading, safe_writing
-from vkbloom.io.images import PIXEL_TYPES, check_name, failure_of, is_exr
+from vkbloom.io.images import PIXEL_TYPES, check_name, complete, is_exr
 from vkbloom.settings import Settings
 
 if TYPE_CHECKING:
@@ -174,9 +174,7 @@ def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
             if attribute.name.startswith("vkbloom:")
         } or _described(spec.get_string_attribute("ImageDescription"))
         pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
-        reason = failure_of(reader)
-    if pixels is None or reason:
-        raise ValueError(f"{file}: damaged: {reason or 'the pixels cannot be read'}")
+        pixels = complete(pixels, reader, file)
     return pixels.reshape(spec.height, spec.width, spec.nchannels), said
 
 

@@ -20,6 +20,7 @@ from vkbloom.io.images import (
     Picture,
     StoredImage,
     check_name,
+    complete,
     failure_of,
     is_kept,
 )
@@ -148,11 +149,7 @@ def _read(
     width, height = _covered(spec)
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
-    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
-    # A truncated JPEG has pixels and an error.
-    reason = failure_of(reader)
-    if data is None or reason:
-        raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
+    data = complete(reader.read_image(subimage, 0, 0, spec.nchannels, wanted), reader, name)
     pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
     if pixels.shape[:2] != (height, width):
         row, column = spec.y - top, spec.x - left

@@ -35,6 +35,7 @@ __all__ = [
     "StoredImage",
     "Window",
     "check_name",
+    "complete",
     "failure_of",
     "is_exr",
     "is_kept",
@@ -233,6 +234,15 @@ def is_kept(attribute: str) -> bool:
     return attribute not in _LOST_ATTRIBUTES and (
         attribute in _KEPT_ATTRIBUTES or attribute.startswith(_KEPT_GROUPS)
     )
+
+
+def complete(pixels: NDArray[Any] | None, reader: Any, file: object) -> NDArray[Any]:
+    """Return the pixels that a reader gave, or raise ValueError if the file is damaged."""
+    # A truncated JPEG has pixels and an error.
+    reason = failure_of(reader)
+    if pixels is None or reason:
+        raise ValueError(f"{file}: damaged: {reason or 'the pixels cannot be read'}")
+    return pixels
 
 
 def failure_of(source: Any) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io import image_reading, image_writing, safe_writing
-from vkbloom.io.images import DTYPES, Picture, SavedColour, StoredImage, failure_of
+from vkbloom.io.images import DTYPES, Picture, SavedColour, StoredImage, complete
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -147,9 +147,7 @@ def _read_rows(
         )
     else:
         data = reader.read_scanlines(*place, y + first, y + end, 0, 0, spec.nchannels, wanted)
-    reason = failure_of(reader)
-    if data is None or reason:
-        raise ValueError(f"{name}: damaged: {reason or 'the pixels cannot be read'}")
+    data = complete(data, reader, name)
     return np.asarray(data, DTYPES[numbers]).reshape(end - first, spec.width, spec.nchannels)
 
 

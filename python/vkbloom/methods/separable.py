@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
+from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 from vkbloom import _core
@@ -84,29 +85,36 @@ class Separable(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "weights", check_floats("weights", self.weights))
-        if not 1 <= len(self.weights) <= _core.MAX_WEIGHTS:
-            raise ValueError(
-                f"weights: {len(self.weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
-            )
-        try:
-            pairs = tuple(tuple(layer) for layer in self.layers)
-        except TypeError:
-            raise TypeError(
-                f"layers: {self.layers!r} is not a sequence of pairs (scale, strength)"
-            ) from None
-        layers = tuple(check_floats("layers", layer) for layer in pairs)
-        if not 1 <= len(layers) <= _core.MAX_LAYERS:
-            raise ValueError(
-                f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}"
-            )
-        if any(len(layer) != 2 for layer in layers):
-            raise ValueError(
-                f"layers: {self.layers!r} is not a sequence of pairs (scale, strength)"
-            )
-        if any(not 0 <= number <= 16 for layer in layers for number in layer):
-            raise ValueError(f"layers: {self.layers!r} has a number out of range, 0 to 16")
-        object.__setattr__(self, "layers", layers)
+        if self.weights is not Separable.weights:
+            object.__setattr__(self, "weights", _check_weights(self.weights))
+        if self.layers is not Separable.layers:
+            object.__setattr__(self, "layers", _check_layers(self.layers))
+
+
+def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
+    weights = check_floats("weights", values)
+    if not 1 <= len(weights) <= _core.MAX_WEIGHTS:
+        raise ValueError(
+            f"weights: {len(weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
+        )
+    return weights
+
+
+def _check_layers(values: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], ...]:
+    try:
+        pairs = tuple(tuple(layer) for layer in values)
+    except TypeError:
+        raise TypeError(
+            f"layers: {values!r} is not a sequence of pairs (scale, strength)"
+        ) from None
+    layers = tuple(check_floats("layers", layer) for layer in pairs)
+    if not 1 <= len(layers) <= _core.MAX_LAYERS:
+        raise ValueError(f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}")
+    if any(len(layer) != 2 for layer in layers):
+        raise ValueError(f"layers: {values!r} is not a sequence of pairs (scale, strength)")
+    if any(not 0 <= number <= 16 for layer in layers for number in layer):
+        raise ValueError(f"layers: {values!r} has a number out of range, 0 to 16")
+    return layers
 
 
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
