@@ -97,6 +97,7 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
                              .pEnabledFeatures =
                                  &(VkPhysicalDeviceFeatures){
                                      .shaderStorageImageWriteWithoutFormat = device->dispatch,
+                                     .shaderInt64 = available.shaderInt64,
                                  },
                              .queueCreateInfoCount = 1,
                              .pQueueCreateInfos =
@@ -204,9 +205,12 @@ static bool has_whole_words(const struct vkb_device *device)
 
 static bool has_words(const struct vkb_device *device)
 {
+    VkPhysicalDeviceFeatures available;
     VkFormatProperties properties;
 
-    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU || !device->dispatch)
+    device->instance->vk.vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU || !device->dispatch
+        || !available.shaderInt64)
         return false;
     for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
         if (format != VKB_FORMAT_DEPTH32_FLOAT && !is_linear(device, vkb_formats[format].vk))
