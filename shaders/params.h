@@ -84,12 +84,13 @@
     VEC4S(B, kernel, LINE_VEC4S)
 
 // The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as in
-// LINE_BLOCK.
+// LINE_BLOCK. `columns` are those that an invocation of strip.comp writes.
 #define FUSED_BLOOM_BLOCK(B, READS, INPUT, VEC4S) \
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
     INPUT(B, int, vertical_radius) \
     INPUT(B, int, horizontal_radius) \
+    INPUT(B, int, columns) \
     VEC4S(B, vertical, FUSED_VEC4S) \
     VEC4S(B, horizontal, FUSED_VEC4S)
 
@@ -341,17 +342,17 @@
 
 // Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line and of a fused bloom.
 // A line up to LINE_SHORT_RADIUS is compiled for its radius.
-#define LINE_RADIUS            64
-#define LINE_SHORT_RADIUS      8
-#define LINE_OUTPUTS           8
-#define LINE_VEC4S             34
-#define STRIP_RADIUS           4
-#define STRIP_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
-#define STRIP_ROWS             135
-#define HALVE_COLUMNS          4
-#define HALVE_ROWS             16
-#define DOUBLE_COLUMNS         4
-#define DOUBLE_ROWS            32
+#define LINE_RADIUS         64
+#define LINE_SHORT_RADIUS   8
+#define LINE_OUTPUTS        8
+#define LINE_VEC4S          34
+#define STRIP_RADIUS        4
+#define STRIP_COLUMNS       240
+#define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
+#define HALVE_COLUMNS       4
+#define HALVE_ROWS          16
+#define DOUBLE_COLUMNS      4
+#define DOUBLE_ROWS         32
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8

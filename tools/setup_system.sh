@@ -84,6 +84,7 @@ check() {
             need "the Khronos validation layer" vulkan-validationlayers has_validation
             want chromium has_chromium
             want xvfb command -v Xvfb
+            want twm command -v twm
             ;;
         esac
     done

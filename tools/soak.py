@@ -73,9 +73,10 @@ def frame(
         ]
     )
     if surface and dice.random() < 0.2:
-        if dice.random() < 0.05:
-            surface.size = size
         surface.present(scene, settings, time=dice.random())
+        if dice.random() < 0.05:
+            with vkbloom.Surface(renderer, size=size) as other:
+                other.present(scene, settings, time=dice.random())
         return
     if dice.random() < 0.3:
         shading = dice.choice(("forward", "deferred"))

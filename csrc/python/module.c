@@ -270,7 +270,6 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
-                && add_type(module, &vkb_screen_spec, "Screen", &state->screen_type)
                 && vkb_make_attributes(state)
                 && add_steal(module, "VALUES", value_table(vkb_value_rows, vkb_value_row_count))
                 && add_steal(module, "GLARE_VALUES",
@@ -293,7 +292,6 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->plan_type);
     Py_VISIT(state->submission_type);
     Py_VISIT(state->pages_type);
-    Py_VISIT(state->screen_type);
     Py_VISIT(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
@@ -309,7 +307,6 @@ static int clear(PyObject *module)
     Py_CLEAR(state->plan_type);
     Py_CLEAR(state->submission_type);
     Py_CLEAR(state->pages_type);
-    Py_CLEAR(state->screen_type);
     Py_CLEAR(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);

@@ -14,7 +14,7 @@
 #include <stdatomic.h>
 
 struct vkb_module_state {
-    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *screen_type;
+    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
 };
@@ -39,7 +39,7 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
-    vkb_pages_spec, vkb_screen_spec;
+    vkb_pages_spec;
 
 // The data of a submission until the device has finished it. If nobody waits for it any more, it is
 // abandoned: the renderer owns it.
@@ -193,15 +193,9 @@ struct vkb_source_object {
 // Whether the renderer can use the source; else with a ValueError set.
 bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_source_object *source);
 
-// A screen of a renderer, which owns it: without the renderer's device there is none.
-struct vkb_screen_object {
-    PyObject_HEAD
-    struct vkb_renderer *renderer;
-    struct vkb_screen *screen;  // NULL: closed
-};
-
-// Fails if the screen is closed. With the renderer's lock.
-bool vkb_require_screen(const struct vkb_screen_object *screen, struct vkb_error *error);
+// Fails if this is the address of no open screen of the renderer. With the renderer's lock.
+bool vkb_require_screen(const struct vkb_renderer *renderer, const struct vkb_screen *screen,
+                        struct vkb_error *error);
 
 struct vkb_plan_object {
     PyObject_HEAD
@@ -236,7 +230,8 @@ PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_bands(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_show(PyObject *renderer, PyObject *arguments);
-PyObject *vkb_new_screen(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_open_screen(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_close_screen(PyObject *renderer, PyObject *screen);
 PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_fill(PyObject *renderer, PyObject *arguments);

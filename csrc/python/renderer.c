@@ -345,9 +345,11 @@ static PyObject *get_info(PyObject *object, void *unused)
 static PyObject *get_instance(PyObject *object, void *unused)
 {
     const struct vkb_renderer *self = (struct vkb_renderer *)object;
+    struct vkb_error error = {0};
 
     (void)unused;
-    return PyLong_FromVoidPtr(self->open ? (void *)self->device.instance->handle : NULL);
+    return vkb_require_open(self, &error) ? PyLong_FromVoidPtr(self->device.instance->handle)
+                                          : vkb_raise(state_of(object), &error);
 }
 
 static PyObject *get_pipeline_count(PyObject *object, void *unused)
@@ -387,12 +389,15 @@ static PyMethodDef methods[] = {
     {"fill", vkb_renderer_fill, METH_VARARGS,
      "fill(source, rows, first). Copies rows of an image into an uploaded image, from row `first` "
      "on, before anything uses it."},
-    {"screen", vkb_new_screen, METH_VARARGS,
-     "screen(surface, mode) -> Screen. Takes over a VkSurfaceKHR; 0: one without a window."},
+    {"open_screen", vkb_open_screen, METH_VARARGS,
+     "open_screen(surface, mailbox) -> screen, a number. Takes over a VkSurfaceKHR; 0: one without "
+     "a window."},
+    {"close_screen", vkb_close_screen, METH_O,
+     "close_screen(screen). Waits for the device and destroys the surface, if it is still there."},
     {"show", vkb_renderer_show, METH_VARARGS,
-     "show(source, plan, screen, width, height, linear) -> (Submission, shown). Presents the "
-     "plan's only output on a screen, of that size if it has none of its own; `linear`: encoded as "
-     "sRGB."},
+     "show(source, plan, screen, width, height, linear) -> Submission, or None: the surface has no "
+     "image. Presents the plan's only output on a screen, of that size if it has none of its own; "
+     "`linear`: encoded as sRGB."},
     {"pages", vkb_new_pages, METH_O,
      "pages(size) -> Pages. Memory for an array; reused when the array is gone."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
@@ -402,7 +407,7 @@ static PyMethodDef methods[] = {
 static PyGetSetDef attributes[] = {
     {"closed", get_closed, NULL, "Whether close() was called.", NULL},
     {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
-    {"instance", get_instance, NULL, "The VkInstance; 0: closed.", NULL},
+    {"instance", get_instance, NULL, "The VkInstance, if it is open.", NULL},
     {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},
     {"cached", get_cached, NULL,
      "(pipelines, framebuffers, bytes of images) that are kept for later frames.", NULL},

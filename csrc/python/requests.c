@@ -209,16 +209,9 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
     return NULL;
 }
 
-// The screen on which the only output of a submission is presented.
-struct show {
-    struct vkb_screen_object *screen;
-    struct vkb_swapchain_spec spec;
-    bool shown;
-};
-
 // `show` may be NULL.
 static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object *source,
-                   struct vkb_pending *pending, struct show *show, struct vkb_error *error)
+                   struct vkb_pending *pending, struct vkb_show *show, struct vkb_error *error)
 {
     struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
@@ -232,21 +225,18 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
     if (!vkb_renderer_enter(renderer, error))
         return false;
     bool done = vkb_require_open(renderer, error)
+             && (!show || vkb_require_screen(renderer, show->screen, error))
              && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
-                                 pending->count, &pending->submission, error);
+                                 pending->count, show, &pending->submission, error);
     if (done)
         pending->specials = vkb_frame_specials(&renderer->frame, &data);
-    if (done && show)
-        done = vkb_require_screen(show->screen, error)
-            && vkb_screen_show(&renderer->device, &renderer->frame, show->screen->screen,
-                               pending->requests[0].plan, &show->spec, &show->shown, error);
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
 }
 
 static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *plans,
-                     const struct rows *rows, PyObject *arrays, struct show *show)
+                     const struct rows *rows, PyObject *arrays, struct vkb_show *show)
 {
     struct vkb_source_object *given = (struct vkb_source_object *)source;
     struct vkb_error error = {0};
@@ -284,30 +274,27 @@ PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     struct vkb_module_state *state = state_of(object);
-    PyObject *source, *plan, *screen, *result = NULL;
-    struct show show = {0};
+    PyObject *source, *plan;
+    unsigned long long screen;
+    struct vkb_show show = {0};
     int linear;
 
-    if (!PyArg_ParseTuple(arguments, "O!O!O!O&O&p:show", state->source_type, &source,
-                          state->plan_type, &plan, state->screen_type, &screen, vkb_read_uint32,
-                          &show.spec.extent.width, vkb_read_uint32, &show.spec.extent.height,
-                          &linear))
+    if (!PyArg_ParseTuple(arguments, "O!O!KO&O&p:show", state->source_type, &source,
+                          state->plan_type, &plan, &screen, vkb_read_uint32, &show.extent.width,
+                          vkb_read_uint32, &show.extent.height, &linear))
         return NULL;
-    show.screen = (struct vkb_screen_object *)screen;
-    show.spec.linear = linear;
-    if (show.screen->renderer != renderer) {
-        PyErr_SetString(PyExc_ValueError, "surface: it was created by another renderer");
-        return NULL;
-    }
+    show.screen = (struct vkb_screen *)(uintptr_t)screen;
+    show.linear = linear;
     PyObject *plans = PyTuple_Pack(1, plan);
     PyObject *arrays = Py_BuildValue("((O))", Py_None);
     PyObject *submission =
         plans && arrays ? run(renderer, source, plans, NULL, arrays, &show) : NULL;
-    if (submission)
-        result = Py_BuildValue("(NO)", submission, show.shown ? Py_True : Py_False);
     Py_XDECREF(plans);
     Py_XDECREF(arrays);
-    return result;
+    if (!submission || show.acquired)
+        return submission;
+    Py_DECREF(submission);
+    Py_RETURN_NONE;
 }
 
 static PyObject *timing_dict(const struct vkb_request *request)

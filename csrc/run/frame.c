@@ -14,7 +14,7 @@ bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, s
 void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 {
     while (frame->screens)
-        vkb_screen_destroy(device, frame, frame->screens);
+        vkb_screen_destroy(device, frame->screens, &frame->screens);
     vkb_submissions_destroy(device, &frame->submissions);
     vkb_buffer_destroy(device, &frame->constants);
     vkb_image_cache_destroy(device, &frame->cache);
@@ -126,7 +126,7 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
         return true;
     if (!vkb_submissions_wait(device, &run->frame->submissions, error)
         || !vkb_scene_begin(device, &submission->commands, data, scene, error)
-        || !vkb_submission_submit(device, submission, NULL, error)
+        || !vkb_submission_submit(device, submission, VK_NULL_HANDLE, error)
         || !vkb_submission_wait(device, &run->frame->submissions, submission, error))
         return false;
     vkb_scene_end(device, data, scene);
@@ -317,6 +317,9 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
         // A pass that stored to the caller's memory did not write the image.
         cached->content.valid = cached->content.valid && !request->outputs[i].stored;
     }
+    if (run->show)
+        vkb_screen_record(run->device, submission->commands.buffer, run->show->screen,
+                          &run->images[request->plan->outputs[0]]->image);
     return true;
 }
 
@@ -326,7 +329,15 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     struct vkb_device *device = run->device;
     struct vkb_submission *submission = run->submission;
     VkCommandBuffer commands = submission->commands.buffer;
+    VkSemaphore rendered = VK_NULL_HANDLE;
 
+    if (run->show) {
+        if (!vkb_screen_acquire(device, run->show, submission->commands.available, error))
+            return false;
+        if (!run->show->acquired)
+            return true;
+        rendered = run->show->screen->images[run->show->screen->index].rendered;
+    }
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
@@ -338,7 +349,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
             return false;
     vkb_barrier_record_host_read(device, commands);
     return vkb_buffer_flush(device, &submission->uniforms, error)
-        && vkb_submission_submit(device, submission, NULL, error);
+        && vkb_submission_submit(device, submission, rendered, error);
 }
 
 static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
@@ -399,10 +410,10 @@ struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
 
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
                       const struct vkb_frame_source *source, struct vkb_request *requests,
-                      uint32_t request_count, struct vkb_submission **submission,
-                      struct vkb_error *error)
+                      uint32_t request_count, struct vkb_show *show,
+                      struct vkb_submission **submission, struct vkb_error *error)
 {
-    struct vkb_run run = {.device = device, .frame = frame};
+    struct vkb_run run = {.device = device, .frame = frame, .show = show};
     // All requests have the same images.
     const uint32_t image_count = requests[0].plan->graph.image_count;
     enum vkb_access accesses[VKB_INPUT_COUNT];
@@ -420,19 +431,21 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         && submit(&run, source, requests, request_count, error);
     vkb_free(run.images);
     vkb_free(run.contents);
-    if (done) {
+    if (done && (!show || show->acquired)) {
         run.submission->requests = requests;
         run.submission->request_count = request_count;
         *submission = run.submission;
         if (source->resident)
             source->resident->staged = false;
-    } else {
+        return !show || vkb_screen_present(device, show->screen, error);
+    }
+    if (!done) {
         // The recorded commands do not run, so the images keep their last access.
         for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
             source->resident->inputs[kind].cached.image.access = accesses[kind];
         fail_frame(device, frame, run.submission, error);
-        vkb_submissions_give_back(device, &frame->submissions, run.submission);
     }
+    vkb_submissions_give_back(device, &frame->submissions, run.submission);
     return done;
 }
 

@@ -56,12 +56,14 @@ struct vkb_request {
 
 // Records the passes that the requests' outputs need and that are out of date, request after
 // request, and submits them. All requests must have the same images (vkb_graph_same_images). The
-// source is read before this returns. After a failure there is no submission, earlier submissions
-// are unchanged, and the frame is usable unless the device is lost.
+// source is read before this returns. With `show`, presents the output of one request; if the
+// surface has no image, there is no submission. After a failure there is none either, unless the
+// presentation failed; earlier submissions are unchanged, and the frame is usable unless the device
+// is lost.
 bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
                       const struct vkb_frame_source *source, struct vkb_request *requests,
-                      uint32_t request_count, struct vkb_submission **submission,
-                      struct vkb_error *error);
+                      uint32_t request_count, struct vkb_show *show,
+                      struct vkb_submission **submission, struct vkb_error *error);
 
 // Waits for the submission and fills its requests' outputs and timings. *over becomes true if the
 // device has finished it, which is not always so after a failure.

@@ -9,6 +9,7 @@ struct vkb_run {
     struct vkb_device *device;
     struct vkb_frame *frame;
     struct vkb_submission *submission;
+    struct vkb_show *show;  // NULL: nothing is presented
     struct vkb_request *request;
     const struct vkb_graph *graph;                     // the request's
     struct vkb_cached_image **images;                  // by the graph's image index

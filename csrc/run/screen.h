@@ -1,35 +1,53 @@
-// Surfaces on which framebuffers are presented. The framebuffer is copied to the swapchain's image
-// by a submission of its own, and never read back.
+// Screens: a surface, which is a window or a display without one, with its swapchain. A framebuffer
+// is copied to the swapchain's image by the submission that renders it, and never read back.
 #ifndef VKB_SCREEN_H
 #define VKB_SCREEN_H
 
-#include "graph/plan.h"
-#include "run/submission.h"
-#include "vulkan/swapchain.h"
+#include "vulkan/memory.h"
 
-struct vkb_frame;
+enum { VKB_MAX_SCREEN_IMAGES = 16 };
 
 struct vkb_screen {
-    struct vkb_swapchain swapchain;
-    // By frame in flight: the copy that was submitted last. Its fence guards the frame's semaphore
-    // and command buffer.
-    struct vkb_submission *copies[VKB_FRAMES_IN_FLIGHT];
-    uint32_t frame;  // in flight, the next one
+    VkSurfaceKHR surface;
+    VkPresentModeKHR mode;
+    VkExtent2D wanted;         // what the swapchain was made for, where the surface has no size
+    bool linear;               // its images get linear light, which their format encodes as sRGB
+    VkSwapchainKHR swapchain;  // VK_NULL_HANDLE: the surface has no area
+    struct vkb_screen_image {
+        struct vkb_image image;
+        VkSemaphore rendered;  // signalled when the image can be presented
+    } images[VKB_MAX_SCREEN_IMAGES];
+    uint32_t index;  // of the image that was acquired last
+    bool stale;      // the swapchain must be created again before an image is acquired
     struct vkb_screen *next;
 };
 
-// Makes a screen of a surface, as vkb_swapchain_create does; NULL on failure. The frame owns it.
-struct vkb_screen *vkb_screen_create(const struct vkb_device *device, struct vkb_frame *frame,
-                                     VkSurfaceKHR surface, bool mailbox, struct vkb_error *error);
-// After vkb_submissions_wait or vkb_frame_end.
-void vkb_screen_destroy(const struct vkb_device *device, struct vkb_frame *frame,
-                        struct vkb_screen *screen);
+// How a submission presents the first output of its plan.
+struct vkb_show {
+    struct vkb_screen *screen;
+    VkExtent2D extent;  // of the swapchain's images, where the surface has no size of its own
+    bool linear;
+    bool acquired;  // the surface had an image
+};
 
-// Presents the plan's first output, which an earlier submission has left in the frame's images. The
-// output is scaled to the surface. If the proportions of `final` differ from those of the surface,
-// black bars are added. *shown: whether the swapchain had an image.
-bool vkb_screen_show(struct vkb_device *device, struct vkb_frame *frame, struct vkb_screen *screen,
-                     const struct vkb_plan *plan, const struct vkb_swapchain_spec *spec,
-                     bool *shown, struct vkb_error *error);
+// Makes a screen of a surface, which it takes over, also on failure. VK_NULL_HANDLE: a surface
+// without a window. The screen is added to a list. NULL on failure.
+struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceKHR surface,
+                                     bool mailbox, struct vkb_screen **screens,
+                                     struct vkb_error *error);
+// Waits until the queue is idle. The submissions that show something must be over.
+void vkb_screen_destroy(const struct vkb_device *device, struct vkb_screen *screen,
+                        struct vkb_screen **screens);
+
+// Acquires an image. `available` is signalled when the image can be written.
+bool vkb_screen_acquire(const struct vkb_device *device, struct vkb_show *show,
+                        VkSemaphore available, struct vkb_error *error);
+// Copies a framebuffer to the image that was acquired, scaled to the surface. If the proportions
+// differ, black bars are added.
+void vkb_screen_record(const struct vkb_device *device, VkCommandBuffer commands,
+                       struct vkb_screen *screen, struct vkb_image *from);
+// Presents the image after the submission that signals its semaphore.
+bool vkb_screen_present(struct vkb_device *device, struct vkb_screen *screen,
+                        struct vkb_error *error);
 
 #endif

@@ -94,9 +94,9 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
 }
 
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
-                           const struct vkb_semaphores *semaphores, struct vkb_error *error)
+                           VkSemaphore rendered, struct vkb_error *error)
 {
-    submission->pending = vkb_commands_submit(device, &submission->commands, semaphores, error);
+    submission->pending = vkb_commands_submit(device, &submission->commands, rendered, error);
     return submission->pending;
 }
 

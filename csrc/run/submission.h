@@ -44,9 +44,9 @@ uint64_t vkb_submissions_pending(const struct vkb_submissions *submissions, uint
 // Whether the device has finished the submission; does not wait.
 bool vkb_submission_over(const struct vkb_device *device, const struct vkb_submission *submission);
 
-// Ends the recording and submits it, with `semaphores` or NULL.
+// Ends the recording and submits it, as vkb_commands_submit does.
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
-                           const struct vkb_semaphores *semaphores, struct vkb_error *error);
+                           VkSemaphore rendered, struct vkb_error *error);
 // Waits until the device has finished the submission and all before it. On failure it is still
 // pending.
 bool vkb_submission_wait(struct vkb_device *device, const struct vkb_submissions *submissions,

@@ -156,19 +156,31 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
+// The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of a word, so
+// that the invocations of a workgroup share a row as evenly as possible.
+static uint32_t strip_columns(uint32_t width)
+{
+    const uint32_t most = ROW_INVOCATIONS * STRIP_COLUMNS;
+    const uint32_t invocations = ROW_INVOCATIONS * ((width + most - 1) / most);
+
+    return ((width + invocations - 1) / invocations + 3) / 4 * 4;
+}
+
 // Adds the composite, and after it the fused pass in strips, which may replace it.
 bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
-    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const uint32_t columns = strip_columns(target->width);
     struct chain chain;
 
     *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, &chain) && vkb_fits_words(choice, pass);
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
-    vkb_make_words(&row, strip_shaders[format], STRIP_COLUMNS(vkb_formats[format].channel_size),
-                   STRIP_ROWS);
+    row.params.fused_bloom.columns = (int32_t)columns;
+    vkb_make_words(&row, strip_shaders[target->format], columns,
+                   STRIP_ROWS(vkb_formats[target->format].channel_size));
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

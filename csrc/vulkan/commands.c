@@ -27,7 +27,12 @@ bool vkb_commands_create(const struct vkb_device *device, struct vkb_commands *c
                                        &(VkFenceCreateInfo){
                                            .sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO,
                                        },
-                                       NULL, &commands->fence));
+                                       NULL, &commands->fence))
+        && VK(error, vk->vkCreateSemaphore(device->handle,
+                                           &(VkSemaphoreCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO,
+                                           },
+                                           NULL, &commands->available));
     if (!done)
         vkb_commands_destroy(device, commands);
     return done;
@@ -35,6 +40,7 @@ bool vkb_commands_create(const struct vkb_device *device, struct vkb_commands *c
 
 void vkb_commands_destroy(const struct vkb_device *device, struct vkb_commands *commands)
 {
+    device->vk.vkDestroySemaphore(device->handle, commands->available, NULL);
     device->vk.vkDestroyFence(device->handle, commands->fence, NULL);
     device->vk.vkDestroyCommandPool(device->handle, commands->pool, NULL);
     *commands = (struct vkb_commands){0};
@@ -54,10 +60,11 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
 }
 
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         const struct vkb_semaphores *semaphores, struct vkb_error *error)
+                         VkSemaphore rendered, struct vkb_error *error)
 {
     return VK(error, device->vk.vkEndCommandBuffer(commands->buffer))
-        && vkb_device_submit(device, commands->buffer, semaphores, commands->fence, error);
+        && vkb_device_submit(device, commands->buffer, commands->available, rendered,
+                             commands->fence, error);
 }
 
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,

@@ -1,4 +1,4 @@
-// One command buffer with its fence, recorded again for each submission.
+// One command buffer with its fence and a semaphore, recorded again for each submission.
 #ifndef VKB_COMMANDS_H
 #define VKB_COMMANDS_H
 
@@ -8,6 +8,7 @@ struct vkb_commands {
     VkCommandPool pool;
     VkCommandBuffer buffer;
     VkFence fence;
+    VkSemaphore available;  // for commands that wait until something else can be written
 };
 
 // Destroying a zeroed or half-created object is safe.
@@ -18,10 +19,10 @@ void vkb_commands_destroy(const struct vkb_device *device, struct vkb_commands *
 // Begins an empty recording. A recording that was not submitted is discarded.
 bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *commands,
                         struct vkb_error *error);
-// Ends the recording and submits it, with `semaphores` or NULL. The device runs submissions in
-// order.
+// Ends the recording and submits it. The device runs submissions in order. With `rendered`, which
+// is signalled when the commands have run, they wait for `available`.
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         const struct vkb_semaphores *semaphores, struct vkb_error *error);
+                         VkSemaphore rendered, struct vkb_error *error);
 // Waits for the last submission, which contains `frames` frames.
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
                        struct vkb_error *error);

@@ -1,5 +1,7 @@
 #include "vulkan/device.h"
 
+#include "vulkan/barrier.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -95,6 +97,7 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
                              .pEnabledFeatures =
                                  &(VkPhysicalDeviceFeatures){
                                      .shaderStorageImageWriteWithoutFormat = device->dispatch,
+                                     .shaderInt64 = available.shaderInt64,
                                  },
                              .queueCreateInfoCount = 1,
                              .pQueueCreateInfos =
@@ -202,9 +205,12 @@ static bool has_whole_words(const struct vkb_device *device)
 
 static bool has_words(const struct vkb_device *device)
 {
+    VkPhysicalDeviceFeatures available;
     VkFormatProperties properties;
 
-    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU || !device->dispatch)
+    device->instance->vk.vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU || !device->dispatch
+        || !available.shaderInt64)
         return false;
     for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
         if (format != VKB_FORMAT_DEPTH32_FLOAT && !is_linear(device, vkb_formats[format].vk))
@@ -272,21 +278,21 @@ static bool remember_loss(struct vkb_device *device, bool done, const struct vkb
     return done;
 }
 
-bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
-                       const struct vkb_semaphores *semaphores, VkFence fence,
-                       struct vkb_error *error)
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkSemaphore available,
+                       VkSemaphore rendered, VkFence fence, struct vkb_error *error)
 {
+    const uint32_t semaphore_count = rendered != VK_NULL_HANDLE;
+    const VkPipelineStageFlags stages = vkb_access_stages(VKB_ACCESS_ACQUIRED);
     VkSubmitInfo submit = {
         .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
+        .waitSemaphoreCount = semaphore_count,
+        .pWaitSemaphores = &available,
+        .pWaitDstStageMask = &stages,
         .commandBufferCount = 1,
         .pCommandBuffers = &commands,
+        .signalSemaphoreCount = semaphore_count,
+        .pSignalSemaphores = &rendered,
     };
-    if (semaphores) {
-        submit.waitSemaphoreCount = submit.signalSemaphoreCount = 1;
-        submit.pWaitSemaphores = &semaphores->wait;
-        submit.pWaitDstStageMask = &semaphores->stages;
-        submit.pSignalSemaphores = &semaphores->signal;
-    }
     bool done = VK(error, device->vk.vkQueueSubmit(device->queue, 1, &submit, fence));
 
     return remember_loss(device, done, error);
@@ -329,12 +335,6 @@ static void poll_fence(const struct vkb_device *device, VkFence fence)
             return;
 }
 
-bool vkb_device_go_on(const struct vkb_device *device, struct vkb_error *error)
-{
-    return !device->interrupted || !device->interrupted(device->context)
-        || vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
-}
-
 bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
                      struct vkb_error *error)
 {
@@ -351,8 +351,8 @@ bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
         if (result != VK_TIMEOUT)
             break;
         waited += slice;
-        if (!vkb_device_go_on(device, error))
-            return false;
+        if (device->interrupted && device->interrupted(device->context))
+            return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
         if (waited >= limit)
             break;
     }

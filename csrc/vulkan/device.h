@@ -49,19 +49,11 @@ bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format
 // How the device uses host memory of the caller that it imports as a buffer.
 VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device);
 
-// The semaphores of a submission: its commands wait for one at some stages, and signal the other.
-struct vkb_semaphores {
-    VkSemaphore wait, signal;
-    VkPipelineStageFlags stages;
-};
-
-// Submits the recorded commands, with `semaphores` or NULL. The unsignalled `fence` is signalled
-// when the device has run them and all earlier submissions. Device loss is stored in the device.
-bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
-                       const struct vkb_semaphores *semaphores, VkFence fence,
-                       struct vkb_error *error);
-// Fails like a wait that was interrupted if a signal's handler says so.
-bool vkb_device_go_on(const struct vkb_device *device, struct vkb_error *error);
+// Submits the recorded commands. The unsignalled `fence` is signalled when the device has run them
+// and all earlier submissions. With `rendered`, which is signalled, too, the commands wait for
+// `available` before VKB_ACCESS_ACQUIRED. Device loss is stored in the device.
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkSemaphore available,
+                       VkSemaphore rendered, VkFence fence, struct vkb_error *error);
 // Waits for the fence and resets it. If the wait takes longer than `frames` frames may take, the
 // device counts as lost. Device loss is stored in the device. After a failure the device may still
 // be busy.

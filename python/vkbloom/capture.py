@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from vkbloom import _core
 
@@ -22,27 +22,22 @@ _HOW: Final = (
 )
 
 
-class _Api:
-    """The functions of RenderDoc."""
+def _functions() -> Callable[..., int]:
+    """Return what calls the function of RenderDoc at an index with arguments of ctypes."""
+    table = ctypes.POINTER(ctypes.c_void_p)()
+    try:
+        # Only Linux has the library by this name.
+        library = ctypes.CDLL("librenderdoc.so", mode=getattr(os, "RTLD_NOLOAD", 0))
+    except OSError:
+        raise _core.Error(_HOW) from None
+    if library.RENDERDOC_GetAPI(_VERSION, ctypes.byref(table)) != 1:
+        raise _core.Error("RenderDoc is older than 1.0")
 
-    def __init__(self) -> None:
-        loaded = getattr(os, "RTLD_NOLOAD", None)
-        try:
-            if loaded is None:
-                raise OSError
-            library = ctypes.CDLL("librenderdoc.so", mode=loaded | os.RTLD_NOW)
-        except OSError:
-            raise _core.Error(_HOW) from None
-        table = ctypes.POINTER(ctypes.c_void_p)()
-        if library.RENDERDOC_GetAPI(_VERSION, ctypes.byref(table)) != 1:
-            raise _core.Error("RenderDoc is older than 1.0")
-        self._table = table
+    def call(index: int, *arguments: Any) -> int:
+        function: Any = ctypes.CFUNCTYPE(ctypes.c_uint32, *map(type, arguments))
+        return int(function(table[index])(*arguments))
 
-    def __call__(self, index: int, *arguments: object) -> int:
-        address = self._table[index]
-        assert address is not None
-        result: int = ctypes.CFUNCTYPE(ctypes.c_uint32, *map(type, arguments))(address)(*arguments)
-        return result
+    return call
 
 
 @contextmanager
@@ -60,32 +55,27 @@ def capture(instance: int, path: str | os.PathLike[str]) -> Iterator[None]:
     Error
         As `Renderer.capture`.
     """
-    call = _Api()
+    call = _functions()
     target = Path(path)
     # A device is known by the dispatch table to which its instance points.
-    device = ctypes.c_void_p.from_address(instance)
+    device, null = ctypes.c_void_p.from_address(instance), ctypes.c_void_p(None)
     call(_SET_TEMPLATE, ctypes.c_char_p(os.fsencode(target.with_suffix("").absolute())))
-    call(_START, device, ctypes.c_void_p(None))
+    call(_START, device, null)
     done = False
     try:
         yield
         done = True
     finally:
         # (RenderDoc 1.24 crashes where a capture is discarded.)
-        written = _ended(call, device)
-        if written and not done:
-            written.unlink()
-    if not written:
+        captured = call(_END, device, null) == 1
+        if captured:
+            name = ctypes.create_string_buffer(4096)
+            last = ctypes.c_uint32(call(_COUNT) - 1)
+            call(_GET, last, ctypes.cast(name, ctypes.c_char_p), null, null)
+            file = Path(os.fsdecode(name.value))
+            if done:
+                file.replace(target)
+            else:
+                file.unlink()
+    if not captured:
         raise _core.Error(f"RenderDoc made no capture. {_HOW}")
-    written.replace(target)
-
-
-def _ended(call: _Api, device: ctypes.c_void_p) -> Path | None:
-    """End the capture; return its file, or None if it failed."""
-    if call(_END, device, ctypes.c_void_p(None)) != 1:
-        return None
-    name = ctypes.create_string_buffer(4096)
-    none = ctypes.c_void_p(None)
-    last = ctypes.c_uint32(call(_COUNT) - 1)
-    call(_GET, last, ctypes.cast(name, ctypes.c_char_p), none, none)
-    return Path(os.fsdecode(name.value))

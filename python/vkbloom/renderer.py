@@ -271,8 +271,6 @@ class Renderer:
         """
         from vkbloom.capture import capture  # noqa: PLC0415  rarely used
 
-        if self.closed:
-            raise ValueError("the renderer is closed")
         return capture(self._core.instance, path)
 
     def __reduce__(self) -> NoReturn:

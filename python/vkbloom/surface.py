@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final, Literal, NoReturn, cast
+from typing import TYPE_CHECKING, Any, Final, Self, cast
 
 from vkbloom import _core
-from vkbloom.checks import check_attachments, check_size, import_extra
+from vkbloom.checks import check_size, import_extra
 from vkbloom.settings import check_settings
 from vkbloom.sources import image_source, is_image, scene_source
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from types import TracebackType
-
     from numpy.typing import NDArray
 
     from vkbloom.image import Image
@@ -28,12 +25,13 @@ _FRAMES_IN_FLIGHT: Final = 2
 
 
 def _window_surface(renderer: Renderer, window: object) -> int:
-    """Return the VkSurfaceKHR of a window of glfw."""
+    """Return the VkSurfaceKHR of a window of glfw, which is a pointer."""
     glfw = import_extra("glfw", "window", "a window")
+    if not isinstance(window, ctypes._Pointer):
+        raise TypeError(f"window: {window!r} is not a glfw window or None")
     if renderer.info.bundled:
         raise _core.Error(
-            "the bundled driver does not support windows; use the system's with "
-            "VKBLOOM_DRIVER=system"
+            "the bundled driver has no windows; use the system's with VKBLOOM_DRIVER=system"
         )
     handle = ctypes.c_uint64()
     result = glfw.create_window_surface(renderer._core.instance, window, None, ctypes.byref(handle))
@@ -45,10 +43,11 @@ def _window_surface(renderer: Renderer, window: object) -> int:
     return handle.value
 
 
-def _is_the_scene(settings: Settings) -> bool:
-    """Return whether a scene's `final` would be a copy of `scene`, for which a pass would run."""
-    shown = settings.tonemap, settings.encoding, settings.exposure, settings.dither
-    return not settings.bloom and shown == ("none", "none", 0.0, False)
+def _copied(source: object, settings: Settings, attachment: str) -> str:
+    """Return what to copy: `scene`, where a scene's `final` would equal it, costs no pass."""
+    values = settings.tonemap, settings.encoding, settings.exposure, settings.dither
+    equal = not settings.bloom and values == ("none", "none", 0.0, False)
+    return "scene" if attachment == "final" and equal and not is_image(source) else attachment
 
 
 class Surface:
@@ -57,28 +56,24 @@ class Surface:
     Parameters
     ----------
     renderer : Renderer
-    window : window of glfw, callable or None
-        A window of PyPI's ``glfw``, created with the hint CLIENT_API = NO_API; a function that
-        makes a VkSurfaceKHR for a VkInstance, both as integers; or None: a display without a
-        window, by VK_EXT_headless_surface, which Mesa's lavapipe 25 has.
-    size : (int, int), optional
-        Width and height in pixels without a window of glfw, by default (1280, 720). A surface
-        that has a size of its own keeps that.
-    mode : {"fifo", "mailbox"}
-        When an image replaces the one before: at the next refresh of the screen, in order; at the
-        next refresh, the newest only. Every surface has "fifo".
+    window : window of glfw or None
+        A window of PyPI's ``glfw``, created with the hint CLIENT_API = NO_API; or None: a display
+        without a window, by VK_EXT_headless_surface, which Mesa's lavapipe 25 has.
+    size : (int, int)
+        Width and height in pixels without a window. A window has its own.
+    mailbox : bool
+        False: each refresh of the screen shows the next image (FIFO); True: it shows the newest
+        one (MAILBOX), which not every surface has.
 
     Attributes
     ----------
     size : (int, int)
         Width and height in pixels; (0, 0) while a window is minimized.
-    timings : dict of str to float
-        Seconds of the passes that ran for the frame before the last two, as of `Frames.timings`.
 
     Raises
     ------
     ValueError
-        The surface lacks the mode, or the renderer is closed.
+        The surface has no MAILBOX, the size is out of range, or the renderer is closed.
     TypeError
         An argument has the wrong type.
     Error
@@ -121,47 +116,25 @@ class Surface:
     def __init__(
         self,
         renderer: Renderer,
-        window: object = None,
+        window: Any = None,
         *,
-        size: tuple[int, int] | None = None,
-        mode: Literal["fifo", "mailbox"] = "fifo",
+        size: tuple[int, int] = (1280, 720),
+        mailbox: bool = False,
     ) -> None:
-        if renderer.closed:
-            raise ValueError("renderer: it is closed")
-        if mode not in ("fifo", "mailbox"):
-            raise ValueError(f'mode: {mode!r} is not "fifo" or "mailbox"')
-        self._renderer = renderer
+        self._size = check_size("size", size)
+        handle = 0 if window is None else _window_surface(renderer, window)
+        self._renderer, self._window = renderer, window
+        self._screen = renderer._core.open_screen(handle, mailbox)
         self._pending: deque[_core.Submission] = deque()
-        self._size = check_size("size", (1280, 720) if size is None else size)
-        # A window of glfw is a pointer.
-        self._window = window if isinstance(window, ctypes._Pointer) else None
-        handle = 0
-        if self._window is not None:
-            if size is not None:
-                raise ValueError("size: a window determines its size; leave the argument out")
-            handle = _window_surface(renderer, window)
-        elif callable(window):
-            handle = int(cast("Callable[[int], int]", window)(renderer._core.instance))
-        elif window is not None:
-            raise TypeError(f"window: {window!r} is not a glfw window, a function or None")
-        self._core = renderer._core.screen(handle, mode == "mailbox")
-        self.timings: dict[str, float] = {}
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height in pixels; may be set where it is no window of glfw."""
+        """Width and height in pixels; (0, 0) while a window is minimized on some systems."""
         if self._window is None:
             return self._size
         import glfw  # noqa: PLC0415  an extra
 
-        width, height = glfw.get_framebuffer_size(self._window)
-        return width, height
-
-    @size.setter
-    def size(self, size: tuple[int, int]) -> None:
-        if self._window is not None:
-            raise ValueError("size: a window determines its size; resize the window")
-        self._size = check_size("size", size)
+        return glfw.get_framebuffer_size(self._window)
 
     def present(
         self,
@@ -221,28 +194,25 @@ class Surface:
         ...     return [surface.present(scene, settings, time=step / 90) for step in range(90)]
         """
         settings = check_settings(settings)
-        names = check_attachments(attachment)
-        if names is None or len(names) != 1:
-            raise ValueError(f"attachment: {attachment!r} is not the name of one framebuffer")
         width, height = self.size
         if min(width, height) < 1:
             return False
         if is_image(source):
             given = image_source(source)
         else:
-            frame = (width, height) if size is None else size
-            if attachment == "final" and _is_the_scene(settings):
-                names = ("scene",)
-            given = scene_source(cast("Scene", source), frame, shading, time)
+            given = scene_source(cast("Scene", source), size or (width, height), shading, time)
         core = self._renderer._core
-        plan = core.plan(given, settings, names)
-        ((_, _, dtype),) = plan.outputs
+        plan = core.plan(given, settings, (_copied(source, settings, attachment),))
+        ((_, shape, dtype),) = plan.outputs
+        if len(shape) != 3:
+            raise ValueError(f"attachment: {attachment!r} has no colours to show")
         linear = dtype != "uint8" and not (attachment == "final" and settings.encoding != "none")
         if len(self._pending) == _FRAMES_IN_FLIGHT:
-            ((self.timings,), _) = self._pending.popleft().wait()
-        submission, shown = core.show(given, plan, self._core, width, height, linear)
-        self._pending.append(submission)
-        return shown
+            self._pending.popleft().wait()
+        submission = core.show(given, plan, self._screen, width, height, linear)
+        if submission:
+            self._pending.append(submission)
+        return submission is not None
 
     def close(self) -> None:
         """Wait for the device and give the surface back; may be called twice.
@@ -263,18 +233,11 @@ class Surface:
         ...     surface.close()
         """
         self._pending.clear()
-        self._core.close()
+        self._renderer._core.close_screen(self._screen)
+        self._screen = 0
 
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("a Surface cannot be copied or pickled; create another one")
-
-    def __enter__(self) -> Surface:
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self.close()

@@ -1,14 +1,11 @@
-// Defines the filter of an image along one axis. Each filter is a product of two such filters: all
-// variants of a pass first filter along rows, then the results along columns. Define before each
-// inclusion:
+// Defines the filter of an image along one axis, for passes that filter along one of the two. Define
+// before each inclusion:
 //
 //   AXIS_FILTER        the name of the filter
 //   AXIS_IMAGE         the parameter by which it takes the image
 //   AXIS_TEXEL(at)     the texel at a position along the axis, of the line `line`
 //
-// Drivers inline each call. With a branch for each kind of filter, a filter along columns of a filter
-// along rows had 484 reads, and some drivers took a second to compile it; with branches for the second
-// and third pair of texels it has 36. A loop over pairs is smaller, but lavapipe runs it more slowly.
+// Without a loop over the pairs, which lavapipe runs more slowly.
 
 #define AXIS_SUM(pair) \
     (pair.weights.x * AXIS_TEXEL(pair.texel) + pair.weights.y * AXIS_TEXEL(pair.texel + 1))

@@ -1,5 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // Upsampling of dual Kawase: four axial taps at a distance of one texel of the smaller level times
 // the offset, and four diagonal taps at half that distance with twice the weight (source:
 // kawase_down.frag).

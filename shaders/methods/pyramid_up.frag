@@ -1,5 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // Upsampling in the pyramid: adds the share of the level itself and that of the upsampled smaller
 // level.
 #include "lib/block.glsl"

@@ -1,82 +1,167 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The complete bloom of an image for devices without fast shared memory. An invocation writes a
-// strip from top to bottom and keeps the vertical sums of the following rows in registers.
+#if CHANNEL_BYTES == 4 && !defined TARGET_CHANNELS
+#define STORES_HALVES
+#extension GL_ARB_gpu_shader_int64 : require
+#endif
+// The complete bloom of an image for devices without fast shared memory. An invocation writes some
+// rows from left to right, one word of each at a time: it adds up the columns of the word, keeps the
+// sums of the last columns in registers, and adds them up along the rows.
 #include "variants/fused_bloom.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = STRIP_COLUMNS(CHANNEL_BYTES);
-const int SUMS = 2 * STRIP_RADIUS;
-const int LOADED = COLUMNS + 2 * STRIP_RADIUS;
+const int COLUMNS = 4 / CHANNEL_BYTES, WORD_SHIFT = COLUMNS >> 1;  // of a word; its logarithm
+const int ROWS = STRIP_ROWS(CHANNEL_BYTES), LOADED = ROWS + 2 * STRIP_RADIUS;
+const int KEPT = 2 * STRIP_RADIUS;
+const int WAITING = STRIP_RADIUS / COLUMNS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, image);
 WRITE_IMAGE(2);
-
-#define LOAD load_wide
-#define LOAD_IMAGE image
-#define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM -STRIP_RADIUS
-#define LOAD_COUNT LOADED
-#include "variants/load.glsl"
-
-#define LOAD load_own
-#define LOAD_IMAGE image
-#define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
-#include "variants/load.glsl"
+// Where a step has three quarters of a word, and where a word has one pixel.
+layout(set = 0, binding = 2, std430) writeonly buffer Quarters { uint quarters[]; } target_quarters;
+#ifdef STORES_HALVES
+layout(set = 0, binding = 2, std430) writeonly buffer Halves { u64vec2 halves[]; } target_halves;
+#endif
 
 #define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
+
+int rows[LOADED];
+float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
+// Of each row: the vertical sums of the last columns, and their words that are not finished yet.
+vec3 kept[ROWS][KEPT];
+uvec4 waiting[ROWS][WAITING + 1];
+
+void start_row_sums(ivec2 first, ivec2 size)
+{
+    [[unroll]] for (int i = 0; i <= STRIP_RADIUS; ++i) {
+        weights[i] = vertical_weight(i);
+        row_weights[i] = horizontal_weight(i);
+    }
+    [[unroll]] for (int i = 0; i < LOADED; ++i)
+        rows[i] = clamp(first.y - STRIP_RADIUS + i, 0, size.y - 1) * read_shapes[0].z;
+    [[unroll]] for (int row = 0; row < ROWS; ++row) {
+        [[unroll]] for (int i = 0; i < KEPT; ++i)
+            kept[row][i] = vec3(0.0);
+        [[unroll]] for (int i = 0; i < WAITING; ++i)
+            waiting[row][i] = uvec4(0);
+    }
+}
+
+void pixels_of(uvec4 word, out uvec4 raw[COLUMNS])
+{
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+#if CHANNEL_BYTES == 4
+        raw[i] = word;
+#elif CHANNEL_BYTES == 2
+        raw[i] = uvec4(word[2 * i], word[2 * i + 1], 0, 0);
+#else
+        raw[i] = uvec4(word[i], 0, 0, 0);
+#endif
+}
+
+// Sums of columns of the word `at` for all rows.
+void add_columns(int at, out vec3 sums[ROWS][COLUMNS])
+{
+    [[unroll]] for (int loaded = 0; loaded < LOADED; ++loaded) {
+        uvec4 raw[COLUMNS], word = texelFetch(image, rows[loaded] + at);
+        pixels_of(word, raw);
+        if (loaded >= STRIP_RADIUS && loaded < ROWS + STRIP_RADIUS)
+            waiting[loaded - STRIP_RADIUS][WAITING] = word;
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+            vec3 added = thresholded(value_of(raw[i]).rgb);
+            // (A loop over the rows of this tap alone has no constant ends, so it is not unrolled.)
+            [[unroll]] for (int row = 0; row < ROWS; ++row)
+                if (row == loaded)
+                    sums[row][i] = weights[STRIP_RADIUS] * added;
+                else if (row < loaded && loaded <= row + 2 * STRIP_RADIUS)
+                    sums[row][i] += weights[abs(STRIP_RADIUS - (loaded - row))] * added;
+        }
+    }
+    [[unroll]] for (int row = 0; row < ROWS; ++row)
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            sums[row][i] = as_stored(sums[row][i], FORMAT);
+}
+
+// Replaces sums outside of the image by those of its outermost columns: of pixels from x on, which
+// are in the word `at` or beyond it.
+void repeat_edges(int x, int at, int width, inout vec3 sums[ROWS][COLUMNS])
+{
+    [[unroll]] for (int row = 0; row < ROWS; ++row) {
+        [[unroll]] for (int i = 1; i < COLUMNS; ++i)
+            sums[row][i] = at * COLUMNS + i >= width ? sums[row][i - 1] : sums[row][i];
+        [[unroll]] for (int i = 0; i < COLUMNS - 1; ++i)
+            sums[row][i] = x > at * COLUMNS ? sums[row][COLUMNS - 1] : sums[row][i];
+        [[unroll]] for (int i = 1; i < COLUMNS; ++i)
+            sums[row][i] = x < 0 ? sums[row][0] : sums[row][i];
+    }
+}
+
+// The finished pixels from `first` on, and the sums and words moved on.
+void finish_row(int row, ivec2 first, vec3 sums[COLUMNS], out uvec4 raw[COLUMNS])
+{
+    vec3 line[KEPT + COLUMNS];
+
+    [[unroll]] for (int i = 0; i < KEPT; ++i)
+        line[i] = kept[row][i];
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        line[KEPT + i] = sums[i];
+    [[unroll]] for (int i = 0; i < KEPT; ++i)
+        kept[row][i] = line[i + COLUMNS];
+    pixels_of(waiting[row][0], raw);
+    [[unroll]] for (int i = 0; i < WAITING; ++i)
+        waiting[row][i] = waiting[row][i + 1];
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        vec3 sum = vec3(0.0);
+        [[unroll]] for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
+            sum += row_weights[abs(tap)] * line[i + STRIP_RADIUS + tap];
+        vec4 bloom = vec4(as_stored(sum, FORMAT), 1.0);
+        raw[i] = finished(raw[i], finish(value_of(raw[i]), bloom, first + ivec2(i, 0)));
+    }
+}
+
+void store_step(ivec2 first, uvec4 raw[COLUMNS])
+{
+#if TARGET_CHANNELS == 3
+    int start = 4 * (first.y - target_shape.w) * target_shape.z + 3 * (first.x >> WORD_SHIFT);
+    [[unroll]] for (int i = 0; i < 3; ++i)
+        target_quarters.quarters[start + i] = max(quarter_of(raw, i), unknown_zero);
+#elif defined STORES_HALVES
+    // llvmpipe stores one integer after the other: two take less time than four.
+    uvec4 word = max(raw[0], uvec4(unknown_zero));
+    target_halves.halves[(first.y - target_shape.w) * target_shape.z + first.x] =
+        u64vec2(packUint2x32(word.xy), packUint2x32(word.zw));
+#else
+    store(first.x, first.y, raw);
+#endif
+}
 
 void main()
 {
     read_words();
     ivec2 size = READ_SIZE(image, 1);
-    ivec2 first = first_pixel(ivec2(COLUMNS, STRIP_ROWS));
-    int end = min(first.y + STRIP_ROWS, size.y);
-    vec3 sums[SUMS][LOADED];
-    vec3 line[LOADED];
-    uvec4 raw[LOADED], own[COLUMNS];
-    float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
+    ivec2 first = first_pixel(ivec2(params.columns, ROWS));
+    int end = min(first.x + params.columns, size.x), last = (size.x - 1) >> WORD_SHIFT;
 
     if (any(greaterThanEqual(first, size)))
         return;
-    [[unroll]] for (int i = 0; i <= STRIP_RADIUS; ++i) {
-        weights[i] = vertical_weight(i);
-        row_weights[i] = horizontal_weight(i);
-    }
-    [[unroll]] for (int row = 0; row < SUMS; ++row)
-        [[unroll]] for (int i = 0; i < LOADED; ++i)
-            sums[row][i] = vec3(0.0);
-    // All other loops are unrolled; otherwise the sums would be in memory.
-    for (int y = first.y - STRIP_RADIUS; y < end + STRIP_RADIUS; ++y) {
-        load_wide(first.x, clamp(y, 0, size.y - 1), raw);
-        [[unroll]] for (int i = 0; i < LOADED; ++i)
-            line[i] = thresholded(value_of(raw[i]).rgb);
-        [[unroll]] for (int i = 0; i < LOADED; ++i) {
-            vec3 added = line[i];
-            // Completes the current row and moves the sums of the following rows by one place.
-            line[i] = as_stored(sums[0][i] + weights[STRIP_RADIUS] * added, FORMAT);
-            [[unroll]] for (int tap = 1; tap < SUMS; ++tap)
-                sums[tap - 1][i] = sums[tap][i] + weights[abs(STRIP_RADIUS - tap)] * added;
-            sums[SUMS - 1][i] = weights[STRIP_RADIUS] * added;
-        }
-        if (y < first.y + STRIP_RADIUS)
+    start_row_sums(first, size);
+    for (int x = first.x - STRIP_RADIUS; x < end + STRIP_RADIUS; x += COLUMNS) {
+        vec3 sums[ROWS][COLUMNS];
+        uvec4 raw[ROWS][COLUMNS];
+        int at = clamp(x >> WORD_SHIFT, 0, last);
+        ivec2 done = ivec2(x - STRIP_RADIUS, first.y);
+        add_columns(at, sums);
+        repeat_edges(x, at, size.x, sums);
+        // All before the first store, after which compilers load parameters lane by lane.
+        [[unroll]] for (int row = 0; row < ROWS; ++row)
+            finish_row(row, done + ivec2(0, row), sums[row], raw[row]);
+        if (done.x < first.x)
             continue;
-        load_own(first.x, y - STRIP_RADIUS, own);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            ivec2 pixel = ivec2(first.x + i, y - STRIP_RADIUS);
-            vec3 sum = vec3(0.0);
-            [[unroll]] for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
-                sum += row_weights[abs(tap)] * line[i + STRIP_RADIUS + tap];
-            vec4 bloom = vec4(as_stored(sum, FORMAT), 1.0);
-            own[i] = finished(own[i], finish(value_of(own[i]), bloom, pixel));
-        }
-        store(first.x, y - STRIP_RADIUS, own);
+        [[unroll]] for (int row = 0; row < ROWS; ++row)
+            if (done.y + row < size.y)
+                store_step(done + ivec2(0, row), raw[row]);
     }
 }

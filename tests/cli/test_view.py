@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -75,7 +74,7 @@ def test_time_passes_unless_it_is_paused() -> None:
     assert live.time == 0.25
     pressed(live, "space").advance(2.0)
     assert live.time == 0.25
-    assert "paused" in live.title(0.0)
+    assert "paused" in live.title(0.02)
     pressed(live, "space").advance(7.0)
     assert live.time == 0.125
 
@@ -84,19 +83,14 @@ def test_the_mouse_moves_the_camera_of_a_scene(scene: Scene) -> None:
     live = Live(Separable(), scene)
     live.drag(10, 5)
     live.scroll(1)
-    assert live.scene is not None
-    assert live.scene.camera == Camera(position=(0, 0, -9.225), rotation=(5.5, -339.0, 0.0))
-    for still in (Live(Separable(), None),):
-        still.drag(10, 5)
-        still.scroll(1)
-        assert still.scene is None
+    assert live.source.camera == Camera(position=(0, 0, -9.225), rotation=(5.5, -339.0, 0.0))
 
 
 def test_the_title_has_the_values() -> None:
     assert Live(Separable(), None).title(0.02) == (
         "final: separable | blur_scale 1 | blur_strength 1.5 | 20.0 ms, 50 frames/s"
     )
-    assert "no bloom" in Live(Separable(bloom=False), None).title(0.0)
+    assert "no bloom" in Live(Separable(bloom=False), None).title(0.02)
 
 
 def view(*arguments: str, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
@@ -112,12 +106,12 @@ def test_a_window_is_controlled_by_keys(display: dict[str, str], tmp_path: Path)
     options = ("--size", "64x36", "--validation", "-o", out)
     done = view("tests.cli.keys", keys, *options, env=display)
     assert done.returncode == 0, done.stderr
-    names = sorted(path.name for path in (tmp_path / "out" / "0001").iterdir())
+    (folder,) = (tmp_path / "out").iterdir()
+    names = sorted(path.name for path in folder.iterdir())
     assert {"final.png", "scene.png", "depth.exr"} <= set(names)
-    picture = str(tmp_path / "out" / "0001" / "final.png")
-    done = view("vkbloom.cli", "view", picture, "--frames", "3", env=display)
+    picture = str(folder / "final.png")
+    done = view("tests.cli.keys", "2,SPACE,ESCAPE", picture, "--mailbox", env=display)
     assert done.returncode == 0, done.stderr
-    assert re.search(r"3 frames: \d+\.\d frames a second after the first one", done.stdout)
 
 
 def test_without_a_display_it_says_so() -> None:

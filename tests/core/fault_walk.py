@@ -121,13 +121,13 @@ def handles(renderer: Renderer) -> Arrays:
 
 
 def presented(renderer: Renderer) -> Arrays:
-    """Frames on two surfaces, of which one changes its size and is left to the renderer."""
+    """Frames on two surfaces; one changes its size, and is left to the renderer."""
     shown = []
     with vkbloom.Surface(renderer, size=SIZE) as closed:
         shown += [closed.present(UFO, time=step / 9) for step in range(3)]
     left = vkbloom.Surface(renderer, size=SIZE)
     shown += [left.present(UFO, size=(16, 16)) for _ in range(2)]
-    left.size = (32, 16)
+    left._size = (32, 16)
     shown += [left.present(UFO) for _ in range(4)]
     return {"shown": np.array(shown), "final": renderer.render(UFO, size=SIZE)["final"]}
 

@@ -19,6 +19,7 @@
     FUNCTION(vkGetPhysicalDeviceQueueFamilyProperties2) \
     FUNCTION(vkGetPhysicalDeviceMemoryProperties) \
     FUNCTION(vkGetPhysicalDeviceMemoryProperties2) \
+    FUNCTION(vkGetPhysicalDeviceSurfaceCapabilitiesKHR) \
     FUNCTION(vkEnumerateDeviceExtensionProperties)
 
 #define DEVICE_FUNCTIONS(FUNCTION) \
@@ -27,6 +28,7 @@
     FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
     FUNCTION(vkAllocateMemory) \
     FUNCTION(vkWaitForFences) \
+    FUNCTION(vkAcquireNextImageKHR) \
     FUNCTION(vkQueuePresentKHR) \
     FUNCTION(vkQueueWaitIdle) \
     FUNCTION(vkDestroySemaphore)
@@ -326,13 +328,42 @@ static void object(const char *text)
 static struct {
     VkSemaphore semaphores[256];
     uint32_t count;
+    bool suboptimal;  // the swapchain should be renewed, which begins with a look at the surface
 } presented;
 
 static VKAPI_ATTR VkResult VKAPI_CALL present(VkQueue queue, const VkPresentInfoKHR *info)
 {
     for (uint32_t i = 0; i < info->waitSemaphoreCount; ++i)
         presented.semaphores[presented.count++ % 256] = info->pWaitSemaphores[i];
-    return below.vkQueuePresentKHR(queue, info);
+    const VkResult result = below.vkQueuePresentKHR(queue, info);
+    presented.suboptimal = result == VK_SUCCESS && lacks("fit");
+    return presented.suboptimal ? VK_SUBOPTIMAL_KHR : result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL acquire(VkDevice handle, VkSwapchainKHR swapchain,
+                                              uint64_t timeout, VkSemaphore semaphore,
+                                              VkFence fence, uint32_t *index)
+{
+    if (presented.suboptimal)
+        object("a suboptimal swapchain is used again");
+    if (lacks("date"))
+        return VK_ERROR_OUT_OF_DATE_KHR;
+    return below.vkAcquireNextImageKHR(handle, swapchain, timeout, semaphore, fence, index);
+}
+
+// As of a minimized window: some systems say that it has no area, or only its title.
+static VKAPI_ATTR VkResult VKAPI_CALL get_surface(VkPhysicalDevice physical, VkSurfaceKHR surface,
+                                                  VkSurfaceCapabilitiesKHR *capabilities)
+{
+    const VkResult result =
+        below.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(physical, surface, capabilities);
+
+    presented.suboptimal = false;
+    if (lacks("area"))
+        capabilities->currentExtent = (VkExtent2D){0, 0};
+    if (lacks("height"))
+        capabilities->currentExtent.height = 0;
+    return result;
 }
 
 static VKAPI_ATTR VkResult VKAPI_CALL wait_idle(VkQueue queue)
@@ -441,6 +472,7 @@ static const struct entry {
     ENTRY(vkGetPhysicalDeviceMemoryProperties, get_memory, false),
     ENTRY(vkGetPhysicalDeviceMemoryProperties2, get_memory2, false),
     ENTRY(vkGetPhysicalDeviceMemoryProperties2KHR, get_memory2, false),
+    ENTRY(vkGetPhysicalDeviceSurfaceCapabilitiesKHR, get_surface, false),
     ENTRY(vkEnumerateDeviceExtensionProperties, get_extensions, false),
     ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
     ENTRY(vkGetBufferMemoryRequirements, get_buffer_requirements, true),
@@ -448,6 +480,7 @@ static const struct entry {
     ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
     ENTRY(vkAllocateMemory, allocate, true),
     ENTRY(vkWaitForFences, wait, true),
+    ENTRY(vkAcquireNextImageKHR, acquire, true),
     ENTRY(vkQueuePresentKHR, present, true),
     ENTRY(vkQueueWaitIdle, wait_idle, true),
     ENTRY(vkDestroySemaphore, destroy_semaphore, true),

@@ -30,6 +30,8 @@ SETTINGS = {
 
 #: From this size on, images are read back without staging memory, if the device supports it.
 LARGE = (600, 500)
+#: The same with three channels: the last pass stores words of three channels.
+LARGE_RGB = (704, 500)
 
 
 def use_handles(renderer: Renderer) -> None:
@@ -63,6 +65,10 @@ def try_all(renderer: Renderer) -> dict[str, str]:
         alone = renderer.apply(image, last, attachments=("final",))["final"]
         np.testing.assert_array_equal(alone, renderer.apply(image, last)["final"])
 
+    def apply_alone(image: Any, settings: vkbloom.Settings) -> None:
+        alone = renderer.apply(image, settings, attachments=("final",))["final"]
+        np.testing.assert_array_equal(alone, renderer.apply(image, settings)["final"])
+
     scene = Scene.ufo()
     for name, settings in SETTINGS.items():
         for dtype in DTYPES:
@@ -74,8 +80,8 @@ def try_all(renderer: Renderer) -> dict[str, str]:
                 lambda: renderer.render(scene, settings, (40, 30), shading=shading),  # noqa: B023
             )
     attempt("handles", lambda: use_handles(renderer))
-    large = picture(*LARGE, 4, "uint8")
-    attempt("large", lambda: apply(large, Separable()))
+    attempt("large", lambda: apply(picture(*LARGE, 4, "uint8"), Separable()))
+    attempt("large RGB", lambda: apply_alone(picture(*LARGE_RGB, 3, "uint8"), Separable()))
     for dtype in DTYPES:
         sky = skybox.load(picture(4, 24, 4, dtype).reshape(6, 4, 4, 4))
         with_sky = dataclasses.replace(scene, skybox=sky)

@@ -1,12 +1,13 @@
-"""What a process does that opens windows: ``python -m tests.core.windows``.
+"""What a process does that opens windows: ``python -m tests.core.windows [managed]``.
 
 Of its own, since an instance that was made without a display has no windows. The window lies at the
-upper left of a screen that has no window manager.
+upper left of a screen that has no window manager, or with ``managed`` one that adds nothing.
 """
 
 from __future__ import annotations
 
 import random
+import sys
 import time
 from typing import Any
 
@@ -61,12 +62,11 @@ def difference(expected: NDArray[np.uint8], most: int = 0) -> int:
 def pixels(renderer: Renderer) -> None:
     """Every framebuffer that has colours, in every mode that there is."""
     window = open_window()
-    modes: tuple[Any, ...] = ("fifo", "mailbox")
-    for mode in modes:
-        with Surface(renderer, window, mode=mode) as surface:
+    for mailbox in (False, True):
+        with Surface(renderer, window, mailbox=mailbox) as surface:
             for step in range(4):
                 assert surface.present(UFO, time=step / 4)
-            assert difference(renderer.render(UFO, size=SIZE, time=0.75)["final"]) == 0, mode
+            assert difference(renderer.render(UFO, size=SIZE, time=0.75)["final"]) == 0, mailbox
     with Surface(renderer, window) as surface:
         for name in ("brightness", "scene", "albedo"):
             assert surface.present(UFO, shading="deferred", attachment=name)
@@ -123,6 +123,43 @@ def resized(renderer: Renderer) -> None:
         assert difference(renderer.render(UFO, size=SIZE, time=0.5)["final"]) == 0
 
 
+def minimize(window: Any, minimized: bool) -> None:
+    """Ask until it is done: the manager may have begun after this process."""
+    for _ in range(500):
+        (glfw.iconify_window if minimized else glfw.restore_window)(window)
+        glfw.wait_events_timeout(0.01)
+        if bool(glfw.get_window_attrib(window, glfw.ICONIFIED)) is minimized:
+            return
+    raise AssertionError(f"minimized is not {minimized}")
+
+
+def minimized(renderer: Renderer) -> None:
+    """Minimized and restored while frames are in flight; frames meanwhile; closed so.
+
+    A window manager has to do it.
+    """
+    window = open_window()
+    for _ in range(3):
+        with Surface(renderer, window) as surface:
+            for step in range(3):
+                surface.present(UFO, time=step / 3)
+            glfw.iconify_window(window)
+            for step in range(3):
+                surface.present(UFO, time=step / 4)
+            minimize(window, True)
+            for step in range(3):
+                surface.present(UFO, time=step / 5)
+            glfw.restore_window(window)
+            surface.present(UFO)
+            minimize(window, False)
+            assert surface.present(UFO, time=0.5)
+            assert difference(renderer.render(UFO, size=SIZE, time=0.5)["final"]) == 0
+            surface.present(UFO)
+            minimize(window, True)
+            surface.present(UFO)
+        minimize(window, False)
+
+
 def closed_while_busy(renderer: Renderer) -> None:
     """The surface, then the renderer with a surface; each after frames that nobody waited for."""
     window = open_window()
@@ -151,8 +188,9 @@ def two_windows(renderer: Renderer) -> None:
 
 
 def main() -> None:
+    alone = (pixels, resized, closed_while_busy, two_windows)
     with Renderer("software", validation=True) as renderer:
-        for work in (pixels, resized, closed_while_busy, two_windows):
+        for work in (minimized,) if sys.argv[1:] == ["managed"] else alone:
             work(renderer)
             while WINDOWS:
                 glfw.destroy_window(WINDOWS.pop())

@@ -297,7 +297,7 @@ static bool submit(struct job *job)
     const bool open = renderer->open;
     if (open
         && !vkb_frame_submit(&renderer->device, &renderer->frame, &source, job->requests,
-                             job->count, &job->submission, &error))
+                             job->count, NULL, &job->submission, &error))
         die("submit", &error);
     leave(renderer);
     return open;

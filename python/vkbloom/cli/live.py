@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 import vkbloom
-from vkbloom.fields import field_range
-from vkbloom.settings import Settings, methods
+from vkbloom.settings import Settings, Shading, methods
 
 __all__ = ["HELP", "Live"]
 
@@ -16,8 +18,7 @@ B              bloom on, off
 Up, Down       scale of the blur, 0.1 to 2
 Left, Right    strength
 1 ... 9        the framebuffer that is shown
-M              the next method
-P              the next preset
+M, P           the next method, the next preset
 Space          pauses the animation
 drag, wheel    turn the scene, zoom
 S              writes all framebuffers to files
@@ -27,11 +28,16 @@ Q, Escape      close\
 # A key changes the first of these fields that the settings have.
 _SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "size")
 _STRENGTHS: Final = ("blur_strength", "intensity")
-_SCALE_RANGE: Final = (0.1, 2.0)
 _STEP: Final = 0.1
 _TURN_SECONDS: Final = 8.0
 _DEGREES: Final = 0.4  # rotation per pixel of mouse movement
 _ZOOM: Final = 0.9  # factor of the distance per step of the wheel
+
+
+def _after(value: object, values: Mapping[str, Any]) -> Any:
+    """Return the value after another one; the first one if there is none."""
+    found = list(values.values())
+    return found[(found.index(value) + 1) % len(found) if value in found else 0]
 
 
 @dataclasses.dataclass
@@ -41,8 +47,9 @@ class Live:
     Attributes
     ----------
     settings : Settings
-    scene : Scene or None
-        None: an image.
+    source : Scene or Image
+    shading : {"forward", "deferred"}
+        Of a scene.
     framebuffer : str
         Name of the framebuffer that is shown.
     time : float
@@ -53,7 +60,8 @@ class Live:
     """
 
     settings: Settings
-    scene: vkbloom.Scene | None
+    source: Any
+    shading: Shading = "forward"
     framebuffer: str = "final"
     time: float = 0.0
     paused: bool = False
@@ -68,20 +76,16 @@ class Live:
         if key == "b":
             self.settings = self.settings.replace(bloom=not self.settings.bloom)
         elif key in ("up", "down"):
-            self._step(_SCALES, _STEP if key == "up" else -_STEP, _SCALE_RANGE)
+            self._step(_SCALES, _STEP if key == "up" else -_STEP, 0.1, 2.0)
         elif key in ("right", "left"):
-            self._step(_STRENGTHS, _STEP if key == "right" else -_STEP)
+            self._step(_STRENGTHS, _STEP if key == "right" else -_STEP, 0.0, math.inf)
         elif key in "123456789" and int(key) <= len(names):
             self.framebuffer = names[int(key) - 1]
         elif key == "m":
-            classes = list(methods().values())
-            at = classes.index(type(self.settings))
             shown = {name: getattr(self.settings, name) for name in ("tonemap", "encoding")}
-            self.settings = classes[(at + 1) % len(classes)](**shown)
+            self.settings = _after(type(self.settings), methods())(**shown)
         elif key == "p":
-            presets = list(vkbloom.presets.values())
-            at = presets.index(self.settings) if self.settings in presets else -1
-            self.settings = presets[(at + 1) % len(presets)]
+            self.settings = _after(self.settings, vkbloom.presets)
         elif key == "space":
             self.paused = not self.paused
         elif key == "s":
@@ -89,33 +93,30 @@ class Live:
         elif key in ("q", "escape"):
             self.closed = True
 
-    def _step(
-        self, fields: tuple[str, ...], step: float, limits: tuple[float, float] | None = None
-    ) -> None:
-        for name in [name for name in fields if hasattr(self.settings, name)][:1]:
-            (field,) = (one for one in dataclasses.fields(self.settings) if one.name == name)
-            low, high = field_range(field)
-            if limits:
-                low, high = max(low, limits[0]), min(high, limits[1])
-            value = round(getattr(self.settings, name) + step, 4)
-            self.settings = self.settings.replace(**{name: min(max(value, low), high)})
+    def _step(self, names: tuple[str, ...], step: float, low: float, high: float) -> None:
+        """Change the value of the first of the names, no further than these."""
+        for name in self._of(names):
+            value = min(max(round(getattr(self.settings, name) + step, 4), low), high)
+            # The settings refuse what is beyond their range.
+            with contextlib.suppress(ValueError):
+                self.settings = self.settings.replace(**{name: value})
+
+    def _of(self, names: tuple[str, ...]) -> list[str]:
+        return [name for name in names if hasattr(self.settings, name)][:1]
 
     def drag(self, x: float, y: float) -> None:
         """Turn the scene by pixels of the mouse."""
-        if self.scene is not None:
-            about_x, about_y, about_z = self.scene.camera.rotation
-            self._see(rotation=(about_x - y * _DEGREES, about_y + x * _DEGREES, about_z))
+        about_x, about_y, about_z = self.source.camera.rotation
+        self._see(rotation=(about_x - y * _DEGREES, about_y + x * _DEGREES, about_z))
 
     def scroll(self, steps: float) -> None:
         """Move the camera towards the scene, or away from it."""
-        if self.scene is not None:
-            x, y, z = self.scene.camera.position
-            self._see(position=(x, y, z * _ZOOM**steps))
+        x, y, z = self.source.camera.position
+        self._see(position=(x, y, z * _ZOOM**steps))
 
     def _see(self, **changes: Any) -> None:
-        assert self.scene is not None
-        camera = dataclasses.replace(self.scene.camera, **changes)
-        self.scene = dataclasses.replace(self.scene, camera=camera)
+        camera = dataclasses.replace(self.source.camera, **changes)
+        self.source = dataclasses.replace(self.source, camera=camera)
 
     def advance(self, seconds: float) -> None:
         """Let time pass."""
@@ -124,16 +125,12 @@ class Live:
 
     def title(self, seconds: float) -> str:
         """Return the text of the title; `seconds` is the time of a frame."""
-        settings = self.settings
-        values = [
-            f"{name} {getattr(settings, name):g}"
-            for names in (_SCALES, _STRENGTHS)
-            for name in [one for one in names if hasattr(settings, one)][:1]
-        ]
+        names = [*self._of(_SCALES), *self._of(_STRENGTHS)] if self.settings.bloom else []
         parts = [
-            f"{self.framebuffer}: {settings.method}",
-            *(values if settings.bloom else ["no bloom"]),
+            f"{self.framebuffer}: {self.settings.method}",
+            *(f"{name} {getattr(self.settings, name):g}" for name in names),
+            *(["no bloom"] if not names else []),
             *(["paused"] if self.paused else []),
-            *([f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s"] if seconds else []),
+            f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s",
         ]
         return " | ".join(parts)
