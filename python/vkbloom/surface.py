@@ -134,7 +134,6 @@ class Surface:
             return self._size
         import glfw  # noqa: PLC0415  an extra
 
-        # Its type is known only where glfw is installed.
         size: tuple[int, int] = glfw.get_framebuffer_size(self._window)
         return size
 
