@@ -81,6 +81,8 @@ def try_all(renderer: Renderer) -> dict[str, str]:
             )
     attempt("handles", lambda: use_handles(renderer))
     attempt("large", lambda: apply(picture(*LARGE, 4, "uint8"), Separable()))
+    # A GPU gets its first rows while the others are packed.
+    attempt("bands", lambda: apply(picture(*LARGE, 4, "float32"), Separable()))
     attempt("large RGB", lambda: apply_alone(picture(*LARGE_RGB, 3, "uint8"), Separable()))
     for dtype in DTYPES:
         sky = skybox.load(picture(4, 24, 4, dtype).reshape(6, 4, 4, 4))
