@@ -176,7 +176,7 @@ def measure(count: int) -> dict[str, dict[str, float]]:
     return {
         "renderer": renderer_growth(count),
         "validated": renderer_growth(max(count // 5, 100), validation=True),
-        "frame": growth(frame, count // 4),
+        "frame": growth(frame, max(count // 4, 50)),
         "open": frame_growth(scene, 2 * count),
     }
 

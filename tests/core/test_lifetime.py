@@ -153,7 +153,9 @@ def test_renderers_and_frames_leave_nothing(grown: Measured, thing: str) -> None
     # to what Python and the loader keep for themselves. Sizes, formats and kernels of the frames
     # change all the time.
     growth = grown[thing]
-    assert growth["heap"] < 12
+    # The validation layer keeps blocks for addresses that it has not seen: up to 100 bytes for a
+    # renderer, where the addresses differ from run to run. The core's own are in "renderer".
+    assert growth["heap"] < (160 if thing == "validated" else 12)
     assert growth["data"] < 2048
     assert growth["code"] == growth["descriptors"] == growth["threads"] == 0
 

@@ -295,7 +295,7 @@ class TestWholeSettings:
             renderer.grid(np.zeros((4, 4, 3), np.uint8), settings, axes)
 
     def test_a_framebuffer_that_some_lack(self, renderer: Renderer) -> None:
-        with pytest.raises(ValueError, match=r"along preset, blur_vertical .* not there at"):
+        with pytest.raises(ValueError, match=r"blur_vertical .* along preset: .* not there at"):
             renderer.grid(
                 np.zeros((8, 8, 3), np.float32),
                 axes={"preset": ["tutorial", "kino"]},
@@ -310,7 +310,7 @@ class TestMemory:
         monkeypatch.setattr(Renderer, "_run_work", None)
         image = np.zeros((1000, 1000, 4), np.float32)
         axes = {"exposure": np.linspace(-1, 1, 1000), "intensity": np.linspace(0, 1, 1000)}
-        told = r"1000000 points with final takes 16,000.0 GB, .* grid_to_zarr .* attachments=\(\)"
+        told = r"1000000 points with final needs 16,000.0 GB, .* grid_to_zarr .* attachments=\(\)"
         with pytest.raises(MemoryError, match=told):
             renderer.grid(image, None, axes)
 

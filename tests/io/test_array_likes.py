@@ -48,7 +48,7 @@ def test_data_arrays_in_any_order(renderer: vkbloom.Renderer) -> None:
     for dims in (("y", "x", "channel"), ("channel", "y", "x"), ("x", "channel", "y")):
         assert np.array_equal(renderer.apply(image.transpose(*dims))["final"], expected)
     with pytest.raises(
-        ValueError, match=r"dimensions \('a', 'b', 'c'\) are not y, x, channel; choose of"
+        ValueError, match=r"dimensions \('a', 'b', 'c'\) are not y, x, channel; select"
     ):
         renderer.apply(image.rename(y="a", x="b", channel="c"))
     grid: Any = renderer.grid(image, axes={"intensity": [0.5, 1]}, attachments=("final", "bloom"))
