@@ -59,7 +59,14 @@ def test_bands_are_the_whole(renderer: Renderer, name: str, height: int, glows: 
     whole = renderer.apply(
         image.image, settings, mask=image.mask, emission=image.emission, attachments=("final",)
     )
-    assert np.array_equal(np.concatenate(bands), whole["final"])
+    final = np.concatenate(bands)
+    if name == "fixed" and renderer.info.type != "cpu":
+        # A GPU's sampler rounds positions to a few bits, from coordinates relative to the height of
+        # the band. On an H100 two values of 500,000 are the next half float.
+        np.testing.assert_array_max_ulp(final, whole["final"])
+        assert np.mean(final != whole["final"]) < 1e-4
+    else:
+        assert np.array_equal(final, whole["final"])
 
 
 @pytest.mark.parametrize(
