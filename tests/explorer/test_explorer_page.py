@@ -548,7 +548,7 @@ def test_no_rule_of_accessibility_is_broken(browser: Browser, scene_url: str, th
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     with opened(browser, scene_url, color_scheme=theme) as page:
         page.get_by_label("wipe A | B").check()
-        page.get_by_text("More").click()
+        page.get_by_text("More", exact=True).click()
         page.get_by_text("Plan", exact=True).click()
         for width in (980, 390):
             page.set_viewport_size({"width": width, "height": 844})
