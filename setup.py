@@ -25,6 +25,8 @@ WORDS_ALONE = {
     "threshold.comp",
     "blend.comp",
     "filter_rows.comp",
+    "upsample.comp",
+    "upsample_final.comp",
     "filter_columns.comp",
     "gather_columns.comp",
     "kawase_columns.comp",

@@ -244,6 +244,8 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "halved", vkb_add_godot_rows, 0},
     {VKB_VARIANTS_CPU, "doubled", vkb_add_doubled, 0},
     {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
+    {VKB_VARIANTS_CPU, "upsampled", vkb_add_upsampled_strips, 0},
+    {VKB_VARIANTS_CPU, "upsampled_final", vkb_add_upsampled_final, 0},
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_upsampled, TWO_PASSES},
     {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered, TWO_PASSES},
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_kawase_up, TWO_PASSES},
