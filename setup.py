@@ -31,6 +31,7 @@ WORDS_ALONE = {
     "gather_columns.comp",
     "kawase_columns.comp",
     "halve_taps.comp",
+    "reduce.comp",
     "kino_bright.comp",
     "highlights.comp",
     "scale.comp",

@@ -523,6 +523,10 @@
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
     NAME(GROUPS_BLENDER, 3, blender) \
     NAME(GROUPS_BOX, 4, box) \
+    NAME(GROUPS_FILAMENT, 5, filament) \
+    NAME(GROUPS_HDRP, 6, hdrp) \
+    NAME(GROUPS_URP, 7, urp) \
+    NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \
