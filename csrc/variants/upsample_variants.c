@@ -163,8 +163,7 @@ bool vkb_add_upsampled_final(const struct vkb_variant_choice *choice,
     VKB_TAKE_COMPOSITE(&row, upsample_final, pass);
     make_strips(choice, &row, final_shaders);
     row.constants.upsample = up->constants.upsample;
-    row.constants.format =
-        vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
+    row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

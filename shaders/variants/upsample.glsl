@@ -72,8 +72,8 @@ void main()
         [[unroll]] for (int kept = 0; kept < KEPT; ++kept)
             rows[kept][i] = vec4(0.0);
     }
-    for (int row = texel + 1 - AFTER; row < texel + AFTER; ++row)
-        add_row(row);
+    for (int y = texel + 1 - AFTER; y < texel + AFTER; ++y)
+        add_row(y);
     for (int y = first.y; y < end;) {
         add_row(texel + AFTER);
         // A level that is not larger than the target has at least one pixel for each row. llvmpipe
