@@ -37,6 +37,8 @@ WORDS_ALONE = {
     "scale.comp",
     "streaks.comp",
     "godot_rows.comp",
+    "hdrp_rows.comp",
+    "hdrp_columns.comp",
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}

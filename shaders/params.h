@@ -375,6 +375,7 @@
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
 #define GODOT_COLUMNS                 8
+#define HDRP_OUTPUTS                  8
 #define STREAK_COLUMNS                8
 #define STREAK_ROWS                   32
 #define TILE_LOADED                   64

@@ -13,6 +13,9 @@ static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT
 static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
 static const enum vkb_shader reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
 static const enum vkb_shader godot_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(godot_rows);
+static const enum vkb_shader hdrp_rows_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(hdrp_rows);
+static const enum vkb_shader hdrp_columns_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(hdrp_columns);
 static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
@@ -204,6 +207,22 @@ bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_p
     vkb_make_words(&row, reduce_words[source->format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
     return vkb_graph_add_pass(choice->graph, &row, error)
         && add_from_image(choice, pass, &row, error);
+}
+
+bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       bool *fits, struct vkb_error *error)
+{
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
+    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    const uint32_t word = 4 / vkb_formats[format].channel_size;
+
+    *fits = pass->shader == VKB_SHADER_hdrp_blur_frag
+         && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
+         && pass->params.pyramid.row_offset == 0 && loads(choice, pass);
+    if (!*fits)
+        return true;
+    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, FILTER_ROWS, error)
+                : add_words(choice, pass, hdrp_columns_words[format], word, HDRP_OUTPUTS, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
