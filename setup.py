@@ -32,6 +32,7 @@ WORDS_ALONE = {
     "kawase_columns.comp",
     "halve_taps.comp",
     "reduce.comp",
+    "shrink.comp",
     "kino_bright.comp",
     "highlights.comp",
     "scale.comp",
