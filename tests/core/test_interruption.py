@@ -6,8 +6,6 @@ import gc
 import math
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 import weakref
@@ -21,6 +19,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.images import picture
+from tests.processes import output
 from vkbloom import DeviceLostError, Frames, Renderer, Scene, Separable, gaussian_weights
 
 LEAVES_BEHIND = pytest.mark.skipif(
@@ -403,16 +402,9 @@ def test_collecting_a_renderer_at_work(
 ) -> None:
     """Regression: this wait had no limit, and Ctrl-C did not end it."""
     # Twice the side: four times as long as half a second.
-    done = subprocess.run(
-        [sys.executable, "-c", COLLECT, str(2 * len(large)), how],
-        env={**os.environ, "VKBLOOM_TIMEOUT": limit},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    ending, seconds = done.stdout.split()
+    side = str(2 * len(large))
+    printed = output("-c", COLLECT, side, how, VKBLOOM_TIMEOUT=limit)
+    ending, seconds = printed.split()
     assert ending == words
     assert float(seconds) < 1.0
 
@@ -482,13 +474,7 @@ print("parent done")
 def test_a_forked_process(how: str, renderer: Renderer) -> None:
     if how == "exit" and renderer.info.type != "cpu":
         pytest.skip("drivers of GPUs may not end in a child (docs/robustness.md, Forks)")
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD, how], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert (done.returncode, done.stdout.split("\n")) == (
-        0,
-        ["child done", "parent done", ""],
-    ), done.stdout + done.stderr
+    assert output("-c", CHILD, how) == "child done\nparent done\n"
 
 
 # Prints the error of a child whose driver opens no device.
@@ -511,10 +497,7 @@ for _ in range(2):
 
 @UNIX
 def test_a_child_without_an_adapter_is_told_to_spawn() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", ADVICE], capture_output=True, text=True, timeout=120, check=True
-    )
-    told = done.stdout.splitlines()
+    told = output("-c", ADVICE).splitlines()
     assert len(told) == 2
     for line in told:
         assert "no such adapter" in line
