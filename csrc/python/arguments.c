@@ -128,24 +128,28 @@ bool vkb_out_of_range(const char *name, PyObject *value, double low, double high
     return false;
 }
 
+bool vkb_read_number(PyObject *value, const struct vkb_value_row *row, void *values)
+{
+    const double number = PyFloat_AsDouble(value);
+
+    if (PyErr_Occurred())
+        return false;
+    if (!(number >= row->low && number <= row->high))
+        return vkb_out_of_range(row->name, value, row->low, row->high);
+    vkb_value_store(values, row, number);
+    return true;
+}
+
 // None keeps the default.
 static bool read_value(const struct reader *reader, size_t index, struct vkb_values *values)
 {
     const struct vkb_value_row *row = &vkb_value_rows[index];
     PyObject *value = optional_attribute(reader, ATTRIBUTE_VALUES + index);
-    bool done = true;
 
     vkb_value_store(values, row, row->initial);
     if (!value)
         return !PyErr_Occurred();
-    if (value != Py_None) {
-        double number = PyFloat_AsDouble(value);
-        done = !PyErr_Occurred();
-        if (done && !(number >= row->low && number <= row->high))
-            done = vkb_out_of_range(row->name, value, row->low, row->high);
-        if (done)
-            vkb_value_store(values, row, number);
-    }
+    const bool done = value == Py_None || vkb_read_number(value, row, values);
     Py_DECREF(value);
     return done;
 }

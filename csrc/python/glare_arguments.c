@@ -9,12 +9,7 @@ static bool read_number(PyObject *object, const struct vkb_value_row *row,
     if (!PyObject_HasAttrString(object, row->name))
         return true;
     PyObject *value = PyObject_GetAttrString(object, row->name);
-    const double number = value ? PyFloat_AsDouble(value) : 0.0;
-    bool done = !PyErr_Occurred();
-    if (done && !(number >= row->low && number <= row->high))
-        done = vkb_out_of_range(row->name, value, row->low, row->high);
-    if (done)
-        vkb_value_store(values, row, number);
+    const bool done = value && vkb_read_number(value, row, values);
     Py_XDECREF(value);
     return done;
 }

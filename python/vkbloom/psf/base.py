@@ -44,11 +44,10 @@ class PSF(Record, abc.ABC):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> spread = psf.gaussian(sigma=2)
+    >>> spread = vkbloom.psf.gaussian(sigma=2)
     >>> spread.array((9, 9)).shape
     (9, 9, 3)
-    >>> psf.PSF.from_json(spread.to_json()) == spread
+    >>> vkbloom.psf.PSF.from_json(spread.to_json()) == spread
     True
     """
 
@@ -80,8 +79,7 @@ class PSF(Record, abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
+        >>> vkbloom.psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
         array([[0.058, 0.093, 0.058],
                [0.093, 0.147, 0.093],
                [0.058, 0.093, 0.058]])
@@ -103,8 +101,7 @@ class PSF(Record, abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).energy()
+        >>> vkbloom.psf.gaussian(sigma=1).energy()
         array([1., 1., 1.])
         """
 
@@ -128,8 +125,7 @@ class PSF(Record, abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).encircled_energy([1, 3])[:, 0].round(3)
+        >>> vkbloom.psf.gaussian(sigma=1).encircled_energy([1, 3])[:, 0].round(3)
         array([0.393, 0.989])
         """
 
@@ -153,8 +149,7 @@ class PSF(Record, abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).mtf([0, 0.1])[:, 0].round(3)
+        >>> vkbloom.psf.gaussian(sigma=1).mtf([0, 0.1])[:, 0].round(3)
         array([1.   , 0.821])
         """
 
@@ -186,8 +181,7 @@ class PSF(Record, abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).kernel((8, 6)).shape
+        >>> vkbloom.psf.gaussian(sigma=1).kernel((8, 6)).shape
         (11, 15, 3)
         """
         width, height = frame
@@ -226,9 +220,8 @@ class PSF(Record, abc.ABC):
         Examples
         --------
         >>> import tempfile
-        >>> from vkbloom import psf
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     path = psf.gaussian(sigma=1).save(f"{folder}/kernel.exr", size=(9, 9))
+        ...     path = vkbloom.psf.gaussian(sigma=1).save(f"{folder}/kernel.exr", size=(9, 9))
         ...     vkbloom.read(path).shape
         (9, 9, 3)
         """
