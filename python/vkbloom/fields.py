@@ -87,7 +87,8 @@ def make_from_fields(
     Raises
     ------
     ValueError
-        There is no such class or field, the class is not `cls`, or a value is out of range.
+        There is no such class or field, the class is not `cls`, a field without a default has no
+        value, or a value is out of range.
     TypeError
         `fields` is not a mapping, or a value has the wrong type.
     """
@@ -100,10 +101,19 @@ def make_from_fields(
     if own not in (None, name):
         raise ValueError(f"{key}: {name!r} is not the {own!r} of {cls.__name__}")
     values = {field: value for field, value in fields.items() if field != key}
-    known = [field.name for field in dataclasses.fields(kinds[name])]
+    declared = dataclasses.fields(kinds[name])
+    known = [field.name for field in declared]
     unknown = [field for field in values if field not in known]
     if unknown:
         raise ValueError(
             f"{subject}: {name} has no {', '.join(map(repr, unknown))}; it has {', '.join(known)}"
         )
+    without = (dataclasses.MISSING, dataclasses.MISSING)
+    lacking = [
+        field.name
+        for field in declared
+        if field.name not in values and (field.default, field.default_factory) == without
+    ]
+    if lacking:
+        raise ValueError(f"{subject}: {name} needs a value for {', '.join(lacking)}")
     return kinds[name](**values)

@@ -6,7 +6,7 @@ import abc
 import dataclasses
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vkbloom.checks import as_float, check_size
 from vkbloom.fields import make_from_fields
-from vkbloom.psf.values import ArrayValue
+from vkbloom.psf.values import plain_value
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -254,7 +254,7 @@ class PSF(abc.ABC):
         {'psf': 'gaussian', 'sigma': 2.0}
         """
         fields = dataclasses.fields(cast("Any", self))
-        values = {field.name: _plain(getattr(self, field.name)) for field in fields}
+        values = {field.name: plain_value(getattr(self, field.name)) for field in fields}
         return {"psf": type(self).__name__, **values}
 
     @classmethod
@@ -385,14 +385,3 @@ def _leaves(kind: type[Any]) -> list[type[Any]]:
     for below in kind.__subclasses__():
         found += [below] if dataclasses.is_dataclass(below) else _leaves(below)
     return found
-
-
-def _plain(value: Any) -> Any:
-    """Return a parameter as values that JSON can represent."""
-    if isinstance(value, ArrayValue):
-        return value.to_plain()
-    if hasattr(value, "to_dict"):
-        return value.to_dict()
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(item) for item in value]
-    return value
