@@ -141,7 +141,11 @@ class TestWhole:
         [
             (Pyramid(levels=2), "glare", [(), vkbloom.Halo(), "godot_dirt"]),
             (vkbloom.Convolution(), "psf", [psf.gaussian(1), np.ones((3, 5), np.float32)]),
-            (Pyramid(glare=vkbloom.Dirt()), "glare.0.image", [None, np.ones((2, 3), np.float32)]),
+            (
+                Pyramid(glare=(vkbloom.Dirt(),)),
+                "glare.0.image",
+                [None, np.ones((2, 3), np.float32)],
+            ),
         ],
     )
     def test_fields_that_are_objects_are_axes(
