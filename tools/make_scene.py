@@ -1,13 +1,14 @@
 """Make the built-in scene: the saucer's body, its glow mesh and the starfield.
 
-Everything in ``python/vkbloom/assets`` except its README is written by this one
+Everything in ``examples/saucer`` except its README is written by this one
 script, which is deterministic: a second run writes the same scene. Two glTF 2.0
 files with their buffers and six cubemap faces come out. The axes are those of
 glTF (right-handed, y up, counter-clockwise front faces), lengths are in scene
-units, angles in degrees.
+units, angles in degrees. Then vkbloom loads these files, and ``ufo.npz`` keeps
+the arrays for `vkbloom.Scene.ufo`, which so needs no reader of glTF and images.
 
-Run ``python tools/make_scene.py`` from anywhere; ``--out`` names another folder.
-It needs NumPy and OpenImageIO (``pip install vkbloom[images]``).
+Run ``python tools/make_scene.py`` from anywhere; ``--out`` names another folder,
+for all files. It needs ``vkbloom[scenes]``.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ FloatArray = npt.NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
 Triple = tuple[float, float, float]
 
-ASSETS = Path(__file__).resolve().parents[1] / "python" / "vkbloom" / "assets"
+ROOT = Path(__file__).resolve().parents[1]
+FILES = ROOT / "examples" / "saucer"
+PACKED = ROOT / "python" / "vkbloom" / "assets"
 
 # Constants of the glTF 2.0 specification, sections 5.1 and 5.11.
 FLOAT, UNSIGNED_SHORT = 5126, 5123
@@ -884,8 +887,23 @@ def write_face(path: Path, face: npt.NDArray[np.uint8]) -> None:
         raise OSError(f"{path}: {image.geterror()}")
 
 
-def write_assets(folder: Path) -> None:
-    """Write the whole scene into `folder`, which is made where it is missing."""
+def pack(folder: Path, path: Path) -> None:
+    """Write the arrays of the scene in `folder` to one file of compressed arrays."""
+    import vkbloom
+
+    faces = [folder / f"starfield_{name}.png" for name in FACE_NAMES]
+    files = (folder / "saucer.gltf", folder / "saucer_glow.gltf")
+    scene = vkbloom.Scene.from_gltf(files[0], glow=files[1], skybox=faces)
+    arrays = {"glow_emission": scene.glow.emission, "sky": scene.skybox.levels[0]}
+    for name, mesh in (("body", scene.body), ("glow", scene.glow)):
+        # All indices fit 16 bits, of which half as many bytes are to be read.
+        arrays[f"{name}_indices"] = mesh.indices.astype(np.uint16)
+        arrays[f"{name}_vertices"] = mesh.vertices
+    np.savez_compressed(path, **arrays)
+
+
+def write_files(folder: Path) -> None:
+    """Write the scene as glTF and images into `folder`, which is made where it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     meshes = body_meshes()
     write_gltf(folder / "saucer.gltf", saucer(with_beam=False), meshes, glow=False)
@@ -896,10 +914,12 @@ def write_assets(folder: Path) -> None:
 
 
 def main() -> None:
-    """Read the command line and write the assets."""
+    """Read the command line and write the scene."""
     parser = argparse.ArgumentParser(description="Make the built-in scene of vkbloom.")
-    parser.add_argument("--out", type=Path, default=ASSETS, help="folder to write into")
-    write_assets(parser.parse_args().out)
+    parser.add_argument("--out", type=Path, help="folder to write all files into")
+    out = parser.parse_args().out
+    write_files(out or FILES)
+    pack(out or FILES, (out or PACKED) / "ufo.npz")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
     VKB_BY_FORMAT(double_final_comp);
 static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
 static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
+static const enum vkb_shader reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
 static const enum vkb_shader godot_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(godot_rows);
 static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
@@ -88,6 +89,23 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
         && add_halved_image(choice, pass, &row, error);
 }
 
+// The same for a pass whose shader only removes NaN and infinity from the image, as the threshold
+// pass of a published method does.
+static bool add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                           const struct vkb_pass_row *reducing, struct vkb_error *error)
+{
+    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
+    struct vkb_pass_row row;
+
+    if (!threshold || threshold->constants.threshold_mode != THRESHOLD_NONE)
+        return true;
+    memcpy(&row, reducing, sizeof row);
+    row.reads[0] = threshold->reads[0];
+    row.fused = true;
+    row.constants.from_image = true;
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 // Whether the pass weights the taps of a downsampling, which are one and two texels apart.
 static bool weights_taps(const struct vkb_pass_row *pass)
 {
@@ -149,6 +167,43 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
     return !*fits
         || add_words(choice, pass, halve_taps_words[source->format], HALVE_WORDS_COLUMNS,
                      HALVE_WORDS_ROWS, error);
+}
+
+// What reduce.comp makes of its taps, as GROUPS_*; 0: it has no such taps.
+static enum vkb_mode reduced_groups(const struct vkb_pass_row *pass)
+{
+    switch (pass->shader) {
+    case VKB_SHADER_filament_prefilter_frag:
+        return GROUPS_FILAMENT;
+    case VKB_SHADER_hdrp_prefilter_frag:
+        return GROUPS_HDRP;
+    case VKB_SHADER_urp_prefilter_frag:
+        return GROUPS_URP;
+    case VKB_SHADER_unreal_prefilter_frag:
+        return GROUPS_UNREAL;
+    default:
+        return 0;
+    }
+}
+
+bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                     bool *fits, struct vkb_error *error)
+{
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const enum vkb_mode groups = reduced_groups(pass);
+    struct vkb_pass_row row;
+
+    *fits = groups && !pass->constants.masked && is_half(&choice->plain, pass)
+         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.groups = groups;
+    row.constants.sampling = 0;
+    vkb_drop_reads(&row, 1);
+    vkb_make_words(&row, reduce_words[source->format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && add_from_image(choice, pass, &row, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

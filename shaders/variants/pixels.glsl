@@ -102,6 +102,19 @@ uvec4 with_alpha_of(uvec4 own, vec4 value)
 #endif
 }
 
+// The pixel with 0 in place of NaN and infinity in each channel.
+uvec4 finite_bits(uvec4 raw)
+{
+#if CHANNEL_BYTES == 2
+    // A carry is where all bits of the exponent are set.
+    uvec2 special = ((raw.xy & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
+    raw.xy &= ~(special | (special - (special >> 15)));
+#elif CHANNEL_BYTES != 1
+    raw = mix(raw, uvec4(0), equal(raw & 0x7f800000u, uvec4(0x7f800000u)));
+#endif
+    return raw;
+}
+
 // A pixel of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
 uvec4 buffer_of(vec4 value)
 {

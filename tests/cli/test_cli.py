@@ -19,7 +19,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.processes import python
+from tests.processes import python
 from vkbloom.cli import fields
 from vkbloom.cli.program import COMMANDS, as_wrong_use, program
 from vkbloom.cli.settings_options import METHODS, settings_options
@@ -27,7 +27,7 @@ from vkbloom.scene import Camera, Scene
 
 oiio = pytest.importorskip("OpenImageIO")
 
-ASSETS = Path(vkbloom.__file__).parent / "assets"
+SAUCER = Path(__file__).parents[2] / "examples" / "saucer"
 SMALL = ("--size", "48x32", "--bloom-size", "16x16")
 SMALL_SETTINGS = vkbloom.Separable(bloom_size=(16, 16))
 
@@ -445,8 +445,8 @@ def test_render_uses_settings_time_and_camera(tmp_path: Path) -> None:
 
 
 def test_render_loads_scenes(tmp_path: Path) -> None:
-    body, glow = ASSETS / "saucer.gltf", ASSETS / "saucer_glow.gltf"
-    faces = [ASSETS / f"starfield_{face}.png" for face in ("px", "nx", "py", "ny", "pz", "nz")]
+    body, glow = SAUCER / "saucer.gltf", SAUCER / "saucer_glow.gltf"
+    faces = [SAUCER / f"starfield_{face}.png" for face in ("px", "nx", "py", "ny", "pz", "nz")]
     skies = [word for face in faces for word in ("--skybox", face)]
     panorama = tmp_path / "panorama.png"
     stars = np.random.default_rng(1).integers(0, 256, (32, 64, 3), np.uint8)

@@ -1,7 +1,8 @@
 """The built-in scene is sound, and tools/make_scene.py still makes it.
 
-The files are read here with NumPy and OpenImageIO alone, so that a fault of the package's
-own loaders cannot hide one of the assets.
+The glTF files and images are read here with NumPy and OpenImageIO alone, so that a fault of the
+package's own loaders cannot hide one of theirs. The package has the arrays that its loaders make of
+these files.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,10 +20,13 @@ import numpy.typing as npt
 import OpenImageIO as oiio
 import pytest
 
+from vkbloom.scene import Scene
+
 Array = npt.NDArray[Any]
 
 ROOT = Path(__file__).resolve().parents[2]
-ASSETS = ROOT / "python" / "vkbloom" / "assets"
+FILES = ROOT / "examples" / "saucer"
+PACKED = ROOT / "python" / "vkbloom" / "assets" / "ufo.npz"
 MESHES = ("saucer", "saucer_glow")
 FACES = ("px", "nx", "py", "ny", "pz", "nz")
 
@@ -132,8 +137,8 @@ def read_face(path: Path) -> Array:
 
 @pytest.fixture(scope="module")
 def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the assets made anew."""
-    folder = tmp_path_factory.mktemp("assets")
+    """A folder with the files made anew."""
+    folder = tmp_path_factory.mktemp("saucer")
     script = ROOT / "tools" / "make_scene.py"
     subprocess.run([sys.executable, str(script), "--out", str(folder)], check=True)
     return folder
@@ -141,12 +146,12 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module", params=MESHES)
 def parts(request: pytest.FixtureRequest) -> list[Part]:
-    return read_parts(ASSETS / f"{request.param}.gltf")
+    return read_parts(FILES / f"{request.param}.gltf")
 
 
 @pytest.fixture(scope="module")
 def sky() -> dict[str, Array]:
-    return {name: read_face(ASSETS / f"starfield_{name}.png") for name in FACES}
+    return {name: read_face(FILES / f"starfield_{name}.png") for name in FACES}
 
 
 # ------------------------------------------------------------------- the script
@@ -154,14 +159,14 @@ def sky() -> dict[str, Array]:
 
 def test_script_writes_the_files_that_are_there(fresh: Path) -> None:
     made = {path.name for path in fresh.iterdir()}
-    assert made == {path.name for path in ASSETS.iterdir()} - {"README.md"}
+    assert made == {path.name for path in (*FILES.iterdir(), PACKED)} - {"README.md"}
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_script_makes_the_same_mesh(fresh: Path, name: str) -> None:
-    document = read_json(ASSETS / f"{name}.gltf")
+    document = read_json(FILES / f"{name}.gltf")
     assert read_json(fresh / f"{name}.gltf") == document
-    old, new = (folder / f"{name}.bin" for folder in (ASSETS, fresh))
+    old, new = (folder / f"{name}.bin" for folder in (FILES, fresh))
     for index in range(len(document["accessors"])):
         # Half a unit of the last decimal that the script keeps of positions is 5e-6.
         np.testing.assert_allclose(
@@ -180,46 +185,79 @@ def test_script_makes_the_same_starfield(fresh: Path, sky: dict[str, Array], nam
     assert np.abs(made.astype(np.int64) - sky[name]).max() <= 1
 
 
+def arrays_of(scene: Scene) -> list[Array]:
+    assert scene.glow is not None
+    assert scene.glow.emission is not None
+    assert scene.skybox is not None
+    assert scene.body.emission is None
+    assert scene.body.surfaces == scene.glow.surfaces == ()
+    meshes = [a for mesh in (scene.body, scene.glow) for a in (mesh.vertices, mesh.indices)]
+    return [*meshes, scene.glow.emission, *scene.skybox.levels]
+
+
+def test_the_built_in_scene_is_that_of_the_files() -> None:
+    faces = [FILES / f"starfield_{name}.png" for name in FACES]
+    glow = FILES / "saucer_glow.gltf"
+    loaded = Scene.from_gltf(FILES / "saucer.gltf", glow=glow, skybox=faces)
+    for built_in, of_files in zip(arrays_of(Scene.ufo()), arrays_of(loaded), strict=True):
+        np.testing.assert_array_equal(built_in, of_files, strict=True)
+
+
+def test_script_packs_the_same_arrays(fresh: Path) -> None:
+    with np.load(PACKED) as old, np.load(fresh / PACKED.name) as new:
+        assert old.files == new.files
+        for name in old.files:
+            # As above; the y of normals and positions is negated, indices are exact.
+            step = {"f": 1e-5, "u": 1 if name == "sky" else 0}[old[name].dtype.kind]
+            np.testing.assert_allclose(
+                new[name].astype(np.float64), old[name].astype(np.float64), rtol=0, atol=step
+            )
+
+
+def test_the_built_in_scene_needs_no_extra() -> None:
+    hide = "sys.modules.update(dict.fromkeys(('pygltflib', 'OpenImageIO'), None))"
+    code = f"import sys; {hide}; import vkbloom; vkbloom.Scene.ufo()"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 # ------------------------------------------------------------------- the meshes
 
 
 def test_the_meshes_are_fine_but_small() -> None:
     for name in MESHES:
-        document = read_json(ASSETS / f"{name}.gltf")
+        document = read_json(FILES / f"{name}.gltf")
         stored = sum(
             document["accessors"][primitive["indices"]]["count"] // 3
             for mesh in document["meshes"]
             for primitive in mesh["primitives"]
         )
         assert stored >= 5000
-    files = [*ASSETS.glob("*.gltf"), *ASSETS.glob("*.bin")]
-    assert len(files) == 4
-    assert sum(path.stat().st_size for path in files) < 600_000
+    assert PACKED.stat().st_size < 1_600_000
+
+
+def attributes_of(name: str, attribute: str) -> Iterator[tuple[Any, npt.NDArray[Any]]]:
+    """The accessors and the values of an attribute of all primitives of a mesh's file."""
+    document = read_json(FILES / f"{name}.gltf")
+    blob = (FILES / f"{name}.bin").read_bytes()
+    for mesh in document["meshes"]:
+        for primitive in mesh["primitives"]:
+            index = primitive["attributes"][attribute]
+            yield document["accessors"][index], read_accessor(document, blob, index)
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_bounds_of_positions_are_exact(name: str) -> None:
-    document = read_json(ASSETS / f"{name}.gltf")
-    blob = (ASSETS / f"{name}.bin").read_bytes()
-    for mesh in document["meshes"]:
-        for primitive in mesh["primitives"]:
-            index = primitive["attributes"]["POSITION"]
-            positions = read_accessor(document, blob, index)
-            accessor = document["accessors"][index]
-            np.testing.assert_array_equal(positions.min(0), np.float32(accessor["min"]))
-            np.testing.assert_array_equal(positions.max(0), np.float32(accessor["max"]))
+    for accessor, positions in attributes_of(name, "POSITION"):
+        np.testing.assert_array_equal(positions.min(0), np.float32(accessor["min"]))
+        np.testing.assert_array_equal(positions.max(0), np.float32(accessor["max"]))
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_stored_normals_are_of_unit_length(name: str) -> None:
-    document = read_json(ASSETS / f"{name}.gltf")
-    blob = (ASSETS / f"{name}.bin").read_bytes()
-    for mesh in document["meshes"]:
-        for primitive in mesh["primitives"]:
-            normals = read_accessor(document, blob, primitive["attributes"]["NORMAL"])
-            lengths = np.linalg.norm(normals.astype(np.float64), axis=1)
-            # Components are kept to 6 decimals.
-            np.testing.assert_allclose(lengths, 1, rtol=0, atol=2e-6)
+    for _, normals in attributes_of(name, "NORMAL"):
+        lengths = np.linalg.norm(normals.astype(np.float64), axis=1)
+        # Components are kept to 6 decimals.
+        np.testing.assert_allclose(lengths, 1, rtol=0, atol=2e-6)
 
 
 def test_indices_are_in_range_and_use_every_vertex(parts: list[Part]) -> None:
@@ -290,7 +328,7 @@ def test_metals_stay_dark_in_the_shade() -> None:
     # The forward system adds an ambient term wherever a channel is 0.9 or more.
     colours = {
         entry["name"]: entry["pbrMetallicRoughness"]["baseColorFactor"]
-        for entry in read_json(ASSETS / "saucer.gltf")["materials"]
+        for entry in read_json(FILES / "saucer.gltf")["materials"]
     }
     assert colours.keys() == {"steel", "gunmetal", "copper", "enamel", "glass", "amber", "red"}
     lit = {name for name, colour in colours.items() if max(colour[:3]) >= 0.9}
@@ -298,7 +336,7 @@ def test_metals_stay_dark_in_the_shade() -> None:
 
 
 def test_glow_colours_are_emissive_and_the_rest_is_black() -> None:
-    materials = read_json(ASSETS / "saucer_glow.gltf")["materials"]
+    materials = read_json(FILES / "saucer_glow.gltf")["materials"]
     colours = {}
     for entry in materials:
         base = entry["pbrMetallicRoughness"]["baseColorFactor"]
@@ -311,7 +349,7 @@ def test_glow_colours_are_emissive_and_the_rest_is_black() -> None:
 
 
 def test_glow_mesh_is_the_body_with_a_beam() -> None:
-    body, glow = (read_parts(ASSETS / f"{name}.gltf") for name in MESHES)
+    body, glow = (read_parts(FILES / f"{name}.gltf") for name in MESHES)
     assert [(part.node, part.material) for part in glow[len(body) :]] == [("beam", "beam")]
     for mine, other in zip(body, glow, strict=False):
         assert mine.node == other.node
@@ -325,7 +363,6 @@ def test_glow_mesh_is_the_body_with_a_beam() -> None:
 
 
 def test_starfield_is_dark_with_bright_stars(sky: dict[str, Array]) -> None:
-    assert sum(path.stat().st_size for path in ASSETS.glob("*.png")) < 700_000
     for name, face in sky.items():
         assert face.shape == (512, 512, 3), name
         assert face.dtype == np.uint8

@@ -70,6 +70,8 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
             raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
         if name not in types:
             raise click.UsageError(f"--axis: {lacking} {name!r}")
+        if name in found:
+            raise click.UsageError(f"--axis: {name} is given twice; list all values in one")
         room = _MOST_VALUES - sum(map(len, found.values()))
         found[name] = _values(word, text, types[name], room)
     return found

@@ -20,7 +20,7 @@ from vkbloom.io import pipeline_cache
 # Purpose of each extra; the distributions that it needs are read from the metadata.
 _EXTRAS: Final = {
     "images": "image files: Frames.save, apply on files",
-    "scenes": "glTF scenes and skyboxes, including the built-in saucer",
+    "scenes": "glTF scenes and skyboxes",
     "grid": "to_xarray and grids of settings",
     "cli": "the command line",
     "software": "a bundled driver that renders on any CPU",

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_time
+from vkbloom.fields import plain_value
 from vkbloom.glare.base import stage_field_of
 from vkbloom.named_settings import presets
-from vkbloom.psf.values import plain_value
 from vkbloom.settings import Settings, check_settings
 from vkbloom.views.descriptions import described_parameters
 

@@ -9,11 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from vkbloom.fields import plain_value
 from vkbloom.grid.order import Index
 from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.reductions import Reduction
 from vkbloom.grid.sources import digest
-from vkbloom.psf.values import plain_value
 
 __all__ = ["FORMAT", "chunk_in", "differences", "identity", "short"]
 

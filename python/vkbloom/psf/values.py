@@ -1,16 +1,16 @@
-"""Read-only arrays that are compared and hashed by their values, and values for JSON."""
+"""Read-only arrays that are compared and hashed by their values."""
 
 from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["ArrayValue", "plain_value"]
+__all__ = ["ArrayValue"]
 
 
 class ArrayValue:
@@ -63,14 +63,3 @@ def _from_plain(plain: Mapping[str, Any]) -> NDArray[Any]:
         return np.frombuffer(data, "<f4").reshape([int(side) for side in plain["shape"]])
     except (KeyError, TypeError, ValueError, zlib.error) as error:
         raise ValueError(f"array: not an array's shape and values: {error}") from None
-
-
-def plain_value(value: Any) -> Any:
-    """Return the value of a field or a parameter in a form that JSON can represent."""
-    if isinstance(value, ArrayValue):
-        return value.to_plain()
-    if hasattr(value, "to_dict"):
-        return value.to_dict()
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [plain_value(item) for item in value]
-    return value

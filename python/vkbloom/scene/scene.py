@@ -13,13 +13,12 @@ import os
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from numbers import Real
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from vkbloom.scene import gltf
 from vkbloom.scene import skybox as sky
 from vkbloom.scene.mesh import Mesh
 from vkbloom.scene.skybox import Cubemap, SkyboxSource
@@ -40,7 +39,8 @@ _contents: weakref.WeakValueDictionary[tuple[int, int, int], _Contents] = (
     weakref.WeakValueDictionary()
 )
 
-_FACE_SUFFIXES: Final = ("px", "nx", "py", "ny", "pz", "nz")
+# The arrays of the built-in scene, made by tools/make_scene.py from the files in examples/saucer.
+_UFO: Final = Path(__file__).parents[1] / "assets" / "ufo.npz"
 
 
 @dataclass(frozen=True)
@@ -189,12 +189,7 @@ class Scene:
         Returns
         -------
         Scene
-            A new scene on every call; the files are read again.
-
-        Raises
-        ------
-        ModuleNotFoundError
-            pygltflib or OpenImageIO is not installed.
+            A new scene on every call; its arrays are read again. No extra is needed.
 
         See Also
         --------
@@ -205,13 +200,13 @@ class Scene:
         >>> vkbloom.Scene.ufo().glow is not None
         True
         """
-        # The complete folder, because the glTF files refer to other files in it.
-        with resources.as_file(resources.files("vkbloom") / "assets") as assets:
-            return cls.from_gltf(
-                assets / "saucer.gltf",
-                glow=assets / "saucer_glow.gltf",
-                skybox=[assets / f"starfield_{suffix}.png" for suffix in _FACE_SUFFIXES],
+        with np.load(_UFO) as arrays:
+            body, glow = (
+                Mesh(arrays[f"{name}_vertices"], arrays[f"{name}_indices"].astype(np.uint32))
+                for name in ("body", "glow")
             )
+            glow = dataclasses.replace(glow, emission=arrays["glow_emission"])
+            return cls(body, glow, sky.from_array(arrays["sky"]))
 
     @classmethod
     def from_gltf(
@@ -266,6 +261,9 @@ class Scene:
             ...
         FileNotFoundError: [Errno 2] No such file or directory: 'missing.glb'
         """
+        # Imported here, since other scenes do not need it.
+        from vkbloom.scene import gltf  # noqa: PLC0415
+
         for name, path in (("base", base), ("glow", "" if glow is None else glow)):
             if not isinstance(path, str | os.PathLike):
                 raise TypeError(f"{name}: a path is needed, not {path!r}")

@@ -16,8 +16,6 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.io.image_reading import check_plausible, opened
-from vkbloom.io.images import failure_of
 from vkbloom.scene import ktx
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -185,7 +183,7 @@ def from_array(faces: NDArray[Any]) -> Cubemap:
     if faces.dtype.newbyteorder("=") not in DTYPES:
         raise TypeError(f"skybox is {faces.dtype}; uint8, float16 or float32 is needed")
     _check_faces("skybox", faces, channels=(3, 4))
-    return Cubemap(mip_levels(_with_alpha(faces.astype(faces.dtype.newbyteorder("=")))))
+    return _with_levels(_with_alpha(faces.astype(faces.dtype.newbyteorder("="))))
 
 
 def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
@@ -211,7 +209,7 @@ def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
     """
     levels = ktx.read(path)
     if len(levels) == 1:
-        return Cubemap(mip_levels(_with_alpha(levels[0])))
+        return _with_levels(_with_alpha(levels[0]))
     return Cubemap(tuple(_with_alpha(level) for level in levels))
 
 
@@ -260,7 +258,7 @@ def from_faces(paths: Sequence[str | os.PathLike[str]]) -> Cubemap:
                 f"face is {faces[0].shape[1]} x {faces[0].shape[0]} {faces[0].dtype}"
             )
         faces.append(face)
-    return Cubemap(mip_levels(np.stack(faces)))
+    return _with_levels(np.stack(faces))
 
 
 def from_equirectangular(path: str | os.PathLike[str]) -> Cubemap:
@@ -293,7 +291,7 @@ def from_equirectangular(path: str | os.PathLike[str]) -> Cubemap:
             f"{os.fspath(path)}: {width} x {height}; an equirectangular image is twice as wide as "
             f"high, at most {4 * MAX_SIDE} wide"
         )
-    return Cubemap(mip_levels(project_equirectangular(panorama, max(1, round(width / 4)))))
+    return _with_levels(project_equirectangular(panorama, max(1, round(width / 4))))
 
 
 def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
@@ -366,17 +364,39 @@ def mip_levels(faces: NDArray[Any]) -> tuple[NDArray[Any], ...]:
         down. Means are computed in float32 and rounded to the dtype once for each level, so that
         errors do not add up. NaN and infinity count as 0.
     """
-    levels = [faces]
-    mean = _finite(faces)
-    while mean.shape[1] > 1:
-        end = mean.shape[1] // 2 * 2
-        # Multiplied before the sum, so that four of the largest float32 do not overflow.
-        quarters = mean[:, :end, :end] * np.float32(0.25)
+    # Face by face, since what a face needs stays in the CPU's cache.
+    smaller = zip(*map(_smaller_levels, faces), strict=True)
+    return (faces, *map(np.stack, smaller))
+
+
+def _smaller_levels(face: NDArray[Any]) -> list[NDArray[Any]]:
+    quarter = np.float32(0.25)
+    levels = []
+    mean = face if face.dtype == np.uint8 else _finite(face)
+    while len(mean) > 1:
+        end = len(mean) // 2 * 2
+        complete = mean[:end, :end]
         # Two sums, since a sum over two axes is ten times as slow.
-        rows = quarters[:, ::2] + quarters[:, 1::2]
-        mean = rows[:, :, ::2] + rows[:, :, 1::2]
-        levels.append(_as_dtype(mean, faces.dtype))
-    return tuple(levels)
+        if mean.dtype == np.uint8:
+            # Sums of integers are exact, too, and take half the time.
+            rows = np.add(complete[::2], complete[1::2], dtype=np.uint16)
+            mean = (rows[:, ::2] + rows[:, 1::2]) * quarter
+        else:
+            # Multiplied before the sum, so that four of the largest float32 do not overflow.
+            quarters = complete * quarter
+            rows = quarters[::2] + quarters[1::2]
+            mean = rows[:, ::2] + rows[:, 1::2]
+        levels.append(_as_dtype(mean, face.dtype))
+    return levels
+
+
+def _with_levels(faces: NDArray[Any]) -> Cubemap:
+    """Return a cubemap with all mip levels of `faces`, which nobody else may change."""
+    levels = mip_levels(faces)
+    for level in levels:
+        # So that the cubemap takes the level itself.
+        level.flags.writeable = False
+    return Cubemap(levels)
 
 
 def _check_faces(field: str, faces: NDArray[Any], *, channels: tuple[int, ...]) -> None:
@@ -425,6 +445,10 @@ def _split(coordinate: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[n
 
 def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Read an RGB or RGBA image file as ``(H, W, C)``, with its stored values."""
+    # Imported here, since most skies come without them.
+    from vkbloom.io.image_reading import check_plausible, opened  # noqa: PLC0415
+    from vkbloom.io.images import failure_of  # noqa: PLC0415
+
     name = os.fspath(path)
     with opened(path, "Reading sky images") as image:
         spec = image.spec()
