@@ -372,9 +372,11 @@
 #define TEXEL_ROWS                    16
 #define UPSAMPLE_COLUMNS(CHANNEL)     (16 / (CHANNEL))
 #define UPSAMPLE_ROWS                 64
+#define SHRINK_ROWS                   32
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
 #define GODOT_COLUMNS                 8
+#define HDRP_OUTPUTS                  8
 #define STREAK_COLUMNS                8
 #define STREAK_ROWS                   32
 #define TILE_LOADED                   64
@@ -527,6 +529,7 @@
     NAME(GROUPS_HDRP, 6, hdrp) \
     NAME(GROUPS_URP, 7, urp) \
     NAME(GROUPS_UNREAL, 8, unreal) \
+    NAME(GROUPS_BEVY, 9, bevy) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \
