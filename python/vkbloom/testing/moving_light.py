@@ -269,7 +269,8 @@ def assert_stable(
         fail(
             "assert_stable",
             "the bloom of a light is not black",
-            f"the largest sum of the bloom is {found.energy.max():.3g}, not above 0",
+            f"the largest sum of the bloom is {found.energy.max():.3g}: only sums above 0 are "
+            "allowed",
         )
     check_inside(found.at_border, probe.size)
     told = {

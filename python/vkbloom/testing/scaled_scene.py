@@ -196,7 +196,7 @@ def assert_resolution_independent(
             fail(
                 "assert_resolution_independent",
                 "the bloom of a light is not black",
-                f"{what} is {values.min():.3g} of {share}, not above 0",
+                f"{what} is {values.min():.3g} of {share}: only values above 0 are allowed",
             )
         low, high = int(values.argmin()), int(values.argmax())
         change = (values[high] - values[low]) / values.mean()
