@@ -25,15 +25,21 @@ WORDS_ALONE = {
     "threshold.comp",
     "blend.comp",
     "filter_rows.comp",
+    "upsample.comp",
+    "upsample_final.comp",
     "filter_columns.comp",
     "gather_columns.comp",
     "kawase_columns.comp",
     "halve_taps.comp",
+    "reduce.comp",
+    "shrink.comp",
     "kino_bright.comp",
     "highlights.comp",
     "scale.comp",
     "streaks.comp",
     "godot_rows.comp",
+    "hdrp_rows.comp",
+    "hdrp_columns.comp",
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}

@@ -40,11 +40,13 @@
 // the target times source_height, less twice the first row of the source times target_height.
 // Otherwise source_height and row_offset are 0.
 #define SAMPLING_ROWS(B, INPUT) \
+    PLACE_ROWS(B, INPUT) \
+    INPUT(B, float, limit)
+#define PLACE_ROWS(B, INPUT) \
     INPUT(B, int, target_width) \
     INPUT(B, int, target_height) \
     INPUT(B, int, source_height) \
-    INPUT(B, int, row_offset) \
-    INPUT(B, float, limit)
+    INPUT(B, int, row_offset)
 
 // For passes with a threshold, and for passes that write the finished picture.
 #define THRESHOLD_ROWS(B, READS) \
@@ -117,6 +119,12 @@
     INPUT(B, float, coarse) \
     COMPOSITE_ROWS(B, READS, INPUT) \
     VEC4S(B, taps, 1)
+
+// The same by any factor.
+#define UPSAMPLE_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
+    PLACE_ROWS(B, INPUT) \
+    INPUT(B, float, coarse) \
+    COMPOSITE_ROWS(B, READS, INPUT)
 
 // The first pass of a published method, which reads the frame. The steps are the distances of its
 // taps in texels of the frame.
@@ -240,6 +248,7 @@
     BLOCK(fused_bloom, FUSED_BLOOM_BLOCK) \
     BLOCK(pyramid, PYRAMID_BLOCK) \
     BLOCK(double_final, DOUBLE_FINAL_BLOCK) \
+    BLOCK(upsample_final, UPSAMPLE_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
     BLOCK(kawase, KAWASE_BLOCK) \
@@ -364,9 +373,13 @@
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
 #define TEXEL_ROWS                    16
+#define UPSAMPLE_COLUMNS(CHANNEL)     (16 / (CHANNEL))
+#define UPSAMPLE_ROWS                 64
+#define SHRINK_ROWS                   32
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
 #define GODOT_COLUMNS                 8
+#define HDRP_OUTPUTS                  8
 #define STREAK_COLUMNS                8
 #define STREAK_ROWS                   32
 #define TILE_LOADED                   64
@@ -516,6 +529,11 @@
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
     NAME(GROUPS_BLENDER, 3, blender) \
     NAME(GROUPS_BOX, 4, box) \
+    NAME(GROUPS_FILAMENT, 5, filament) \
+    NAME(GROUPS_HDRP, 6, hdrp) \
+    NAME(GROUPS_URP, 7, urp) \
+    NAME(GROUPS_UNREAL, 8, unreal) \
+    NAME(GROUPS_BEVY, 9, bevy) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

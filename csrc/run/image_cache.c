@@ -220,14 +220,11 @@ static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache,
 static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache, const char *name,
                                            struct vkb_error *error)
 {
-    struct vkb_cached_image *cached;
+    struct vkb_cached_image *cached =
+        vkb_append(error, &cache->images, &cache->count, &cache->capacity, sizeof *cached);
 
-    if (!vkb_grow(error, &cache->images, &cache->capacity, cache->count + 1,
-                  sizeof(struct vkb_cached_image *))
-        || !(cached = vkb_alloc(error, 1, sizeof *cached)))
-        return NULL;
-    memcpy(cached->name, name, sizeof cached->name);
-    cache->images[cache->count++] = cached;
+    if (cached)
+        memcpy(cached->name, name, sizeof cached->name);
     return cached;
 }
 

@@ -11,7 +11,12 @@ static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
     VKB_BY_FORMAT(double_final_comp);
 static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
 static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
+static const enum vkb_shader reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
+static const enum vkb_shader shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
 static const enum vkb_shader godot_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(godot_rows);
+static const enum vkb_shader hdrp_rows_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(hdrp_rows);
+static const enum vkb_shader hdrp_columns_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(hdrp_columns);
 static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
@@ -88,6 +93,23 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
         && add_halved_image(choice, pass, &row, error);
 }
 
+// The same for a pass whose shader only removes NaN and infinity from the image, as the threshold
+// pass of a published method does.
+static bool add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                           const struct vkb_pass_row *reducing, struct vkb_error *error)
+{
+    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
+    struct vkb_pass_row row;
+
+    if (!threshold || threshold->constants.threshold_mode != THRESHOLD_NONE)
+        return true;
+    memcpy(&row, reducing, sizeof row);
+    row.reads[0] = threshold->reads[0];
+    row.fused = true;
+    row.constants.from_image = true;
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 // Whether the pass weights the taps of a downsampling, which are one and two texels apart.
 static bool weights_taps(const struct vkb_pass_row *pass)
 {
@@ -149,6 +171,89 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
     return !*fits
         || add_words(choice, pass, halve_taps_words[source->format], HALVE_WORDS_COLUMNS,
                      HALVE_WORDS_ROWS, error);
+}
+
+// What reduce.comp makes of its taps, as GROUPS_*; 0: it has no such taps.
+static enum vkb_mode reduced_groups(const struct vkb_pass_row *pass)
+{
+    switch (pass->shader) {
+    case VKB_SHADER_filament_prefilter_frag:
+        return GROUPS_FILAMENT;
+    case VKB_SHADER_hdrp_prefilter_frag:
+        return GROUPS_HDRP;
+    case VKB_SHADER_urp_prefilter_frag:
+        return GROUPS_URP;
+    case VKB_SHADER_unreal_prefilter_frag:
+        return GROUPS_UNREAL;
+    case VKB_SHADER_bevy_prefilter_frag:
+        return GROUPS_BEVY;
+    default:
+        return 0;
+    }
+}
+
+// Adds the pass as one of words, and a fused pass that reads the image itself.
+static bool add_prefilter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                          enum vkb_shader shader, uint32_t columns, uint32_t rows,
+                          struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    row.constants.groups = reduced_groups(pass);
+    row.constants.sampling = 0;
+    vkb_drop_reads(&row, 1);
+    vkb_make_words(&row, shader, columns, rows);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && add_from_image(choice, pass, &row, error);
+}
+
+bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                     bool *fits, struct vkb_error *error)
+{
+    const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
+    const enum vkb_mode groups = reduced_groups(pass);
+
+    *fits = groups && groups != GROUPS_BEVY && !pass->constants.masked
+         && is_half(&choice->plain, pass) && pass->params.prefilter.row_offset == 0
+         && loads(choice, pass);
+    return !*fits
+        || add_prefilter(choice, pass, reduce_words[format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS,
+                         error);
+}
+
+bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                    bool *fits, struct vkb_error *error)
+{
+    const struct vkb_prefilter_params *params = &pass->params.prefilter;
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const enum vkb_mode groups = reduced_groups(pass);
+    const bool taps = groups == GROUPS_FILAMENT
+                   || (groups == GROUPS_BEVY && params->step_x == 1.0f && params->step_y == 1.0f);
+
+    *fits = taps && !pass->constants.masked
+         && (params->source_height ? (uint32_t)params->source_height : source->height)
+                >= (uint32_t)params->target_height
+         && loads(choice, pass);
+    return !*fits
+        || add_prefilter(choice, pass, shrink_words[source->format],
+                         4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, error);
+}
+
+bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       bool *fits, struct vkb_error *error)
+{
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
+    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    const uint32_t word = 4 / vkb_formats[format].channel_size;
+
+    *fits = pass->shader == VKB_SHADER_hdrp_blur_frag
+         && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
+         && pass->params.pyramid.row_offset == 0 && loads(choice, pass);
+    if (!*fits)
+        return true;
+    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, FILTER_ROWS, error)
+                : add_words(choice, pass, hdrp_columns_words[format], word, HDRP_OUTPUTS, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

@@ -1,4 +1,4 @@
-// Variants of upsampling by any factor: filters along rows, then along columns.
+// Variants of upsampling by any factor: in strips, or as two passes, along rows and along columns.
 #include "variants/variant.h"
 
 #include "passes/levels.h"
@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(upsample);
+static const enum vkb_shader final_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(upsample_final);
 static const enum vkb_shader rows_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(filter_rows);
 static const enum vkb_shader columns_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(filter_columns);
@@ -84,6 +86,86 @@ bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *p
 {
     return pass->constants.upsample == UPSAMPLE_LINEAR && !pass->constants.add_own
         && vkb_same_size(graph, pass->reads[0], pass->targets[0]);
+}
+
+// Whether the pass upsamples a level, not larger than its target and of the same format, with a
+// filter of adjacent texels.
+static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    const struct vkb_pyramid_params *params = &pass->params.pyramid;
+    const int32_t kind = pass->constants.upsample;
+
+    if (pass->shader != VKB_SHADER_pyramid_up_frag || vkb_doubles(pass)
+        || vkb_only_scales(graph, pass))
+        return false;
+    const uint32_t height = params->source_height ? (uint32_t)params->source_height
+                                                  : graph->images[pass->reads[0]].height;
+    return (kind == UPSAMPLE_LINEAR || kind == UPSAMPLE_CUBIC || kind == UPSAMPLE_UNIT_TENT)
+        && height <= (uint32_t)params->target_height
+        && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
+}
+
+static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                        const enum vkb_shader *shaders)
+{
+    const enum vkb_format format = choice->graph->images[row->targets[0]].format;
+
+    row->constants.sampling = 0;
+    vkb_make_words(row, shaders[format], UPSAMPLE_COLUMNS(vkb_formats[format].channel_size),
+                   UPSAMPLE_ROWS);
+}
+
+bool vkb_add_upsampled_strips(const struct vkb_variant_choice *choice,
+                              const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = fits_strips(&choice->plain, pass) && vkb_fits_words(choice, pass)
+         && (!pass->constants.add_own
+             || vkb_has_format_of(&choice->plain, pass->reads[1], pass->targets[0]));
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    make_strips(choice, &row, strip_shaders);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// Adds the composite, and after it a fused pass that also upsamples the last level.
+bool vkb_add_upsampled_final(const struct vkb_variant_choice *choice,
+                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    const struct vkb_graph *plain = &choice->plain;
+    const struct vkb_pass_row *up = NULL;
+    struct vkb_pass_row row;
+    struct vkb_upsample_final_params *params = &row.params.upsample_final;
+
+    if (vkb_is_composite(pass))
+        up = vkb_writer_of(plain, pass->reads[1]);
+    *fits = up && fits_strips(plain, up) && !up->constants.add_own && !pass->constants.masked
+         && vkb_has_format_of(plain, up->reads[0], pass->targets[0])
+         && vkb_has_format_of(plain, pass->reads[0], pass->targets[0])
+         && plain->images[pass->reads[1]].format == plain->images[pass->targets[0]].format
+         && vkb_same_size(plain, pass->reads[1], pass->targets[0]) && vkb_fits_words(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    memset(&row.params, 0, sizeof row.params);
+    row.fused = true;
+    row.reads[0] = up->reads[0];
+    row.reads[1] = pass->reads[0];
+    vkb_drop_reads(&row, 2);
+    row.block = VKB_BLOCK_upsample_final;
+    params->target_width = up->params.pyramid.target_width;
+    params->target_height = up->params.pyramid.target_height;
+    params->source_height = up->params.pyramid.source_height;
+    params->row_offset = up->params.pyramid.row_offset;
+    params->coarse = up->params.pyramid.coarse;
+    VKB_TAKE_COMPOSITE(&row, upsample_final, pass);
+    make_strips(choice, &row, final_shaders);
+    row.constants.upsample = up->constants.upsample;
+    row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
+    return vkb_add_fullscreen(choice, pass, error)
+        && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 bool vkb_add_upsampled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

@@ -1,13 +1,14 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// URP's prefilter: one bilinear tap, a clamp, the soft threshold (Unity-Technologies/Graphics,
-// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509).
+#extension GL_EXT_control_flow_attributes : require
+// URP's prefilter: one bilinear tap.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
+#include "lib/prefilters.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
@@ -17,11 +18,6 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 vec4 shade()
 {
-    vec4 kept = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING);
-    kept.rgb = min(kept.rgb, vec3(params.clamp_max));
-    if (THRESHOLDED != 0) {
-        float width = params.threshold * params.knee;
-        kept = soft_threshold(kept, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
-    }
-    return stored(mask_value() * max(kept, vec4(0.0)));
+    vec4 value = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING);
+    return stored(mask_value() * urp_prefiltered(value));
 }

@@ -102,6 +102,19 @@ uvec4 with_alpha_of(uvec4 own, vec4 value)
 #endif
 }
 
+// The pixel with 0 in place of NaN and infinity in each channel.
+uvec4 finite_bits(uvec4 raw)
+{
+#if CHANNEL_BYTES == 2
+    // A carry is where all bits of the exponent are set.
+    uvec2 special = ((raw.xy & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
+    raw.xy &= ~(special | (special - (special >> 15)));
+#elif CHANNEL_BYTES != 1
+    raw = mix(raw, uvec4(0), equal(raw & 0x7f800000u, uvec4(0x7f800000u)));
+#endif
+    return raw;
+}
+
 // A pixel of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
 uvec4 buffer_of(vec4 value)
 {
@@ -134,17 +147,22 @@ uvec4 finished(uvec4 own, vec4 value)
 #ifdef WORDS
 
 // A pixel anywhere in an image of this shape (see Words).
-vec4 load_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
+uvec4 raw_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
 {
     uvec4 word = texelFetch(image, row * shape.z + at * CHANNEL_BYTES / 4);
 #if CHANNEL_BYTES == 1
     uvec2 half_word = (at & 2) == 0 ? word.xy : word.zw;
-    return value_of(uvec4((at & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0));
+    return uvec4((at & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0);
 #elif CHANNEL_BYTES == 2
-    return value_of(uvec4((at & 1) == 0 ? word.xy : word.zw, 0, 0));
+    return uvec4((at & 1) == 0 ? word.xy : word.zw, 0, 0);
 #else
-    return value_of(word);
+    return word;
 #endif
+}
+
+vec4 load_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
+{
+    return value_of(raw_pixel(image, shape, at, row));
 }
 
 // A pixel of an image of single floats. Above and below the image, the outermost rows are repeated.

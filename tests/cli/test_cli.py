@@ -19,7 +19,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.processes import python
+from tests.processes import python
 from vkbloom.cli import fields
 from vkbloom.cli.program import COMMANDS, as_wrong_use, program
 from vkbloom.cli.settings_options import METHODS, settings_options

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +12,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.processes import python
+from tests.processes import python
 from vkbloom.cli.program import program
 from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
@@ -422,13 +419,7 @@ class TestErrors:
         content = path.read_bytes()
         path.write_bytes(content[: len(content) // 2])
         # As a process, because libpng writes to the descriptor.
-        ended = subprocess.run(
-            [sys.executable, "-m", "vkbloom.cli", "apply", str(path), str(tmp_path / "b.png")],
-            env=dict(os.environ),
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        ended = python("-m", "vkbloom.cli", "apply", path, tmp_path / "b.png")
         assert (ended.returncode, ended.stdout) == (1, "")
         assert ended.stderr.startswith(f"vkbloom: {path}: ")
         assert ended.stderr.count("\n") == 1

@@ -21,6 +21,7 @@ import pytest
 import vkbloom
 from tests.framebuffers import noise
 from tests.grid.stores import contents
+from tests.processes import output, python
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, reductions
 from vkbloom.grid.filling import Filler
 from vkbloom.grid.identity import differences
@@ -275,8 +276,8 @@ class TestResumed:
                 process.wait()
             if (store / "zarr.json").exists():
                 assert int(xr.open_zarr(store)["done"].sum()) < 1000
-        subprocess.run([sys.executable, str(script), str(store)], check=True)
-        subprocess.run([sys.executable, str(script), str(whole)], check=True)
+        output(script, store)
+        output(script, whole)
         assert contents(store) == contents(whole)
 
     def test_resume_can_be_declined(self, copy: Path) -> None:
@@ -687,9 +688,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
         "                     chunks={'intensity': 2})\n"
     )
     store = tmp_path / "a.zarr"
-    ended = subprocess.run(
-        [sys.executable, "-c", code, str(store)], capture_output=True, text=True, check=False
-    )
+    ended = python("-c", code, store)
     assert f"OSError: [Errno 27] File too large: '{store}/" in ended.stderr
     assert not list(store.rglob("*.partial"))
     assert check_grid(store).done == 0

@@ -1,0 +1,113 @@
+// What the first passes of published methods make of their bilinear taps.
+#include "lib/groups.glsl"
+
+float brightest(vec3 value)
+{
+    return max(max(value.r, max(value.g, value.b)), 0.0);
+}
+
+// Bevy's: 13 taps in groups that are weighted by brightness but not renormalized, a floor, then the
+// threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
+vec4 bevy_prefiltered(Taps taps)
+{
+    vec4 means[5] = group_means(taps);
+    vec4 sum = vec4(0.0);
+    [[unroll]] for (int group = 0; group < 5; ++group) {
+        vec4 part = GROUP_SHARES[group] * means[group];
+        // Bevy's buffers hold no negative values. These do, and the divisor must not become 0.
+        float luminance = max(dot(part.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
+        sum += part / (1.0 + 0.25 * luminance);
+    }
+    sum.rgb = max(sum.rgb, vec3(1e-4));
+    if (THRESHOLDED != 0) {
+        float width = params.threshold * params.knee;
+        sum = soft_threshold(sum, params.threshold, width, 4.0 * (width + 1e-5), 1e-5);
+    }
+    return sum;
+}
+
+// The shares of Filament's four taps, and the distances of the first and the last of them. Along an
+// axis the texels at -1 .. 2 have the weights (1 - f, 2 - f, 1 + f, f) / 4. Two bilinear taps, each
+// between two texels, give these weights.
+struct FilamentTaps {
+    vec4 shares;
+    vec2 left, right;
+};
+
+FilamentTaps filament_taps(vec2 part)
+{
+    vec2 left_share = 0.25 * (3.0 - 2.0 * part), right_share = 0.25 * (1.0 + 2.0 * part);
+    vec4 shares = vec4(left_share.x, right_share.x, left_share.x, right_share.x)
+                * vec4(left_share.yy, right_share.yy);
+    return FilamentTaps(shares, (2.0 - part) / (3.0 - 2.0 * part) - 1.0 - part,
+                        1.0 + part / (1.0 + 2.0 * part) - part);
+}
+
+// Filament's: four taps with these shares. With the threshold it also has a firefly filter, which
+// weights the taps by brightness (google/filament, bloomDownsample2x.mat @ 9f62dc2f2f53).
+vec4 filament_prefiltered(vec4 taps[4], vec4 shares)
+{
+    vec4 sum = vec4(0.0);
+    float total = 0.0;
+    [[unroll]] for (int i = 0; i < 4; ++i) {
+        float share = shares[i];
+        if (THRESHOLDED != 0)
+            share /= 1.0 + brightest(taps[i].rgb);
+        sum += share * taps[i];
+        total += share;
+    }
+    sum /= total;
+    if (THRESHOLDED != 0) {
+        vec3 kept = max(sum.rgb - params.threshold, vec3(0.0));
+        kept /= 1.0 + brightest(kept) / params.highlight;
+        // The threshold subtracts from colours. The alpha is multiplied by the factor of the
+        // brightest channel.
+        float value = brightest(sum.rgb);
+        sum = vec4(kept, value > 0.0 ? sum.a * (brightest(kept) / value) : 0.0);
+    }
+    return sum;
+}
+
+// HDRP's: the centre and four diagonal taps, at these distances in texels, weighted against fireflies
+// (Karis 2013; Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition,
+// BloomPrefilter.compute @ 2309d2c2fde8).
+const vec2 HDRP_OFFSETS[5] = vec2[](vec2(0.0, 0.0), vec2(0.9, -0.4), vec2(-0.9, 0.4),
+                                    vec2(0.4, 0.9), vec2(-0.4, -0.9));
+
+vec4 hdrp_prefiltered(vec4 taps[5])
+{
+    vec4 sum = vec4(0.0);
+    float shares = 0.0;
+    [[unroll]] for (int i = 0; i < 5; ++i) {
+        float luminance = dot(taps[i].rgb, vec3(0.2126729, 0.7151522, 0.0721750));
+        float share = 1.0 / (1.0 + max(luminance, 0.0));
+        sum += share * taps[i];
+        shares += share;
+    }
+    return sum / shares;
+}
+
+// URP's: a clamp, the soft threshold (Unity-Technologies/Graphics,
+// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509).
+vec4 urp_prefiltered(vec4 value)
+{
+    vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
+    if (THRESHOLDED != 0) {
+        float width = params.threshold * params.knee;
+        kept = soft_threshold(kept, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
+    }
+    return max(kept, vec4(0.0));
+}
+
+// three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
+// examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
+vec4 unreal_prefiltered(vec4 value)
+{
+    if (THRESHOLDED == 0)
+        return value;
+    // BloomNode's luminance is that of three.js' colour management.
+    const vec3 weights = NODE != 0 ? vec3(0.2126, 0.7152, 0.0722)
+                                   : vec3(0.2126729, 0.7151522, 0.0721750);
+    float luminance = dot(value.rgb, weights);
+    return value * smoothstep(params.threshold, params.threshold + params.smooth_width, luminance);
+}

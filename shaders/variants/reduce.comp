@@ -1,0 +1,90 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// The first passes of published methods that read an image of exactly twice the target's size, with
+// bilinear taps among 4 x 4 texels. An invocation writes a strip from top to bottom and loads each
+// texel once.
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+#include "lib/threshold.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+#include "lib/prefilters.glsl"
+#include "variants/pixels.glsl"
+
+const int COLUMNS = HALVE_WORDS_COLUMNS, ROWS = HALVE_WORDS_ROWS;
+const int LOADED = 2 * COLUMNS + 2;
+// A pixel of the target has the texels BEFORE before twice its own position to 2 after it.
+const int BEFORE = 1, SIDE = 4;
+
+layout(local_size_x = ROW_INVOCATIONS) in;
+READ_IMAGE(1, source);
+WRITE_IMAGE(2);
+
+#define LOAD load_run
+#define LOAD_IMAGE source
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS 4
+#define LOAD_FROM (-BEFORE)
+#define LOAD_COUNT LOADED
+#include "variants/load.glsl"
+
+#define STORE_COUNT COLUMNS
+#include "variants/store.glsl"
+
+vec4 texels[SIDE][LOADED];
+
+void load_row(int x, int y, int row)
+{
+    uvec4 raw[LOADED];
+
+    load_run(2 * x, clamp(y, 0, read_shapes[0].y - 1), raw);
+    [[unroll]] for (int i = 0; i < LOADED; ++i)
+        texels[row][i] = value_of(FROM_IMAGE != 0 ? finite_bits(raw[i]) : raw[i]);
+}
+
+// A bilinear tap of the pixel in this column, at an offset from the middle of its 2 x 2 texels.
+vec4 tap(int column, vec2 offset)
+{
+    vec2 moved = offset + 0.5, integer = floor(moved), part = moved - integer;
+    int x = 2 * column + BEFORE + int(integer.x), y = BEFORE + int(integer.y);
+    return bilinear(vec4[](texels[y][x], texels[y][x + 1], texels[y + 1][x], texels[y + 1][x + 1]),
+                    part);
+}
+
+vec4 prefiltered(int column)
+{
+    if (GROUPS == GROUPS_FILAMENT) {
+        vec4 taps[4] = vec4[](tap(column, vec2(-0.75, -0.75)), tap(column, vec2(0.75, -0.75)),
+                              tap(column, vec2(-0.75, 0.75)), tap(column, vec2(0.75, 0.75)));
+        return filament_prefiltered(taps, vec4(0.25));
+    }
+    if (GROUPS == GROUPS_HDRP) {
+        vec4 taps[5];
+        [[unroll]] for (int i = 0; i < 5; ++i)
+            taps[i] = tap(column, HDRP_OFFSETS[i]);
+        return hdrp_prefiltered(taps);
+    }
+    vec4 value = tap(column, vec2(0.0));
+    return GROUPS == GROUPS_URP ? urp_prefiltered(value) : unreal_prefiltered(value);
+}
+
+void main()
+{
+    read_words();
+    ivec2 size = TARGET_SIZE();
+    ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
+    int end = min(first.y + ROWS, size.y);
+    uvec4 pixels[COLUMNS];
+
+    if (any(greaterThanEqual(first, size)))
+        return;
+    for (int y = first.y; y < end; ++y) {
+        [[unroll]] for (int row = 0; row < SIDE; ++row)
+            load_row(first.x, 2 * y - BEFORE + row, row);
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            pixels[i] = buffer_of(prefiltered(i));
+        store(first.x, y, pixels);
+    }
+}
