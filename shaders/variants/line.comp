@@ -76,13 +76,13 @@ void blur_rolled()
     }
     if (any(greaterThanEqual(first, imageSize(target))))
         return;
-    for (int i = 0; i < ROLLED_OUTPUTS + 2 * params.radius; ++i) {
-        vec4 texel = load(first, i - RADIUS);
+    for (int number = 0; number < ROLLED_OUTPUTS + 2 * params.radius; ++number) {
+        vec4 texel = load(first, number - RADIUS);
         [[unroll]] for (int j = 0; j < 2 * RADIUS; ++j)
             sums[2 * RADIUS - j] = sums[2 * RADIUS - j - 1] + weights[2 * RADIUS - j] * texel;
         sums[0] = weights[0] * texel;
-        if (i >= 2 * RADIUS)
-            write(first + (i - 2 * RADIUS) * along(), sums[2 * RADIUS]);
+        if (number >= 2 * RADIUS)
+            write(first + (number - 2 * RADIUS) * along(), sums[2 * RADIUS]);
     }
 }
 
