@@ -113,7 +113,10 @@ class Record:
         """
         itself: Any = self
         values = {each.name: getattr(self, each.name) for each in dataclasses.fields(itself)}
-        return {self._class_key: self._class_name(), **{k: _plain(v) for k, v in values.items()}}
+        return {
+            self._class_key: self._class_name(),
+            **{k: plain_value(v) for k, v in values.items()},
+        }
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
@@ -133,8 +136,8 @@ class Record:
         Raises
         ------
         ValueError
-            There is no such class or field, the named class is not that of the call, or a value is
-            out of range.
+            There is no such class or field, the named class is not that of the call, a field
+            without a default has no value, or a value is out of range.
         TypeError
             `fields` is not a mapping, or a value has the wrong type.
 
@@ -158,13 +161,22 @@ class Record:
         if own not in (None, name):
             raise ValueError(f"{key}: {name!r} is not the {own!r} of {cls.__name__}")
         values = {field: value for field, value in fields.items() if field != key}
-        known = [field.name for field in dataclasses.fields(classes[name])]
+        declared = dataclasses.fields(classes[name])
+        known = [field.name for field in declared]
         unknown = [field for field in values if field not in known]
         if unknown:
             raise ValueError(
                 f"{cls._subject}: {name} has no {', '.join(map(repr, unknown))}; "
                 f"it has {', '.join(known)}"
             )
+        without = (dataclasses.MISSING, dataclasses.MISSING)
+        lacking = [
+            field.name
+            for field in declared
+            if field.name not in values and (field.default, field.default_factory) == without
+        ]
+        if lacking:
+            raise ValueError(f"{cls._subject}: {name} needs a value for {', '.join(lacking)}")
         made: Self = classes[name](**values)
         return made
 
@@ -221,10 +233,10 @@ class Record:
         return cls.from_dict(fields)
 
 
-def _plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """Return the value of a field as values that JSON can represent."""
     if isinstance(value, tuple | list):
-        return [_plain(item) for item in value]
+        return [plain_value(item) for item in value]
     for convert in ("to_dict", "to_plain"):
         if hasattr(value, convert):
             return getattr(value, convert)()

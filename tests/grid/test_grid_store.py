@@ -22,7 +22,7 @@ import vkbloom
 from tests.framebuffers import noise
 from tests.grid.stores import contents
 from tests.processes import output, python
-from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, reductions
+from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, psf, reductions
 from vkbloom.grid.filling import Filler
 from vkbloom.grid.identity import differences
 from vkbloom.grid.store import GridStore
@@ -136,6 +136,32 @@ class TestWhole:
         )
         assert list(listed["image"].values) == ["x", "y"]
         assert check_grid(tmp_path / "c.zarr").complete
+
+    @pytest.mark.parametrize(
+        ("settings", "axis", "values"),
+        [
+            (Pyramid(levels=2), "glare", [(), vkbloom.Halo(), "godot_dirt"]),
+            (vkbloom.Convolution(), "psf", [psf.gaussian(1), np.ones((3, 5), np.float32)]),
+            (
+                Pyramid(glare=(vkbloom.Dirt(),)),
+                "glare.0.image",
+                [None, np.ones((2, 3), np.float32)],
+            ),
+        ],
+    )
+    def test_fields_that_are_objects_are_axes(
+        self, tmp_path: Path, renderer: Renderer, settings: Any, axis: str, values: Any
+    ) -> None:
+        stored = grid_to_zarr(source(), settings, {axis: values}, tmp_path / "a.zarr")
+        for place, value in enumerate(values):
+            expected = renderer.apply(source(), settings.replace(**{axis: value}))["final"]
+            np.testing.assert_array_equal(stored["final"][place], expected)
+        in_memory = renderer.grid(source(), settings, {axis: values}, progress=False)
+        assert list(in_memory[axis].values) == list(stored[axis].values)
+        again = grid_to_zarr(source(), settings, {axis: values}, tmp_path / "a.zarr")
+        assert again.attrs["passes_run"] == 0
+        with pytest.raises(ValueError, match=rf"axes\.{axis}"):
+            grid_to_zarr(source(), settings, {axis: values[:1]}, tmp_path / "a.zarr")
 
     def test_masks_and_emissions_belong_to_the_source(
         self, tmp_path: Path, renderer: Renderer
