@@ -42,15 +42,16 @@ void store(int first, int row, uvec4 raw[STORE_COUNT])
     // 64-bit integers of a run. Rows of three channels have multiples of three, others of four.
     const int RUN = TARGET_CHANNELS == 3 ? 3 : STORE_COUNT * BYTES % 32 == 0 ? 4 : 2;
     const int COUNT = STORE_COUNT * BYTES / (8 * RUN);
-    int start = first * BYTES / (8 * RUN);
-    int last = (target_shape.x * BYTES - 1) / (8 * RUN);
-    int row_start = (row - target_shape.w) * target_shape.z * 2 / RUN;
+    const uint PIXELS = 8 * RUN / BYTES;
+    int start = int(uint(first) / PIXELS), last = int(uint(target_shape.x - 1) / PIXELS);
+    int row_start = (row - target_shape.w) * (2 * target_shape.z / RUN);
     [[unroll]] for (int i = 0; i < COUNT; ++i) {
         uvec2 part[4];
         [[unroll]] for (int j = 0; j < RUN; ++j)
             part[j] = uvec2(quarter_of(raw, 2 * (RUN * i + j)),
                             quarter_of(raw, 2 * (RUN * i + j) + 1));
-        if (start + i <= last)
+        // The first pixel is inside of the image.
+        if (i == 0 || start + i <= last)
             store_run(row_start + start + i, RUN, part);
     }
 #else
