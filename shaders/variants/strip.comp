@@ -12,6 +12,9 @@ const int ROWS = STRIP_ROWS(CHANNEL_BYTES), LOADED = ROWS + 2 * STRIP_RADIUS;
 const int KEPT = 2 * STRIP_RADIUS;
 const int WAITING = STRIP_RADIUS / COLUMNS;
 const int STEP = 2 * COLUMNS;
+// Words of each row that are loaded before the first of them is used: llvmpipe calls a function for
+// each load, before which it moves what is in registers to memory.
+const int AHEAD = CHANNEL_BYTES == 4 ? 1 : 2;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, image);
@@ -53,14 +56,20 @@ void pixels_of(uvec4 word, out uvec4 raw[COLUMNS])
 #endif
 }
 
-// Sums of columns of the word `at` for all rows.
-void add_columns(int at, out vec3 sums[ROWS][COLUMNS])
+void load_columns(int at, out uvec4 loaded[LOADED])
+{
+    [[unroll]] for (int i = 0; i < LOADED; ++i)
+        loaded[i] = texelFetch(image, rows[i] + at);
+}
+
+// Sums of the columns of a word for all rows.
+void add_columns(uvec4 words[LOADED], out vec3 sums[ROWS][COLUMNS])
 {
     [[unroll]] for (int loaded = 0; loaded < LOADED; ++loaded) {
-        uvec4 raw[COLUMNS], word = texelFetch(image, rows[loaded] + at);
-        pixels_of(word, raw);
+        uvec4 raw[COLUMNS];
+        pixels_of(words[loaded], raw);
         if (loaded >= STRIP_RADIUS && loaded < ROWS + STRIP_RADIUS)
-            waiting[loaded - STRIP_RADIUS][WAITING] = word;
+            waiting[loaded - STRIP_RADIUS][WAITING] = words[loaded];
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             vec3 added = thresholded(value_of(raw[i]).rgb);
             // (A loop over the rows of this tap alone has no constant ends, so it is not unrolled.)
@@ -107,14 +116,19 @@ void finish_row(int row, ivec2 first, vec3 sums[COLUMNS], out uvec4 raw[COLUMNS]
     }
 }
 
-// Adds the word of the column x to all rows. The pixels from `done` on are finished then.
-void add_word(int x, ivec2 done, ivec2 size, out uvec4 raw[ROWS][COLUMNS])
+// The word of the column x, or the nearest one in the image.
+int word_of(int x, int width)
 {
-    int at = clamp(x >> WORD_SHIFT, 0, (size.x - 1) >> WORD_SHIFT);
+    return clamp(x >> WORD_SHIFT, 0, (width - 1) >> WORD_SHIFT);
+}
+
+// Adds the word of the column x to all rows. The pixels from `done` on are finished then.
+void add_word(int x, uvec4 loaded[LOADED], ivec2 done, int width, out uvec4 raw[ROWS][COLUMNS])
+{
     vec3 sums[ROWS][COLUMNS];
 
-    add_columns(at, sums);
-    repeat_edges(x, at, size.x, sums);
+    add_columns(loaded, sums);
+    repeat_edges(x, word_of(x, width), width, sums);
     [[unroll]] for (int row = 0; row < ROWS; ++row)
         finish_row(row, done + ivec2(0, row), sums[row], raw[row]);
 }
@@ -130,14 +144,18 @@ void main()
         return;
     start_row_sums(first, size);
     for (int x = first.x - STRIP_RADIUS; x < end + STRIP_RADIUS; x += STEP) {
-        uvec4 raw[ROWS][STEP], added[ROWS][COLUMNS];
+        uvec4 loaded[2][LOADED], added[ROWS][COLUMNS], raw[ROWS][STEP];
         ivec2 done = ivec2(x - STRIP_RADIUS, first.y);
         // All pixels before the first store, after which compilers load parameters lane by lane.
-        [[unroll]] for (int i = 0; i < STEP; i += COLUMNS) {
-            add_word(x + i, done + ivec2(i, 0), size, added);
+        [[unroll]] for (int word = 0; word < 2; ++word) {
+            int start = word * COLUMNS;
+            if (word % AHEAD == 0)
+                [[unroll]] for (int i = 0; i < AHEAD; ++i)
+                    load_columns(word_of(x + start + i * COLUMNS, size.x), loaded[word + i]);
+            add_word(x + start, loaded[word], done + ivec2(start, 0), size.x, added);
             [[unroll]] for (int row = 0; row < ROWS; ++row)
-                [[unroll]] for (int j = 0; j < COLUMNS; ++j)
-                    raw[row][i + j] = added[row][j];
+                [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+                    raw[row][start + i] = added[row][i];
         }
         if (done.x < first.x)
             continue;
