@@ -32,11 +32,14 @@ WORDS_ALONE = {
     "kawase_columns.comp",
     "halve_taps.comp",
     "reduce.comp",
+    "shrink.comp",
     "kino_bright.comp",
     "highlights.comp",
     "scale.comp",
     "streaks.comp",
     "godot_rows.comp",
+    "hdrp_rows.comp",
+    "hdrp_columns.comp",
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
@@ -15,8 +16,9 @@ from benchmarks.results import Report, Section
 
 __all__ = ["BENCHMARKS", "run"]
 
-#: What each benchmark times, by its id. Each is a module of this package (with _ in place of -)
-#: that has a function ``run(plan) -> Section``.
+#: What each benchmark times, by its id. Each is a module of this package (with _ in place of -).
+#: The paragraphs of its docstring, after the first, begin `Section.about`. Its function
+#: ``run(plan, section)`` adds the rest.
 BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "image": "an image's bloom, NumPy in and out, against image libraries",
@@ -67,7 +69,11 @@ def run(plan: Plan) -> Iterator[Report]:
     for name in plan.only or BENCHMARKS:
         plan.tell(name)
         module = importlib.import_module(f"benchmarks.{name.replace('-', '_')}")
-        section: Section = module.run(plan)
+        _, *about = (inspect.getdoc(module) or "").split("\n\n")
+        section = Section(name, about=[" ".join(paragraph.split()) for paragraph in about])
+        module.run(plan, section)
+        # Several groups of contenders may have missed the same peer.
+        section.missing = list(dict.fromkeys(section.missing))
         if plan.quick:
             # The figures of a quick run mean nothing.
             section.goals.clear()

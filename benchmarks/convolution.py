@@ -1,4 +1,9 @@
-"""Convolution with large kernels, NumPy in and out, against SciPy's Fourier transforms."""
+"""Convolution with large kernels, NumPy in and out, against SciPy's Fourier transforms.
+
+Hard luminance threshold, convolution by Fourier transforms, sum. NumPy array in, new NumPy array
+out; wall-clock time. All keep the kernel's spectrum between calls and pad no more than they need.
+Each round has another image than the round before.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +15,7 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.ours import OURS
 from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, agreement, side_by_side
 from benchmarks.timing import Contender, alternate
@@ -18,7 +24,6 @@ __all__ = ["ALLOWED", "kernel_sizes", "placed", "run", "settings_of"]
 
 SIZE: Final = (1920, 1080)
 ROUNDS: Final = 9
-OURS: Final = "vkbloom"
 SCIPY: Final = "SciPy's transforms"
 
 #: The allowed difference of pictures by dtype, and the reason.
@@ -80,24 +85,14 @@ def placed(
     return np.roll(result, (-up, -left), (1, 2)), (padded[0], padded[1])
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time the bloom of an RGB image with a small kernel and with one of full size."""
     size = plan.size(*SIZE)
-    section = Section(
-        "convolution",
-        f"Convolution at {size[0]} x {size[1]}, float32 RGB",
-        [
-            "Hard luminance threshold, convolution by Fourier transforms, sum. NumPy array in, "
-            "new NumPy array out; wall-clock time. All keep the kernel's spectrum between calls "
-            "and pad no more than they need. Each round has another image than the round before.",
-        ],
-    )
+    section.title = f"Convolution at {size[0]} x {size[1]}, float32 RGB"
     images = pictures(size, np.float32, 3)
     for name, kernel_size in kernel_sizes(size, 256).items():
         plan.tell(f"convolution: {name}")
         _time_one(plan, section, name, settings_of(kernel_size), images)
-    section.missing = list(dict.fromkeys(section.missing))
-    return section
 
 
 def _time_one(

@@ -1,4 +1,10 @@
-"""Convolution with large kernels on a GPU, half-float RGBA in and out, against torch.fft."""
+"""Convolution with large kernels on a GPU, half-float RGBA in and out, against torch.fft.
+
+Times on the device: for vkbloom the timestamps of its passes, for torch CUDA events. The complete
+bloom is a hard threshold, the convolution in single floats and the sum; alone are the transforms
+and the product, from half floats to half floats. All keep the kernel's spectrum. The images of
+torch stay on the device.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +19,7 @@ import vkbloom
 from benchmarks import peers
 from benchmarks.convolution import ALLOWED, kernel_sizes, placed, settings_of
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.ours import OURS
 from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, Table, agreement, side_by_side
 from benchmarks.timing import Contender, alternate, device_clock
@@ -20,32 +27,24 @@ from benchmarks.timing import Contender, alternate, device_clock
 __all__ = ["run"]
 
 ROUNDS: Final = 25
-OURS: Final = "vkbloom"
 OURS_ALONE: Final = "vkbloom, convolution alone"
 STAGES: Final = "vkbloom, stage by stage"
 TORCH: Final = "torch.fft"
 TORCH_ALONE: Final = "torch.fft, convolution alone"
-COPY: Final = "plain copy on the device"
 #: The passes of the convolution itself, by the names of their times.
 PASSES: Final = ("spectrum", "bloom")
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time 4K with a kernel of 1024 x 1024 and of full size, and 1080p of full size."""
-    section = Section("convolution-gpu", "Convolution on the GPU, float16 RGBA")
+    section.title = "Convolution on the GPU, float16 RGBA"
     with ExitStack() as stack:
         ours = stack.enter_context(plan.renderer())
         clock = device_clock(ours.info)
         if clock is None:
             section.missing.append(f"all of it: {ours.info.name} is no GPU")
-            return section
+            return
         stages = stack.enter_context(plan.renderer("fragment"))
-        section.about.append(
-            "Times on the device: for vkbloom the timestamps of its passes, for torch CUDA events. "
-            "The complete bloom is a hard threshold, the convolution in single floats and the "
-            "sum; alone are the transforms and the product, from half floats to half floats. All "
-            "keep the kernel's spectrum. The images of torch stay on the device."
-        )
         for size in (plan.size(3840, 2160), plan.size(1920, 1080)):
             images = pictures(size, np.float16)
             kernels = kernel_sizes(size, 1024 if size[0] > 1920 else 256)
@@ -54,8 +53,6 @@ def run(plan: Plan) -> Section:
                 plan.tell(f"convolution-gpu: {group}")
                 work = _Work(group, settings_of(kernel_size), images)
                 _time_one(plan, section, work, (ours, stages))
-    section.missing = list(dict.fromkeys(section.missing))
-    return section
 
 
 class _Work(NamedTuple):
@@ -104,7 +101,7 @@ def _time_one(
     alone = apply(ours, "bloom")(0)["bloom"]
     for name, (call, seconds, fetch) in theirs.items():
         calls[name] = call, seconds
-        if name != COPY:
+        if name != peers.COPY:
             expected = alone if name == TORCH_ALONE else pictures_made[STAGES][0]
             pictures_made[name] = expected, fetch(call(0))
     for name, (expected, made) in pictures_made.items():
@@ -132,7 +129,7 @@ def _time_one(
         if other in times:
             ratio = times[mine].over(times[other]).value
             section.goals.append(Goal(f"{group}: {mine} / {other}", ratio, 1.0, at_most=True))
-    if COPY in times:
+    if peers.COPY in times:
         section.tables.append(
             Table(
                 f"{group}: image read once and written once",
@@ -141,9 +138,9 @@ def _time_one(
                     (
                         name,
                         f"{2 * images[0].nbytes / times[name].median / 1e9:.0f}",
-                        f"{times[COPY].median / times[name].median:.3f}",
+                        f"{times[peers.COPY].median / times[name].median:.3f}",
                     )
-                    for name in (COPY, OURS, OURS_ALONE, TORCH, TORCH_ALONE)
+                    for name in (peers.COPY, OURS, OURS_ALONE, TORCH, TORCH_ALONE)
                     if name in times
                 ),
             )

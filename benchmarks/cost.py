@@ -1,4 +1,9 @@
-"""Cost against the number of pixels, the length of the kernel and the number of levels."""
+"""Cost against the number of pixels, the length of the kernel and the number of levels.
+
+float16 RGBA, another image in each round. CPU adapters: wall-clock time, NumPy in and out. GPUs:
+time of the passes on the device; OpenCV always has wall-clock time. The lines are least-squares
+fits of relative deviations. A positive deviation is slower than the line.
+"""
 
 from __future__ import annotations
 
@@ -55,18 +60,9 @@ class Line:
         return y / (self.start + self.slope * x) - 1
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time vkbloom and OpenCV over sizes and kernels, and vkbloom over levels."""
-    section = Section(
-        "cost",
-        "Cost against pixels, kernel length and levels",
-        [
-            "float16 RGBA, another image in each round. CPU adapters: wall-clock time, NumPy in "
-            "and out. GPUs: time of the passes on the device; OpenCV always has wall-clock "
-            "time. The lines are least-squares fits of relative deviations. A positive "
-            "deviation is slower than the line.",
-        ],
-    )
+    section.title = "Cost against pixels, kernel length and levels"
     with ExitStack() as stack:
         ours, source = (
             stack.enter_context(plan.renderer(variant)) for variant in ("auto", "fragment")
@@ -74,8 +70,6 @@ def run(plan: Plan) -> Section:
         _over_pixels(plan, section, ours, source)
         _over_taps(plan, section, ours)
         _over_levels(plan, section, ours)
-    section.missing = list(dict.fromkeys(section.missing))
-    return section
 
 
 def _peer_contenders(

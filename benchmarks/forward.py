@@ -1,4 +1,9 @@
-"""The time that bloom adds to a forward frame: frames with it minus frames without it."""
+"""The time that bloom adds to a forward frame: frames with it minus frames without it.
+
+The built-in scene at another time in each round, so that every pass runs. `final` is read back;
+wall-clock time. The cost of bloom is the difference between a frame with bloom and the frame of the
+same round without bloom, which has no glow mesh either.
+"""
 
 from __future__ import annotations
 
@@ -17,19 +22,10 @@ ROUNDS: Final = 25
 NAMES: Final = {"auto": "vkbloom", "fragment": "the source's variant"}
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time frames of the built-in scene with all defaults, bloom on and off."""
     size = plan.size(*SIZE)
-    section = Section(
-        "forward",
-        f"A forward frame at {size[0]} x {size[1]}, all defaults",
-        [
-            "The built-in scene at another time in each round, so that every pass runs. `final` "
-            "is read back; wall-clock time. The cost of bloom is the difference between a frame "
-            "with bloom and the frame of the same round without bloom, which has no glow mesh "
-            "either.",
-        ],
-    )
+    section.title = f"A forward frame at {size[0]} x {size[1]}, all defaults"
     scene = vkbloom.Scene.ufo()
     with ExitStack() as stack:
         # One renderer each: a renderer that has drawn the scene with bloom would not draw it again
@@ -81,4 +77,3 @@ def run(plan: Plan) -> Section:
     if all(found.agrees for found in section.agreements):
         what = "forward frame: bloom's cost / that of the source's variant"
         section.goals.append(Goal(what, ratio, 1 / 3, at_most=True))
-    return section

@@ -1,4 +1,13 @@
-"""Bloom of an image, NumPy in and out: threshold, nine taps of the forward system, sum."""
+"""Bloom of an image, NumPy in and out: threshold, nine taps of the forward system, sum.
+
+Hard luminance threshold, the nine taps of the forward system (strength 1.5) in both directions,
+sum. NumPy array in, new NumPy array out; wall-clock time. Each round gives every contender another
+image than the round before. Contenders that can keep intermediate buffers between calls do so.
+Peers need not keep alpha.
+
+The contender with the same image has another `blur_strength` in each round. So the image is not
+uploaded again, and the threshold pass does not run again.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +21,7 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.ours import FRAGMENT, OURS
 from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, agreement, side_by_side
 from benchmarks.timing import Contender, Times, alternate
@@ -21,8 +31,6 @@ __all__ = ["ALLOWED", "SETTINGS", "full_kernel", "run"]
 SETTINGS: Final = vkbloom.Separable(threshold=THRESHOLD)
 SIZE: Final = (1920, 1080)
 ROUNDS: Final = 15
-OURS: Final = "vkbloom"
-FRAGMENT: Final = "vkbloom, the source's fragment variant"
 UNCHANGED: Final = "vkbloom, same image, other strength"
 
 #: The allowed difference of pictures by dtype, and the reason.
@@ -54,26 +62,13 @@ def full_kernel(settings: vkbloom.Separable) -> NDArray[np.float32]:
     return np.concatenate([one_side[::-1], settings.weights[:1], one_side]).astype(np.float32)
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time the bloom of RGBA and RGB images of each dtype."""
     size = plan.size(*SIZE)
-    section = Section(
-        "image",
-        f"An image's bloom at {size[0]} x {size[1]}",
-        [
-            "Hard luminance threshold, the nine taps of the forward system (strength 1.5) in "
-            "both directions, sum. NumPy array in, new NumPy array out; wall-clock time. Each "
-            "round gives every contender another image than the round before. Contenders that "
-            "can keep intermediate buffers between calls do so. Peers need not keep alpha.",
-            f'"{UNCHANGED}" uses one image and another `blur_strength` in each round. So the '
-            "image is not uploaded again, and the threshold pass does not run again.",
-        ],
-    )
+    section.title = f"An image's bloom at {size[0]} x {size[1]}"
     for dtype in ("float16", "float32", "uint8"):
         for channels in (4, 3):
             _time_one(plan, section, size, np.dtype(dtype), channels)
-    section.missing = list(dict.fromkeys(section.missing))
-    return section
 
 
 def _time_one(

@@ -1,4 +1,14 @@
-"""Bloom of an image at 4K on a GPU: times on the device, and until Python has the array."""
+"""Bloom of an image at 4K on a GPU: times on the device, and until Python has the array.
+
+Times on the device: for vkbloom the sum of the timestamps of its passes, for the others CUDA
+events. All do the complete bloom (hard threshold, nine taps in both directions, sum), except rows
+with `blur alone`. vkbloom gets another image in each round. The images of the others stay on the
+device.
+
+The array in Python's hands: a half-float frame (`scene` of deferred shading) that has not changed,
+so that the call consists of submission, transfer and the array. Calls of `apply` first upload
+another image or, for the same image, compare it with the image on the device.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +24,7 @@ import vkbloom
 from benchmarks import peers
 from benchmarks.image import ALLOWED, SETTINGS, full_kernel
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
+from benchmarks.ours import FRAGMENT, OURS
 from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, Table, agreement, side_by_side
 from benchmarks.timing import Contender, Times, alternate, alternate_seconds, device_clock
@@ -23,10 +34,7 @@ __all__ = ["run"]
 SIZE: Final = (3840, 2160)
 SMALLER: Final = (1920, 1080)
 ROUNDS: Final = 25
-OURS: Final = "vkbloom"
-FRAGMENT: Final = "vkbloom, the source's fragment variant"
 FUSED: Final = "a CUDA kernel of our own"
-COPY: Final = "plain copy on the device"
 UPLOAD: Final = "bare upload from pinned memory"
 READBACK: Final = "bare readback into pinned memory"
 IN_HANDS: Final = "vkbloom, an unchanged half-float frame as an array"
@@ -43,31 +51,20 @@ _GOALS: Final = (
 )
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time the bloom of a half-float image on the device, and the transfer back."""
     size = plan.size(*SIZE)
-    section = Section("image-gpu", f"On the GPU: {size[0]} x {size[1]}, float16 RGBA")
+    section.title = f"On the GPU: {size[0]} x {size[1]}, float16 RGBA"
     with ExitStack() as stack:
         ours = stack.enter_context(plan.renderer())
         if device_clock(ours.info) is None:
             section.missing.append(f"all of it: {ours.info.name} is no GPU")
-            return section
+            return
         source = stack.enter_context(plan.renderer("fragment"))
-        section.about += [
-            "Times on the device: for vkbloom the sum of the timestamps of its passes, for the "
-            "others CUDA events. All do the complete bloom (hard threshold, nine taps in both "
-            "directions, sum), except rows with `blur alone`. vkbloom gets another image in "
-            "each round. The images of the others stay on the device.",
-            "The array in Python's hands: a half-float frame (`scene` of deferred shading) that "
-            "has not changed, so that the call consists of submission, transfer and the array. "
-            "Calls of `apply` first upload another image or, for the same image, compare it "
-            "with the image on the device.",
-        ]
         images = pictures(size, np.float16)
         _on_device(plan, section, ours, source, images)
         for each in (images, pictures(plan.size(*SMALLER), np.float16)):
             _in_hands(plan, section, ours, each)
-    return section
 
 
 def _on_device(
@@ -88,7 +85,7 @@ def _on_device(
     allowed, reason = ALLOWED["float16"]
     blurred = {FRAGMENT: _bloom(source, images[0])["final"]}
     for name, (call, _, fetch) in theirs.items():
-        if not name.endswith("alone") and name != COPY:
+        if not name.endswith("alone") and name != peers.COPY:
             blurred[name] = fetch(call(0))
     for name, other in blurred.items():
         section.agreements.append(agreement(name, picture, other, allowed, reason))
@@ -113,14 +110,14 @@ def _on_device(
             section.goals.append(
                 Goal(f"4K on the GPU: {pair[0]} / {pair[1]}", ratio, wanted, at_most)
             )
-    if COPY in times:
+    if peers.COPY in times:
         # The bloom reads and writes as many bytes as the copy.
-        share = times[COPY].over(times[OURS]).value
+        share = times[peers.COPY].over(times[OURS]).value
         section.goals.append(Goal("4K on the GPU: share of the copy's bandwidth", share, 0.3))
         rows = tuple(
             (name, f"{2 * images[0].nbytes / measured.median / 1e9:.0f}")
             for name, measured in times.items()
-            if name in (COPY, OURS, FUSED)
+            if name in (peers.COPY, OURS, FUSED)
         )
         section.tables.append(Table("Image read once and written once", ("", "GB/s"), rows))
 

@@ -1,16 +1,19 @@
-"""The contenders of vkbloom."""
+"""The contenders of vkbloom, and their names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 from numpy.typing import NDArray
 
 import vkbloom
 from benchmarks.timing import Contender, device_clock
 
-__all__ = ["contender"]
+__all__ = ["FRAGMENT", "OURS", "contender"]
+
+OURS: Final = "vkbloom"
+FRAGMENT: Final = "vkbloom, the source's fragment variant"
 
 
 def contender(

@@ -1,4 +1,8 @@
-"""The constant cost of a call, split into Python, passes and readback."""
+"""The constant cost of a call, split into Python, passes and readback.
+
+The image is so small that the constant cost of the call dominates. NumPy in and out; wall-clock
+time. The control is a second renderer of the same kind: its difference is noise.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,7 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks.image import SETTINGS
 from benchmarks.inputs import COUNT, pictures
+from benchmarks.ours import OURS
 from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, Table, side_by_side
 from benchmarks.timing import Contender, Times, alternate, alternate_seconds
@@ -22,7 +27,6 @@ __all__ = ["run"]
 SIZE: Final = (64, 64)
 ROUNDS: Final = 101
 LOOPS: Final = 8
-OURS: Final = "vkbloom"
 FRAGMENT: Final = "vkbloom, plain fragment variant"
 AGAIN: Final = "vkbloom once more, a control"
 
@@ -59,17 +63,9 @@ class _Stopwatch:
         return self._call(self._core.wait)
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time calls on 64 x 64 pixels, against the fragment variant and by the work they do."""
-    section = Section(
-        "overhead",
-        f"A call on {SIZE[0]} x {SIZE[1]}, float16 RGBA",
-        [
-            "The image is so small that the constant cost of the call dominates. NumPy in and "
-            "out; wall-clock time. The control is a second renderer of the same kind: its "
-            "difference is noise.",
-        ],
-    )
+    section.title = f"A call on {SIZE[0]} x {SIZE[1]}, float16 RGBA"
     images = pictures(SIZE, np.float16)
     rounds = plan.times(ROUNDS)
     with ExitStack() as stack:
@@ -98,7 +94,6 @@ def run(plan: Plan) -> Section:
             Goal("64 x 64: vkbloom / plain fragment variant", ratio, 1.05, at_most=True)
         )
         _split(section, made[OURS], images, rounds)
-    return section
 
 
 def _cases(images: list[NDArray[Any]]) -> dict[str, Case]:

@@ -1,4 +1,13 @@
-"""A pyramid of five levels against pygfx's bloom pass and a Gaussian of the same spread."""
+"""A pyramid of five levels against pygfx's bloom pass and a Gaussian of the same spread.
+
+NumPy array in, new NumPy array out, another image in each round; wall-clock time. pygfx runs its
+`PhysicalBasedBloomPass`, the same chain after Jimenez 2014, with five levels, on the same adapter
+and the same number of pixels. Its tent has one radius for all levels, relative to the width. Ours
+has a radius in texels of each level. So the pictures differ; pygfx's radius is set so that both
+have the same spread.
+
+The Gaussian has the same spread, too. OpenCV converts half floats itself.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +20,7 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, pictures
+from benchmarks.ours import OURS
 from benchmarks.plan import Plan
 from benchmarks.results import Agreement, Goal, Section, Table, agreement, side_by_side
 from benchmarks.spread import spread
@@ -22,29 +32,16 @@ LEVELS: Final = 5
 SETTINGS: Final = vkbloom.Pyramid(levels=LEVELS)
 SIZE: Final = (1920, 1080)
 ROUNDS: Final = 15
-OURS: Final = "vkbloom"
 FRAGMENT: Final = "vkbloom, fragment variant"
 GAUSSIAN: Final = "OpenCV GaussianBlur"
 PYGFX: Final = "pygfx"
 PYGFX_COPY: Final = "pygfx, upload and readback alone"
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time ``Pyramid(levels=5)`` of half-float RGBA images."""
     size = plan.size(*SIZE)
-    section = Section(
-        "pyramid",
-        f"Pyramid(levels=5) at {size[0]} x {size[1]}, float16 RGBA",
-        [
-            "NumPy array in, new NumPy array out, another image in each round; wall-clock time. "
-            "pygfx runs its `PhysicalBasedBloomPass`, the same chain after Jimenez 2014, with "
-            "five levels, on the same adapter and the same number of pixels. Its tent has one "
-            "radius for all levels, relative to the width. Ours has a radius in texels of each "
-            "level. So the pictures differ; pygfx's radius is set so that both have the same "
-            "spread.",
-            "The Gaussian has the same spread, too. OpenCV converts half floats itself.",
-        ],
-    )
+    section.title = f"Pyramid(levels=5) at {size[0]} x {size[1]}, float16 RGBA"
     images = pictures(size, np.float16)
     with ExitStack() as stack:
         ours, source = (
@@ -80,7 +77,6 @@ def run(plan: Plan) -> Section:
         if name in times:
             ratio = times[name].over(times[OURS]).value
             section.goals.append(Goal(f"pyramid: {name} / {OURS}", ratio, wanted))
-    return section
 
 
 def _bloom(renderer: vkbloom.Renderer, image: NDArray[Any]) -> NDArray[Any]:

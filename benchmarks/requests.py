@@ -1,4 +1,10 @@
-"""Many requests with one image, in the best order, against single calls."""
+"""Many requests with one image, in the best order, against single calls.
+
+Settings over blur_scale x blur_strength x intensity for one image. `final` of each request becomes
+an array; wall-clock time. Best order: intensity changes fastest, then blur_strength. Worst order:
+blur_scale changes fastest, so that no request can use the blur of the one before. Contenders take
+turns in blocks of requests.
+"""
 
 from __future__ import annotations
 
@@ -52,20 +58,10 @@ def worst_order(settings: Iterable[vkbloom.Separable]) -> list[vkbloom.Separable
     return sorted(settings, key=lambda each: (each.intensity, each.blur_strength))
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time `plan.requests` requests with one half-float image, in blocks that alternate."""
     count = min(plan.requests, 60) if plan.quick else plan.requests
-    section = Section(
-        "requests",
-        f"{count:,} requests of {SIZE[0]} x {SIZE[1]}, float16 RGBA",
-        [
-            "Settings over blur_scale x blur_strength x intensity for one image. `final` of "
-            "each request becomes an array; wall-clock time. Best order: intensity changes "
-            "fastest, then blur_strength. Worst order: blur_scale changes fastest, so that no "
-            "request can use the blur of the one before. Contenders take turns in up to "
-            f"{BLOCKS} blocks of requests.",
-        ],
-    )
+    section.title = f"{count:,} requests of {SIZE[0]} x {SIZE[1]}, float16 RGBA"
     image = picture(SIZE, np.float16, 4, 0)
     settings = best_order(count)
     work = {MANY: settings, CALLS: settings, WORST: worst_order(settings)}
@@ -104,7 +100,6 @@ def run(plan: Plan) -> Section:
         )
     header = ("", "all, s", "ms a request", "passes run", f"times as long as {MANY} (quartiles)")
     section.tables.append(Table("", header, tuple(rows)))
-    return section
 
 
 def _time_block(

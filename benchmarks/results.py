@@ -117,7 +117,7 @@ class Section:
     """
 
     id: str
-    title: str
+    title: str = ""
     about: list[str] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     goals: list[Goal] = field(default_factory=list)

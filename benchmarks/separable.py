@@ -1,4 +1,9 @@
-"""The gain of separability: the same blur as two passes and as one N x N pass."""
+"""The gain of separability: the same blur as two passes and as one N x N pass.
+
+The same Gaussian as two passes of N taps and as one pass of N x N (`direct=True`). The time of a
+kernel of one tap is subtracted: upload, readback, composite, and the cost of a pass without taps.
+CPU adapters: wall-clock time. GPUs: time of the passes on the device.
+"""
 
 from __future__ import annotations
 
@@ -22,19 +27,10 @@ ROUNDS: Final = 7
 NOTHING: Final = "one tap"
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time two passes of N taps and one of N x N, for several N."""
     size = plan.size(*SIZE)
-    section = Section(
-        "separable",
-        f"Two passes against one at {size[0]} x {size[1]}, float32 RGBA",
-        [
-            "The same Gaussian as two passes of N taps and as one pass of N x N "
-            "(`direct=True`). The time of a kernel of one tap is subtracted: upload, readback, "
-            "composite, and the cost of a pass without taps. CPU adapters: wall-clock time. "
-            "GPUs: time of the passes on the device.",
-        ],
-    )
+    section.title = f"Two passes against one at {size[0]} x {size[1]}, float32 RGBA"
     images = pictures(size, np.float32)
     rows = []
     with plan.renderer() as renderer:
@@ -71,4 +67,3 @@ def run(plan: Plan) -> Section:
         "ratio of taps",
     )
     section.tables.append(Table("", header, tuple(rows)))
-    return section

@@ -1,4 +1,9 @@
-"""Import, renderer and first frame, in fresh processes."""
+"""Import, renderer and first frame, in fresh processes.
+
+Forward frame of the built-in scene, all defaults, `final` read back. Without caches, the folder of
+vkbloom's pipeline cache is empty, and the driver's own shader cache is off. All files are in the
+system's page cache, so that the disk is not measured.
+"""
 
 from __future__ import annotations
 
@@ -53,23 +58,13 @@ _CACHES: Final = (
 _IMPORTS: Final = {"scikit-image": "from skimage.filters import correlate_sparse"}
 
 
-def run(plan: Plan) -> Section:
+def run(plan: Plan, section: Section) -> None:
     """Time the imports and the first frame of fresh processes."""
     size = plan.size(*SIZE)
-    section = Section(
-        "startup",
-        "Start-up, in fresh processes",
-        [
-            f"Forward frame of the built-in scene, {size[0]} x {size[1]}, all defaults, `final` "
-            "read back. Without caches, the folder of vkbloom's pipeline cache is empty, and "
-            "the driver's own shader cache is off. All files are in the system's page cache, so "
-            "that the disk is not measured.",
-        ],
-    )
+    section.title = f"Start-up, in fresh processes; frames of {size[0]} x {size[1]}"
     rounds = 1 if plan.quick else plan.times(ROUNDS)
     _imports(plan, section, rounds)
     _frames(plan, section, rounds, size)
-    return section
 
 
 def _child(arguments: list[str], environment: dict[str, str] | None = None) -> Any:

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PEERS", "ImageBloom", "gather", "versions"]
+__all__ = ["COPY", "PEERS", "GpuWork", "ImageBloom", "gather", "versions"]
 
 #: Import name of each peer, by its name in tables.
 PEERS: Final = MappingProxyType(
@@ -31,6 +31,27 @@ PEERS: Final = MappingProxyType(
 )
 
 ImageBloom = Callable[[NDArray[Any]], NDArray[Any]]
+
+#: The contender that copies an image's bytes from device memory to device memory.
+COPY: Final = "plain copy on the device"
+
+
+class GpuWork(NamedTuple):
+    """Work on a GPU.
+
+    Attributes
+    ----------
+    call : callable
+        Takes the round and does the work once.
+    seconds : callable
+        Takes a result of `call` and returns the time by CUDA events.
+    fetch : callable
+        Takes a result of `call` and returns its picture.
+    """
+
+    call: Callable[[int], Any]
+    seconds: Callable[[Any], float]
+    fetch: Callable[[Any], NDArray[Any]]
 
 
 def versions() -> dict[str, str | None]:

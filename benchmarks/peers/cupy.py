@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.inputs import REC709
+from benchmarks.peers import COPY, GpuWork
 
 #: Output pixels of a thread block of fused.cu, and rows for each thread.
 TILE = (64, 32)
@@ -25,8 +26,8 @@ def _cupy() -> Any:
     return cupy
 
 
-def _timed(cupy: Any, work: Any) -> tuple[Any, Any, Any]:
-    """Return call, seconds and fetch of work on the device, as `gpu_bloom` gives them."""
+def _timed(cupy: Any, work: Any) -> GpuWork:
+    """Return work on the device, timed by events."""
 
     def call(_: int) -> Any:
         start, end = cupy.cuda.Event(), cupy.cuda.Event()
@@ -43,20 +44,13 @@ def _timed(cupy: Any, work: Any) -> tuple[Any, Any, Any]:
         picture: NDArray[Any] = cupy.asnumpy(result[0])
         return picture
 
-    return call, seconds, fetch
+    return GpuWork(call, seconds, fetch)
 
 
 def gpu_bloom(
     image: NDArray[np.float16], kernel: NDArray[np.float32], threshold: float
-) -> dict[str, tuple[Any, Any, Any]]:
-    """Return blooms of an image (H, W, 4) on the GPU, each also with its blur alone.
-
-    Returns
-    -------
-    dict of str to (call, seconds, fetch)
-        `call` takes the round and does the work once. `seconds` returns the time of a result by
-        CUDA events. `fetch` returns the picture of a result.
-    """
+) -> dict[str, GpuWork]:
+    """Return blooms of an image (H, W, 4) on the GPU, each also with its blur alone."""
     cupy = _cupy()
     ndimage = importlib.import_module("cupyx.scipy.ndimage")
     source = cupy.asarray(image)
@@ -117,8 +111,8 @@ def _fused(cupy: Any, source: Any, kernel: NDArray[np.float32], threshold: float
     return run
 
 
-def gpu_copy(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
-    """Return a copy of an image's bytes from device memory to device memory, as `gpu_bloom`."""
+def gpu_copy(image: NDArray[Any]) -> dict[str, GpuWork]:
+    """Return a copy of an image's bytes from device memory to device memory."""
     cupy = _cupy()
     source = cupy.asarray(image)
     target = cupy.empty_like(source)
@@ -127,10 +121,10 @@ def gpu_copy(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
         target.data.copy_from_device_async(source.data, source.nbytes, cupy.cuda.Stream.null)
         return target
 
-    return {"plain copy on the device": _timed(cupy, copy)}
+    return {COPY: _timed(cupy, copy)}
 
 
-def transfers(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
+def transfers(image: NDArray[Any]) -> dict[str, GpuWork]:
     """Return the bare transfers of an image's bytes from and into pinned memory of the host.
 
     The memory is allocated once and not used otherwise. Wall-clock time.
@@ -156,15 +150,9 @@ def transfers(image: NDArray[Any]) -> dict[str, tuple[Any, Any, Any]]:
         return held.copy()
 
     there, here = source.data.ptr, pinned.ptr
+    upload = copy(there, here, runtime.memcpyHostToDevice)
+    readback = copy(here, there, runtime.memcpyDeviceToHost)
     return {
-        "bare upload from pinned memory": (
-            copy(there, here, runtime.memcpyHostToDevice),
-            float,
-            fetch,
-        ),
-        "bare readback into pinned memory": (
-            copy(here, there, runtime.memcpyDeviceToHost),
-            float,
-            fetch,
-        ),
+        "bare upload from pinned memory": GpuWork(upload, float, fetch),
+        "bare readback into pinned memory": GpuWork(readback, float, fetch),
     }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.inputs import REC709
-from benchmarks.peers import ImageBloom, rounded
+from benchmarks.peers import COPY, GpuWork, ImageBloom, rounded
 
 
 class _Blur:
@@ -57,8 +57,8 @@ def image_bloom(
     return {"PyTorch": bloom}
 
 
-def _on_device(torch: Any, work: Any, fetch: Any) -> tuple[Any, Any, Any]:
-    """Return call, seconds and fetch of work on the device, as `gpu_bloom` gives them."""
+def _on_device(torch: Any, work: Any, fetch: Any) -> GpuWork:
+    """Return work on the device, timed by events."""
 
     def call(_: int) -> Any:
         start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
@@ -73,20 +73,13 @@ def _on_device(torch: Any, work: Any, fetch: Any) -> tuple[Any, Any, Any]:
         _, start, end = result
         return float(start.elapsed_time(end)) * 1e-3
 
-    return call, seconds, fetch
+    return GpuWork(call, seconds, fetch)
 
 
 def gpu_bloom(
     image: NDArray[Any], kernel: NDArray[np.float32], threshold: float
-) -> dict[str, tuple[Any, Any, Any]]:
-    """Return the bloom and the blur alone of an image on the GPU.
-
-    Returns
-    -------
-    dict of str to (call, seconds, fetch)
-        `call` takes the round and does the work once. `seconds` returns the time of a result by
-        CUDA events. `fetch` returns the picture of a result.
-    """
+) -> dict[str, GpuWork]:
+    """Return the bloom and the blur alone of an image on the GPU."""
     torch = importlib.import_module("torch")
     if not torch.cuda.is_available():
         raise RuntimeError("torch finds no CUDA device")
@@ -114,11 +107,11 @@ def gpu_convolution(
     kernel: NDArray[np.float32],
     padded: tuple[int, int],
     threshold: float,
-) -> dict[str, tuple[Any, Any, Any]]:
+) -> dict[str, GpuWork]:
     """Return the bloom of an image (H, W, 4) by Fourier transforms, and the convolution alone.
 
-    The kernel (3, h, w) has its centre at [0, 0], and the padded size. Values as `gpu_bloom`, and
-    a copy of the image's bytes on the device.
+    The kernel (3, h, w) has its centre at [0, 0], and the padded size. There is also a copy of
+    the image's bytes on the device.
     """
     torch = importlib.import_module("torch")
     if not torch.cuda.is_available():
@@ -161,5 +154,5 @@ def gpu_convolution(
     return {
         "torch.fft": _on_device(torch, bloom, fetch),
         "torch.fft, convolution alone": _on_device(torch, alone, fetch),
-        "plain copy on the device": _on_device(torch, copy, fetch),
+        COPY: _on_device(torch, copy, fetch),
     }

@@ -27,18 +27,6 @@ static bool fits(const struct vkb_dry_image *image, const struct vkb_image_row *
         && image->row.height == row->height;
 }
 
-static struct vkb_dry_image *add_image(struct vkb_dry_run *dry_run, struct vkb_error *error)
-{
-    struct vkb_dry_image *image;
-
-    if (!vkb_grow(error, &dry_run->images, &dry_run->capacity, dry_run->count + 1,
-                  sizeof(struct vkb_dry_image *))
-        || !(image = vkb_alloc(error, 1, sizeof *image)))
-        return NULL;
-    dry_run->images[dry_run->count++] = image;
-    return image;
-}
-
 // Returns the content of the image with that row's name. An image of another size or format is
 // replaced, as the image cache does it.
 static struct vkb_content *resolve(struct vkb_dry_run *dry_run, const struct vkb_image_row *row,
@@ -46,7 +34,9 @@ static struct vkb_content *resolve(struct vkb_dry_run *dry_run, const struct vkb
 {
     struct vkb_dry_image *image = find_image(dry_run, row->name);
 
-    if (!image && !(image = add_image(dry_run, error)))
+    if (!image
+        && !(image = vkb_append(error, &dry_run->images, &dry_run->count, &dry_run->capacity,
+                                sizeof *image)))
         return NULL;
     image->content.valid = image->content.valid && fits(image, row);
     image->row = *row;

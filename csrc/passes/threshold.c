@@ -42,7 +42,10 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
 
     row.constants.threshold_mode = mode;
     // Not the sampler's filter: it would spread NaN, and a threshold magnifies its rounding errors.
-    row.constants.sampling = vkb_same_size(graph, image, glow) ? SAMPLING_TEXEL : SAMPLING_FETCH;
+    // The mask is read in the same way, and may have another size than the image.
+    const bool same_size = vkb_same_size(graph, image, glow)
+                        && (mask == VKB_NO_IMAGE || vkb_same_size(graph, mask, glow));
+    row.constants.sampling = same_size ? SAMPLING_TEXEL : SAMPLING_FETCH;
     row.band_rows = VKB_BAND_ANY_ROW;
     row.reads[0] = image;
     vkb_apply_mask(&row, mask);

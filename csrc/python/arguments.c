@@ -128,26 +128,40 @@ bool vkb_out_of_range(const char *name, PyObject *value, double low, double high
     return false;
 }
 
+bool vkb_read_number(PyObject *value, const struct vkb_value_row *row, void *values)
+{
+    const double number = PyFloat_AsDouble(value);
+
+    if (PyErr_Occurred())
+        return false;
+    if (!(number >= row->low && number <= row->high))
+        return vkb_out_of_range(row->name, value, row->low, row->high);
+    vkb_value_store(values, row, number);
+    return true;
+}
+
 // None keeps the default.
 static bool read_value(const struct reader *reader, size_t index, struct vkb_values *values)
 {
     const struct vkb_value_row *row = &vkb_value_rows[index];
     PyObject *value = optional_attribute(reader, ATTRIBUTE_VALUES + index);
-    bool done = true;
 
     vkb_value_store(values, row, row->initial);
     if (!value)
         return !PyErr_Occurred();
-    if (value != Py_None) {
-        double number = PyFloat_AsDouble(value);
-        done = !PyErr_Occurred();
-        if (done && !(number >= row->low && number <= row->high))
-            done = vkb_out_of_range(row->name, value, row->low, row->high);
-        if (done)
-            vkb_value_store(values, row, number);
-    }
+    const bool done = value == Py_None || vkb_read_number(value, row, values);
     Py_DECREF(value);
     return done;
+}
+
+int vkb_read_name(PyObject *value, const char *const *names, int count, const char *what,
+                  const char *noun)
+{
+    for (int i = 0; PyUnicode_Check(value) && i < count; ++i)
+        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0)
+            return i;
+    PyErr_Format(PyExc_ValueError, "%s: unknown %s %R", what, noun, value);
+    return -1;
 }
 
 static bool read_choice(const struct reader *reader, int index, int *choice)
@@ -158,15 +172,9 @@ static bool read_choice(const struct reader *reader, int index, int *choice)
     *choice = 0;
     if (!value)
         return !PyErr_Occurred();
-    for (int i = 0; PyUnicode_Check(value) && i < row->count; ++i)
-        if (PyUnicode_CompareWithASCIIString(value, row->spellings[i]) == 0) {
-            *choice = i;
-            Py_DECREF(value);
-            return true;
-        }
-    PyErr_Format(PyExc_ValueError, "%s: unknown value %R", row->name, value);
+    *choice = vkb_read_name(value, row->spellings, row->count, row->name, "value");
     Py_DECREF(value);
-    return false;
+    return *choice >= 0;
 }
 
 static bool read_format(const struct reader *reader, enum vkb_format *format)
@@ -216,18 +224,12 @@ static bool read_method(const struct reader *reader, enum vkb_method *method)
 #undef METHOD_NAME
     PyObject *value = PyObject_GetAttr(
         reader->object, PyTuple_GetItem(reader->state->attributes, ATTRIBUTE_METHOD));
+    const int found =
+        value ? vkb_read_name(value, names, VKB_METHOD_COUNT, "method", "method") : -1;
 
-    if (!value)
-        return false;
-    for (int i = 0; PyUnicode_Check(value) && i < VKB_METHOD_COUNT; ++i)
-        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0) {
-            *method = (enum vkb_method)i;
-            Py_DECREF(value);
-            return true;
-        }
-    PyErr_Format(PyExc_ValueError, "method: unknown method %R", value);
-    Py_DECREF(value);
-    return false;
+    Py_XDECREF(value);
+    *method = (enum vkb_method)found;
+    return found >= 0;
 }
 
 // From 1 to `most` numbers; None leaves them out.

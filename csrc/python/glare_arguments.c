@@ -9,12 +9,7 @@ static bool read_number(PyObject *object, const struct vkb_value_row *row,
     if (!PyObject_HasAttrString(object, row->name))
         return true;
     PyObject *value = PyObject_GetAttrString(object, row->name);
-    const double number = value ? PyFloat_AsDouble(value) : 0.0;
-    bool done = !PyErr_Occurred();
-    if (done && !(number >= row->low && number <= row->high))
-        done = vkb_out_of_range(row->name, value, row->low, row->high);
-    if (done)
-        vkb_value_store(values, row, number);
+    const bool done = value && vkb_read_number(value, row, values);
     Py_XDECREF(value);
     return done;
 }
@@ -25,18 +20,11 @@ static bool read_kind(PyObject *object, enum vkb_stage_kind *kind)
     static const char *const names[VKB_STAGE_COUNT] = {VKB_STAGES(STAGE_NAME)};
 #undef STAGE_NAME
     PyObject *value = PyObject_GetAttrString(object, "stage");
+    const int found = value ? vkb_read_name(value, names, VKB_STAGE_COUNT, "glare", "stage") : -1;
 
-    if (!value)
-        return false;
-    for (int i = 0; PyUnicode_Check(value) && i < VKB_STAGE_COUNT; ++i)
-        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0) {
-            *kind = (enum vkb_stage_kind)i;
-            Py_DECREF(value);
-            return true;
-        }
-    PyErr_Format(PyExc_ValueError, "glare: unknown stage %R", value);
-    Py_DECREF(value);
-    return false;
+    Py_XDECREF(value);
+    *kind = (enum vkb_stage_kind)found;
+    return found >= 0;
 }
 
 static bool is_within(float number, double limit)
@@ -57,16 +45,26 @@ static bool read_ghost(PyObject *tuple, float ghost[4])
     return true;
 }
 
+// The length of a tuple of at most `most` items; -1 with an exception set.
+static Py_ssize_t tuple_length(PyObject *tuple, const char *name, const char *items,
+                               Py_ssize_t most)
+{
+    if (!vkb_require_tuple(tuple, name))
+        return -1;
+    const Py_ssize_t count = PyTuple_Size(tuple);
+    if (count <= most)
+        return count;
+    PyErr_Format(PyExc_ValueError, "%s: %zd %s are out of range, 0 to %zd", name, count, items,
+                 most);
+    return -1;
+}
+
 static bool read_ghost_tuple(PyObject *tuple, struct vkb_stage *stage)
 {
-    if (!vkb_require_tuple(tuple, "ghosts"))
+    const Py_ssize_t count = tuple_length(tuple, "ghosts", "ghosts", MOST_GHOSTS);
+
+    if (count < 0)
         return false;
-    const Py_ssize_t count = PyTuple_Size(tuple);
-    if (count > MOST_GHOSTS) {
-        PyErr_Format(PyExc_ValueError, "ghosts: %zd ghosts are out of range, 0 to %d", count,
-                     MOST_GHOSTS);
-        return false;
-    }
     for (Py_ssize_t i = 0; i < count; ++i)
         if (!read_ghost(PyTuple_GetItem(tuple, i), stage->ghosts[i]))
             return false;
@@ -94,14 +92,10 @@ static bool read_stage(PyObject *object, struct vkb_stage *stage)
 
 static bool read_stages(PyObject *tuple, struct vkb_settings *settings)
 {
-    if (!vkb_require_tuple(tuple, "glare"))
+    const Py_ssize_t count = tuple_length(tuple, "glare", "stages", MAX_STAGES);
+
+    if (count < 0)
         return false;
-    const Py_ssize_t count = PyTuple_Size(tuple);
-    if (count > MAX_STAGES) {
-        PyErr_Format(PyExc_ValueError, "glare: %zd stages are out of range, 0 to %d", count,
-                     MAX_STAGES);
-        return false;
-    }
     for (Py_ssize_t i = 0; i < count; ++i)
         if (!read_stage(PyTuple_GetItem(tuple, i), &settings->stages[i]))
             return false;

@@ -94,11 +94,12 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
 
 static VkImageUsageFlags image_usage(enum vkb_format format)
 {
+    // No pass reads depth.
     return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
-         | VK_IMAGE_USAGE_SAMPLED_BIT
          | (format == VKB_FORMAT_DEPTH32_FLOAT
                 ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
-                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_STORAGE_BIT);
+                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
+                      | VK_IMAGE_USAGE_STORAGE_BIT);
 }
 
 bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
@@ -219,14 +220,11 @@ static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache,
 static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache, const char *name,
                                            struct vkb_error *error)
 {
-    struct vkb_cached_image *cached;
+    struct vkb_cached_image *cached =
+        vkb_append(error, &cache->images, &cache->count, &cache->capacity, sizeof *cached);
 
-    if (!vkb_grow(error, &cache->images, &cache->capacity, cache->count + 1,
-                  sizeof(struct vkb_cached_image *))
-        || !(cached = vkb_alloc(error, 1, sizeof *cached)))
-        return NULL;
-    memcpy(cached->name, name, sizeof cached->name);
-    cache->images[cache->count++] = cached;
+    if (cached)
+        memcpy(cached->name, name, sizeof cached->name);
     return cached;
 }
 

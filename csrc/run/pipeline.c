@@ -30,11 +30,10 @@ struct pipeline_key {
     uint32_t textured;
     uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
-    uint32_t zero;  // makes the size a multiple of a pointer's
     struct vkb_constants constants;
 };
 _Static_assert(sizeof(struct pipeline_key)
-                   == sizeof(VkRenderPass) + (8 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                   == sizeof(VkRenderPass) + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
@@ -238,54 +237,18 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
     return true;
 }
 
-// The fixed state of each kind of geometry.
-static const struct geometry_state {
-    VkCullModeFlags cull;
-    bool depth_test, depth_write;
-} geometry_states[] = {
-    [VKB_GEOMETRY_FULLSCREEN] = {.cull = VK_CULL_MODE_NONE},
-    [VKB_GEOMETRY_SKYBOX] = {.cull = VK_CULL_MODE_FRONT_BIT, .depth_test = true},
-    [VKB_GEOMETRY_BODY] =
-        {
-            .cull = VK_CULL_MODE_BACK_BIT,
-            .depth_test = true,
-            .depth_write = true,
-        },
-    [VKB_GEOMETRY_GLOW] =
-        {
-            .cull = VK_CULL_MODE_BACK_BIT,
-            .depth_test = true,
-            .depth_write = true,
-        },
-};
-
-// Colours are added, the target keeps its alpha. The forward system's SRC_ALPHA, DST_ALPHA does the
-// same for an alpha of 1 in rgba8unorm, but gives an alpha of 2 in a float format.
-static const VkPipelineColorBlendAttachmentState blend_states[] = {
-    [VKB_BLEND_NONE] = {.colorWriteMask = 0xf},
-    [VKB_BLEND_ADD] =
-        {
-            .blendEnable = VK_TRUE,
-            .srcColorBlendFactor = VK_BLEND_FACTOR_ONE,
-            .dstColorBlendFactor = VK_BLEND_FACTOR_ONE,
-            .colorBlendOp = VK_BLEND_OP_ADD,
-            .srcAlphaBlendFactor = VK_BLEND_FACTOR_ZERO,
-            .dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
-            .alphaBlendOp = VK_BLEND_OP_ADD,
-            .colorWriteMask = 0xf,
-        },
-    [VKB_BLEND_ADD_RGBA] =
-        {
-            .blendEnable = VK_TRUE,
-            .srcColorBlendFactor = VK_BLEND_FACTOR_ONE,
-            .dstColorBlendFactor = VK_BLEND_FACTOR_ONE,
-            .colorBlendOp = VK_BLEND_OP_ADD,
-            .srcAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
-            .dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
-            .alphaBlendOp = VK_BLEND_OP_ADD,
-            .colorWriteMask = 0xf,
-        },
-};
+static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
+                                                    VkShaderModule module,
+                                                    const VkSpecializationInfo *constants)
+{
+    return (VkPipelineShaderStageCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+        .stage = stage,
+        .module = module,
+        .pName = "main",
+        .pSpecializationInfo = constants,
+    };
+}
 
 static bool create_compute(const struct vkb_device *device, struct vkb_pipelines *pipelines,
                            const struct vkb_pass_row *pass, const VkSpecializationInfo *constants,
@@ -298,17 +261,93 @@ static bool create_compute(const struct vkb_device *device, struct vkb_pipelines
                          device->handle, pipelines->cache, 1,
                          &(VkComputePipelineCreateInfo){
                              .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                             .stage =
-                                 {
-                                     .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                                     .stage = VK_SHADER_STAGE_COMPUTE_BIT,
-                                     .module = module,
-                                     .pName = "main",
-                                     .pSpecializationInfo = constants,
-                                 },
+                             .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module, constants),
                              .layout = vkb_bindings_layout(&pipelines->bindings, pass),
                          },
                          NULL, pipeline));
+}
+
+static const struct geometry_state {
+    VkCullModeFlags cull;
+    bool depth_test, depth_write;
+} geometry_states[] = {
+    [VKB_GEOMETRY_FULLSCREEN] = {VK_CULL_MODE_NONE, false, false},
+    [VKB_GEOMETRY_SKYBOX] = {VK_CULL_MODE_FRONT_BIT, true, false},
+    [VKB_GEOMETRY_BODY] = {VK_CULL_MODE_BACK_BIT, true, true},
+    [VKB_GEOMETRY_GLOW] = {VK_CULL_MODE_BACK_BIT, true, true},
+};
+
+// The states of a graphics pipeline that are the same for all passes.
+static const VkPipelineInputAssemblyStateCreateInfo triangles = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
+    .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST,
+};
+static const VkPipelineViewportStateCreateInfo one_viewport = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO,
+    .viewportCount = 1,
+    .scissorCount = 1,
+};
+static const VkPipelineMultisampleStateCreateInfo one_sample = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
+    .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT,
+};
+static const VkPipelineDynamicStateCreateInfo dynamic_viewport = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO,
+    .dynamicStateCount = 2,
+    .pDynamicStates = (const VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR},
+};
+
+static VkPipelineVertexInputStateCreateInfo vertex_input(const struct vkb_pass_row *pass)
+{
+    const bool is_mesh = vkb_is_mesh(pass->geometry);
+
+    return (VkPipelineVertexInputStateCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
+        .vertexBindingDescriptionCount = pass->textured ? VKB_VERTEX_BINDINGS : is_mesh,
+        .pVertexBindingDescriptions = vkb_vertex_bindings,
+        .vertexAttributeDescriptionCount =
+            pass->textured ? VKB_TEXTURED_ATTRIBUTES : is_mesh * VKB_VERTEX_ATTRIBUTES,
+        .pVertexAttributeDescriptions = vkb_vertex_attributes,
+    };
+}
+
+static VkPipelineRasterizationStateCreateInfo rasterization(const struct geometry_state *state)
+{
+    return (VkPipelineRasterizationStateCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO,
+        .polygonMode = VK_POLYGON_MODE_FILL,
+        .cullMode = state->cull,
+        .frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE,
+        .lineWidth = 1.0f,
+    };
+}
+
+static VkPipelineDepthStencilStateCreateInfo depth_test(const struct geometry_state *state)
+{
+    return (VkPipelineDepthStencilStateCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
+        .depthTestEnable = state->depth_test,
+        .depthWriteEnable = state->depth_write,
+        .depthCompareOp = VK_COMPARE_OP_LESS_OR_EQUAL,
+    };
+}
+
+// Colours are added. VKB_BLEND_ADD keeps the target's alpha: the forward system's SRC_ALPHA,
+// DST_ALPHA does the same for an alpha of 1 in rgba8unorm, but gives an alpha of 2 in a float
+// format.
+static VkPipelineColorBlendAttachmentState blending(enum vkb_blend blend)
+{
+    return (VkPipelineColorBlendAttachmentState){
+        .blendEnable = blend != VKB_BLEND_NONE,
+        .srcColorBlendFactor = VK_BLEND_FACTOR_ONE,
+        .dstColorBlendFactor = VK_BLEND_FACTOR_ONE,
+        .colorBlendOp = VK_BLEND_OP_ADD,
+        .srcAlphaBlendFactor =
+            blend == VKB_BLEND_ADD_RGBA ? VK_BLEND_FACTOR_ONE : VK_BLEND_FACTOR_ZERO,
+        .dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
+        .alphaBlendOp = VK_BLEND_OP_ADD,
+        .colorWriteMask = 0xf,
+    };
 }
 
 static bool create_graphics(const struct vkb_device *device, struct vkb_pipelines *pipelines,
@@ -316,18 +355,17 @@ static bool create_graphics(const struct vkb_device *device, struct vkb_pipeline
                             VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
-    const bool is_mesh = vkb_is_mesh(pass->geometry);
+    const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
+    const VkPipelineRasterizationStateCreateInfo raster = rasterization(state);
+    const VkPipelineDepthStencilStateCreateInfo depth = depth_test(state);
     VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
-    const uint32_t bindings = pass->textured ? VKB_VERTEX_BINDINGS : is_mesh;
-    const uint32_t attributes =
-        pass->textured ? VKB_TEXTURED_ATTRIBUTES : is_mesh * VKB_VERTEX_ATTRIBUTES;
     VkShaderModule vertex, fragment;
 
     if (!get_module(device, pipelines, pass->vertex, &vertex, error)
         || !get_module(device, pipelines, pass->shader, &fragment, error))
         return false;
     for (uint32_t i = 0; i < pass->target_count; ++i)
-        blends[i] = blend_states[pass->blend];
+        blends[i] = blending(pass->blend);
     return VK(error,
               device->vk.vkCreateGraphicsPipelines(
                   device->handle, pipelines->cache, 1,
@@ -336,72 +374,22 @@ static bool create_graphics(const struct vkb_device *device, struct vkb_pipeline
                       .stageCount = 2,
                       .pStages =
                           (VkPipelineShaderStageCreateInfo[]){
-                              {
-                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                                  .stage = VK_SHADER_STAGE_VERTEX_BIT,
-                                  .module = vertex,
-                                  .pName = "main",
-                              },
-                              {
-                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                                  .stage = VK_SHADER_STAGE_FRAGMENT_BIT,
-                                  .module = fragment,
-                                  .pName = "main",
-                                  .pSpecializationInfo = constants,
-                              },
+                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, vertex, NULL),
+                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, fragment, constants),
                           },
-                      .pVertexInputState =
-                          &(VkPipelineVertexInputStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
-                              .vertexBindingDescriptionCount = bindings,
-                              .pVertexBindingDescriptions = vkb_vertex_bindings,
-                              .vertexAttributeDescriptionCount = attributes,
-                              .pVertexAttributeDescriptions = vkb_vertex_attributes,
-                          },
-                      .pInputAssemblyState =
-                          &(VkPipelineInputAssemblyStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
-                              .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST,
-                          },
-                      .pViewportState =
-                          &(VkPipelineViewportStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO,
-                              .viewportCount = 1,
-                              .scissorCount = 1,
-                          },
-                      .pRasterizationState =
-                          &(VkPipelineRasterizationStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO,
-                              .polygonMode = VK_POLYGON_MODE_FILL,
-                              .cullMode = state->cull,
-                              .frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE,
-                              .lineWidth = 1.0f,
-                          },
-                      .pMultisampleState =
-                          &(VkPipelineMultisampleStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
-                              .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT,
-                          },
-                      .pDepthStencilState =
-                          &(VkPipelineDepthStencilStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
-                              .depthTestEnable = state->depth_test,
-                              .depthWriteEnable = state->depth_write,
-                              .depthCompareOp = VK_COMPARE_OP_LESS_OR_EQUAL,
-                          },
+                      .pVertexInputState = &vertices,
+                      .pInputAssemblyState = &triangles,
+                      .pViewportState = &one_viewport,
+                      .pRasterizationState = &raster,
+                      .pMultisampleState = &one_sample,
+                      .pDepthStencilState = &depth,
                       .pColorBlendState =
                           &(VkPipelineColorBlendStateCreateInfo){
                               .sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
                               .attachmentCount = pass->target_count,
                               .pAttachments = blends,
                           },
-                      .pDynamicState =
-                          &(VkPipelineDynamicStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO,
-                              .dynamicStateCount = 2,
-                              .pDynamicStates = (VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT,
-                                                                   VK_DYNAMIC_STATE_SCISSOR},
-                          },
+                      .pDynamicState = &dynamic_viewport,
                       .layout = vkb_bindings_layout(&pipelines->bindings, pass),
                       .renderPass = render_pass,
                   },

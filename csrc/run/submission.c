@@ -28,19 +28,6 @@ static struct vkb_submission *find_free(const struct vkb_submissions *submission
     return NULL;
 }
 
-static struct vkb_submission *add_submission(struct vkb_submissions *submissions,
-                                             struct vkb_error *error)
-{
-    struct vkb_submission *submission;
-
-    if (!vkb_grow(error, &submissions->submissions, &submissions->capacity, submissions->count + 1,
-                  sizeof(struct vkb_submission *))
-        || !(submission = vkb_alloc(error, 1, sizeof *submission)))
-        return NULL;
-    submissions->submissions[submissions->count++] = submission;
-    return submission;
-}
-
 // Frees the submissions that nobody waits for and that the device has finished: copies of rows.
 static bool free_finished(const struct vkb_device *device, struct vkb_submissions *submissions,
                           struct vkb_error *error)
@@ -62,7 +49,9 @@ bool vkb_submissions_take(const struct vkb_device *device, struct vkb_submission
     if (!free_finished(device, submissions, error))
         return false;
     struct vkb_submission *submission = find_free(submissions);
-    if (!submission && !(submission = add_submission(submissions, error)))
+    if (!submission
+        && !(submission = vkb_append(error, &submissions->submissions, &submissions->count,
+                                     &submissions->capacity, sizeof *submission)))
         return false;
     if (!submission->commands.pool && !vkb_commands_create(device, &submission->commands, error))
         return false;

@@ -12,7 +12,11 @@ static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
 static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
 static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
 static const enum vkb_shader reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
+static const enum vkb_shader shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
 static const enum vkb_shader godot_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(godot_rows);
+static const enum vkb_shader hdrp_rows_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(hdrp_rows);
+static const enum vkb_shader hdrp_columns_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(hdrp_columns);
 static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
@@ -181,29 +185,75 @@ static enum vkb_mode reduced_groups(const struct vkb_pass_row *pass)
         return GROUPS_URP;
     case VKB_SHADER_unreal_prefilter_frag:
         return GROUPS_UNREAL;
+    case VKB_SHADER_bevy_prefilter_frag:
+        return GROUPS_BEVY;
     default:
         return 0;
     }
 }
 
+// Adds the pass as one of words, and a fused pass that reads the image itself.
+static bool add_prefilter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                          enum vkb_shader shader, uint32_t columns, uint32_t rows,
+                          struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    row.constants.groups = reduced_groups(pass);
+    row.constants.sampling = 0;
+    vkb_drop_reads(&row, 1);
+    vkb_make_words(&row, shader, columns, rows);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && add_from_image(choice, pass, &row, error);
+}
+
 bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                      bool *fits, struct vkb_error *error)
 {
+    const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
+    const enum vkb_mode groups = reduced_groups(pass);
+
+    *fits = groups && groups != GROUPS_BEVY && !pass->constants.masked
+         && is_half(&choice->plain, pass) && pass->params.prefilter.row_offset == 0
+         && loads(choice, pass);
+    return !*fits
+        || add_prefilter(choice, pass, reduce_words[format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS,
+                         error);
+}
+
+bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                    bool *fits, struct vkb_error *error)
+{
+    const struct vkb_prefilter_params *params = &pass->params.prefilter;
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const enum vkb_mode groups = reduced_groups(pass);
-    struct vkb_pass_row row;
+    const bool taps = groups == GROUPS_FILAMENT
+                   || (groups == GROUPS_BEVY && params->step_x == 1.0f && params->step_y == 1.0f);
 
-    *fits = groups && !pass->constants.masked && is_half(&choice->plain, pass)
-         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
+    *fits = taps && !pass->constants.masked
+         && (params->source_height ? (uint32_t)params->source_height : source->height)
+                >= (uint32_t)params->target_height
+         && loads(choice, pass);
+    return !*fits
+        || add_prefilter(choice, pass, shrink_words[source->format],
+                         4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, error);
+}
+
+bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       bool *fits, struct vkb_error *error)
+{
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
+    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    const uint32_t word = 4 / vkb_formats[format].channel_size;
+
+    *fits = pass->shader == VKB_SHADER_hdrp_blur_frag
+         && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
+         && pass->params.pyramid.row_offset == 0 && loads(choice, pass);
     if (!*fits)
         return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants.groups = groups;
-    row.constants.sampling = 0;
-    vkb_drop_reads(&row, 1);
-    vkb_make_words(&row, reduce_words[source->format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error)
-        && add_from_image(choice, pass, &row, error);
+    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, FILTER_ROWS, error)
+                : add_words(choice, pass, hdrp_columns_words[format], word, HDRP_OUTPUTS, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

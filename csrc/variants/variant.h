@@ -30,6 +30,10 @@ vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 vkb_variant_add vkb_add_halved_taps, vkb_add_godot_rows;
 // First passes of published methods, with taps among 4 x 4 texels of an image of twice the size.
 vkb_variant_add vkb_add_reduced;
+// The same of an image of any larger size.
+vkb_variant_add vkb_add_shrunk;
+// HDRP's blurs, of images of the same size and of twice the size along the line.
+vkb_variant_add vkb_add_hdrp_line;
 // Upsampling by any factor in strips, also fused with the composite; as two passes, along rows and
 // along columns; the sum of several levels that are upsampled so.
 vkb_variant_add vkb_add_upsampled_strips, vkb_add_upsampled_final;

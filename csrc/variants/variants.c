@@ -243,6 +243,8 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "halved", vkb_add_halved_taps, 0},
     {VKB_VARIANTS_CPU, "halved", vkb_add_godot_rows, 0},
     {VKB_VARIANTS_CPU, "halved", vkb_add_reduced, 0},
+    {VKB_VARIANTS_CPU, "shrunk", vkb_add_shrunk, 0},
+    {VKB_VARIANTS_CPU, "line", vkb_add_hdrp_line, 0},
     {VKB_VARIANTS_CPU, "doubled", vkb_add_doubled, 0},
     {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_upsampled_strips, 0},

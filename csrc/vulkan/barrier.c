@@ -132,14 +132,17 @@ void vkb_barrier_record(const struct vkb_device *device, VkCommandBuffer command
                                     NULL, image != NULL, &barrier);
 }
 
+// After copies to buffers, and after the writes of `also`.
 static void record_buffer_barrier(const struct vkb_device *device, VkCommandBuffer commands,
-                                  enum vkb_access from, VkPipelineStageFlags stages,
+                                  enum vkb_access also, VkPipelineStageFlags stages,
                                   VkAccessFlags reads)
 {
-    device->vk.vkCmdPipelineBarrier(commands, accesses[from].stages, stages, 0, 1,
+    const struct access_info *copy = &accesses[VKB_ACCESS_COPY_TARGET], *other = &accesses[also];
+
+    device->vk.vkCmdPipelineBarrier(commands, copy->stages | other->stages, stages, 0, 1,
                                     &(VkMemoryBarrier){
                                         .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
-                                        .srcAccessMask = accesses[from].writes,
+                                        .srcAccessMask = copy->writes | other->writes,
                                         .dstAccessMask = reads,
                                     },
                                     0, NULL, 0, NULL);
@@ -147,8 +150,6 @@ static void record_buffer_barrier(const struct vkb_device *device, VkCommandBuff
 
 void vkb_barrier_record_host_read(const struct vkb_device *device, VkCommandBuffer commands)
 {
-    record_buffer_barrier(device, commands, VKB_ACCESS_COPY_TARGET, VK_PIPELINE_STAGE_HOST_BIT,
-                          VK_ACCESS_HOST_READ_BIT);
     record_buffer_barrier(device, commands, VKB_ACCESS_DISPATCH_STORED, VK_PIPELINE_STAGE_HOST_BIT,
                           VK_ACCESS_HOST_READ_BIT);
 }

@@ -253,8 +253,9 @@ static bool has_words(const struct vkb_device *device)
 static bool create_handle(struct vkb_device *device, const char *adapter_choice, const char *driver,
                           bool validation, struct vkb_error *error)
 {
-    if (!vkb_adapter_open(adapter_choice, driver, validation, &device->instance, &device->adapter,
-                          error)
+    if (!(device->workers = vkb_workers_create(error))
+        || !vkb_adapter_open(adapter_choice, driver, validation, &device->instance,
+                             &device->adapter, error)
         || !create_logical(device, error))
         return false;
     vkb_instance_load_device(device->instance, device->handle, &device->vk);
@@ -284,6 +285,8 @@ void vkb_device_destroy(struct vkb_device *device)
 {
     const struct vkb_messages *before = vkb_messages_begin(&device->messages);
 
+    vkb_workers_destroy(device->workers);
+    device->workers = NULL;
     if (device->handle)
         device->vk.vkDestroyDevice(device->handle, NULL);
     device->handle = VK_NULL_HANDLE;

@@ -5,6 +5,7 @@
 #include "vulkan/adapter.h"
 #include "vulkan/format.h"
 #include "vulkan/messages.h"
+#include "vulkan/parts.h"
 
 #include <stdatomic.h>
 
@@ -15,6 +16,7 @@ struct vkb_device {
     VkDevice handle;
     struct VolkDeviceTable vk;
     VkQueue queue;
+    struct vkb_workers *workers;  // of the host
     VkPhysicalDeviceMemoryProperties memory;
     VkPhysicalDeviceLimits limits;
     uint32_t max_side;                                // of images that passes write

@@ -141,6 +141,20 @@ bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t nee
     return true;
 }
 
+void *vkb_append(struct vkb_error *error, void *pointers, size_t *count, size_t *capacity,
+                 size_t size)
+{
+    char *first;
+    void *object;
+
+    if (!vkb_grow(error, pointers, capacity, *count + 1, sizeof object)
+        || !(object = vkb_alloc(error, 1, size)))
+        return NULL;
+    memcpy(&first, pointers, sizeof first);
+    memcpy(first + (*count)++ * sizeof object, &object, sizeof object);
+    return object;
+}
+
 void vkb_free(void *memory)
 {
     COUNT_BLOCKS(-(memory != NULL));

@@ -54,6 +54,10 @@ void *vkb_alloc(struct vkb_error *error, size_t count, size_t size);
 // Grows an array to at least `needed` objects of `size` bytes. On failure the array is unchanged.
 // `array` points to the pointer to the first object, of any type.
 bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t needed, size_t size);
+// Adds a zeroed object of `size` bytes to an array of pointers to such objects. `pointers` points
+// to the pointer to the first of them. NULL and a filled error on failure.
+void *vkb_append(struct vkb_error *error, void *pointers, size_t *count, size_t *capacity,
+                 size_t size);
 void vkb_free(void *memory);
 
 #endif

@@ -41,7 +41,12 @@ _DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 _DTYPE_CURES = {
     "uint16": "; convert it: (image / 65535).astype(np.float32)",
     "bool": "; convert it: image.astype(np.float32)",
-    "longdouble": "; convert it: image.astype(np.float32)",
+    np.dtype(np.longdouble).name: "; convert it: image.astype(np.float32)",
+}
+#: Modes of PIL whose arrays are not red, green and blue, and the mode to convert them to.
+_MODE_CURES = {
+    **dict.fromkeys(("1", "L", "P", "CMYK", "YCbCr", "HSV", "RGBX"), "RGB"),
+    **dict.fromkeys(("LA", "La", "PA", "RGBa"), "RGBA"),
 }
 
 
@@ -175,12 +180,18 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
     the CPU, and an xarray.DataArray with the dimensions y, x and channel in any order. float64
     becomes float32.
     """
+    mode = _pil_mode(image)
+    if mode in _MODE_CURES:
+        raise ValueError(
+            f"{name}: the mode {mode} is not RGB or RGBA; convert it: "
+            f'{name}.convert("{_MODE_CURES[mode]}")'
+        )
     array = image if isinstance(image, np.ndarray) else _viewed(image, name)
     if type(array) is not np.ndarray and np.ma.is_masked(array):
         raise ValueError(
             f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
         )
-    if array.dtype == np.float64:
+    if array.dtype.name == "float64":  # in any byte order
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
         if array.dtype.name not in ("uint8", "float16", "float32"):
@@ -209,6 +220,8 @@ def check_emission(emission: object, image: NDArray[Any]) -> NDArray[Any]:
 
 def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
     """Return the mask as floats of 0 to 1, (H, W), if it has that height and width."""
+    if _pil_mode(mask) == "P":
+        raise ValueError('mask: the mode P is a palette; convert it: mask.convert("L")')
     array = mask if isinstance(mask, np.ndarray) else _viewed(mask, "mask", ("y", "x"))
     if type(array) is not np.ndarray and np.ma.is_masked(array):
         raise ValueError("mask: some values are masked; fill them first, such as mask.filled(0)")
@@ -245,10 +258,13 @@ def _viewed(
         # A grid's channels are named after their framebuffer, such as "final_channel".
         order = [_dimension(dims, one) for one in dimensions]
         if len(dims) != len(order) or None in order:
-            raise ValueError(
-                f"{name}: dimensions {dims} are not {', '.join(dimensions)}; select one value of "
-                f"the others first, such as {name}.isel(intensity=0)"
+            others = [dim for dim, one in zip(dims, order, strict=False) if dim not in order]
+            cure = (
+                f"select one value of the others first, such as {name}.isel({others[0]}=0)"
+                if len(dims) > len(order) and others
+                else f"rename them: {name}.rename(...)"
             )
+            raise ValueError(f"{name}: dimensions {dims} are not {', '.join(dimensions)}; {cure}")
         return np.asarray(image.transpose(*order))
     is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
     try:
@@ -262,6 +278,11 @@ def _viewed(
             f"{name}: an array is needed, not {type(image).__name__}"
             + (f"; NumPy: {error}" if is_viewed else "")
         ) from None
+
+
+def _pil_mode(image: object) -> str:
+    """Return the mode of an image of PIL; "" for other objects."""
+    return str(getattr(image, "mode", "")) if type(image).__module__.startswith("PIL.") else ""
 
 
 def _dimension(dims: tuple[Any, ...], name: str) -> Any:
@@ -278,7 +299,7 @@ def _shape_cure(shape: tuple[int, ...]) -> str:
         return "; convert grey to RGB: np.repeat(image[..., None], 3, axis=2)"
     if len(shape) == 3 and shape[2] == 1:
         return "; convert grey to RGB: np.repeat(image, 3, axis=2)"
-    if len(shape) == 3 and shape[0] in (3, 4):
+    if len(shape) == 3 and shape[0] in (3, 4) and shape[2] not in (0, 3, 4):
         return "; move the channels last: np.moveaxis(image, 0, -1)"
     return ""
 

@@ -13,11 +13,11 @@ from typing import Any, ClassVar, Final, Literal, Self, get_args
 from vkbloom import _core
 from vkbloom.checks import check_like, check_size
 from vkbloom.fields import (
+    Record,
     choice_field,
     field_range,
     flag_field,
     import_class,
-    make_from_fields,
     number_field,
 )
 from vkbloom.glare.base import Glare, replaced_stages, stage_field_of
@@ -52,7 +52,7 @@ METHODS: Final = {
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Settings:
+class Settings(Record):
     """Base class of the settings of all methods; use a method's class, such as `Separable`.
 
     Settings are frozen and hashable; `replace` returns a changed copy.
@@ -139,6 +139,8 @@ class Settings:
     ValueError: knee: 2 is out of range, 0 to 1
     """
 
+    _class_key: ClassVar[str] = "method"
+    _subject: ClassVar[str] = "fields"
     method: ClassVar[str]
     #: The composites that the method has.
     composites: ClassVar[tuple[Composite, ...]] = ("add", "mix", "screen")
@@ -256,114 +258,9 @@ class Settings:
         place, field = stage_field_of(self.glare, name)
         return getattr(self.glare[place], field)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name, and ``method``.
-
-        Returns
-        -------
-        dict
-            Values that JSON can represent, with lists instead of tuples.
-
-        See Also
-        --------
-        from_dict : Makes settings from the result.
-
-        Examples
-        --------
-        >>> vkbloom.Pyramid(levels=3).to_dict()["levels"]
-        3
-        """
-        values = dataclasses.asdict(self)
-        values["glare"] = [stage.to_dict() for stage in self.glare]
-        return {"method": self.method, **values}
-
     @classmethod
-    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """Make settings from the result of `to_dict`.
-
-        Parameters
-        ----------
-        fields : mapping of str to object
-            Values by field. Missing fields have their defaults. ``method`` names the class; it may
-            be missing in calls on a method's class, such as ``Separable.from_dict``.
-
-        Returns
-        -------
-        Settings
-            Settings of this method.
-
-        Raises
-        ------
-        ValueError
-            There is no such method or field, the method is not that of the class, or a value is out
-            of range.
-        TypeError
-            `fields` is not a mapping, or a value has the wrong type.
-
-        See Also
-        --------
-        to_dict : The fields by name.
-
-        Examples
-        --------
-        >>> Settings.from_dict({"method": "pyramid", "levels": 3})  # doctest: +SKIP
-        Pyramid(bloom=True, ..., levels=3, ...)
-        """
-        made: Self = make_from_fields(cls, methods(), "method", fields, "fields")
-        return made
-
-    def to_json(self) -> str:
-        """Return `to_dict` as JSON text.
-
-        See Also
-        --------
-        from_json : Makes settings from the result.
-
-        Examples
-        --------
-        >>> text = vkbloom.Pyramid(levels=3).to_json()
-        >>> vkbloom.Pyramid.from_json(text).levels
-        3
-        """
-        import json  # noqa: PLC0415  costs start-up time
-
-        return json.dumps(self.to_dict())
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Make settings from the result of `to_json`.
-
-        Parameters
-        ----------
-        text : str
-            An object with the keys of `from_dict`.
-
-        Returns
-        -------
-        Settings
-
-        Raises
-        ------
-        ValueError, TypeError
-            The text is not a JSON object, or as for `from_dict`.
-
-        See Also
-        --------
-        to_json : Returns the text.
-
-        Examples
-        --------
-        >>> from vkbloom import Settings
-        >>> Settings.from_json('{"method": "pyramid", "levels": 3}').levels
-        3
-        """
-        import json  # noqa: PLC0415  costs start-up time
-
-        try:
-            fields = json.loads(text)
-        except RecursionError:
-            raise ValueError("text: lists and objects are nested too deeply") from None
-        return cls.from_dict(fields)
+    def _classes(cls) -> Mapping[str, type[Settings]]:
+        return methods()
 
     def _repr_html_(self) -> str:
         """Return the table of `display.fields_html`."""

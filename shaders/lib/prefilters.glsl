@@ -1,8 +1,46 @@
 // What the first passes of published methods make of their bilinear taps.
+#include "lib/groups.glsl"
 
 float brightest(vec3 value)
 {
     return max(max(value.r, max(value.g, value.b)), 0.0);
+}
+
+// Bevy's: 13 taps in groups that are weighted by brightness but not renormalized, a floor, then the
+// threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
+vec4 bevy_prefiltered(Taps taps)
+{
+    vec4 means[5] = group_means(taps);
+    vec4 sum = vec4(0.0);
+    [[unroll]] for (int group = 0; group < 5; ++group) {
+        vec4 part = GROUP_SHARES[group] * means[group];
+        // Bevy's buffers hold no negative values. These do, and the divisor must not become 0.
+        float luminance = max(dot(part.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
+        sum += part / (1.0 + 0.25 * luminance);
+    }
+    sum.rgb = max(sum.rgb, vec3(1e-4));
+    if (THRESHOLDED != 0) {
+        float width = params.threshold * params.knee;
+        sum = soft_threshold(sum, params.threshold, width, 4.0 * (width + 1e-5), 1e-5);
+    }
+    return sum;
+}
+
+// The shares of Filament's four taps, and the distances of the first and the last of them. Along an
+// axis the texels at -1 .. 2 have the weights (1 - f, 2 - f, 1 + f, f) / 4. Two bilinear taps, each
+// between two texels, give these weights.
+struct FilamentTaps {
+    vec4 shares;
+    vec2 left, right;
+};
+
+FilamentTaps filament_taps(vec2 part)
+{
+    vec2 left_share = 0.25 * (3.0 - 2.0 * part), right_share = 0.25 * (1.0 + 2.0 * part);
+    vec4 shares = vec4(left_share.x, right_share.x, left_share.x, right_share.x)
+                * vec4(left_share.yy, right_share.yy);
+    return FilamentTaps(shares, (2.0 - part) / (3.0 - 2.0 * part) - 1.0 - part,
+                        1.0 + part / (1.0 + 2.0 * part) - part);
 }
 
 // Filament's: four taps with these shares. With the threshold it also has a firefly filter, which

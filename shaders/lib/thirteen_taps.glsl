@@ -1,7 +1,6 @@
 // The 13 taps of a downsample: nine in three rows, and four around the centre (Jimenez, "Next Generation
 // Post Processing in Call of Duty: Advanced Warfare", SIGGRAPH 2014). The including shader defines
-// `source` and SAMPLING.
-#include "lib/groups.glsl"
+// `source` and SAMPLING, and includes groups.glsl.
 
 vec4 tap(Place place, float x, float y)
 {

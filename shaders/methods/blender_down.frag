@@ -14,6 +14,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
+#include "lib/groups.glsl"
 #include "lib/thirteen_taps.glsl"
 
 vec4 shade()

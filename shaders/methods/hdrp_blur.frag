@@ -10,6 +10,7 @@
 
 UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
+#include "lib/hdrp.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
@@ -38,17 +39,15 @@ vec4 sample_pixel(ivec2 pixel, ivec2 size)
     if (SAMPLING == SAMPLING_FILTER)
         return sample_at(source, place, vec2(0.0), SAMPLING);
     // Across the direction, source and target have the same size.
-    return mix(fetch_clamped(source, place.texel), fetch_clamped(source, place.texel + along),
-               dot(place.part, vec2(along)));
+    return blended(fetch_clamped(source, place.texel), fetch_clamped(source, place.texel + along),
+                   dot(place.part, vec2(along)));
 }
 
 vec4 shade()
 {
-    const float weights[9] = float[](0.00390625, 0.03125, 0.109375, 0.21875, 0.2734375, 0.21875,
-                                     0.109375, 0.03125, 0.00390625);
     ivec2 size = ivec2(params.target_width, params.target_height);
     vec4 sum = vec4(0.0);
-    for (int tap = 0; tap < 9; ++tap)
-        sum += weights[tap] * sample_pixel(PIXEL + (tap - 4) * along, size);
+    for (int tap = -HDRP_RADIUS; tap <= HDRP_RADIUS; ++tap)
+        sum += HDRP_WEIGHTS[tap + HDRP_RADIUS] * sample_pixel(PIXEL + tap * along, size);
     return stored(sum);
 }

@@ -15,6 +15,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 
+#include "lib/groups.glsl"
 #include "lib/thirteen_taps.glsl"
 
 vec4 shade()

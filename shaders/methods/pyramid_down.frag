@@ -13,6 +13,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
+#include "lib/groups.glsl"
 #include "lib/thirteen_taps.glsl"
 
 // The 13 taps from a level of exactly twice the size, where all taps are between texels. They are

@@ -162,17 +162,22 @@ uvec4 finished(uvec4 own, vec4 value)
 #ifdef WORDS
 
 // A pixel anywhere in an image of this shape (see Words).
-vec4 load_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
+uvec4 raw_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
 {
     uvec4 word = texelFetch(image, row * shape.z + at * CHANNEL_BYTES / 4);
 #if CHANNEL_BYTES == 1
     uvec2 half_word = (at & 2) == 0 ? word.xy : word.zw;
-    return value_of(uvec4((at & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0));
+    return uvec4((at & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0);
 #elif CHANNEL_BYTES == 2
-    return value_of(uvec4((at & 1) == 0 ? word.xy : word.zw, 0, 0));
+    return uvec4((at & 1) == 0 ? word.xy : word.zw, 0, 0);
 #else
-    return value_of(word);
+    return word;
 #endif
+}
+
+vec4 load_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
+{
+    return value_of(raw_pixel(image, shape, at, row));
 }
 
 // A pixel of an image of single floats. Above and below the image, the outermost rows are repeated.

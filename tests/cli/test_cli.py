@@ -19,7 +19,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.processes import python
+from tests.processes import python
 from vkbloom.cli import fields
 from vkbloom.cli.program import COMMANDS, as_wrong_use, program
 from vkbloom.cli.settings_options import METHODS, settings_options
@@ -216,6 +216,10 @@ def test_the_default_is_the_renderers() -> None:
         ("--glare none", {"glare": ()}),
         ("--glare anamorphic+halo", {"glare": (*vkbloom.glares["anamorphic"], vkbloom.Halo())}),
         (
+            "--glare ghosts:scales=[1,-2],tints=[[1,0,0],[0,1,0]],falloff=3",
+            {"glare": vkbloom.Ghosts(scales=(1, -2), tints=((1, 0, 0), (0, 1, 0)), falloff=3)},
+        ),
+        (
             "--glare streaks:directions=4,fade=0.5 --streaks 6 --ghosts --halo",
             {
                 "glare": (
@@ -250,7 +254,14 @@ def test_options_change_a_preset() -> None:
         ("--bloom-size 256", "'--bloom-size': '256' is not WxH|none"),
         ("--bloom-size 0x5", "bloom_size: (0, 5) is out of range"),
         ("--format rgba8", "'--format': 'rgba8' is not rgba8unorm|"),
-        ("--glare rain", "'--glare': 'rain' is not NAME[:A=1,...]+..."),
+        ("--glare rain", "'--glare': 'rain': 'rain' is not one of streaks, ghosts,"),
+        ("--glare streaks:base=9", "'streaks:base=9': base: 9 is out of range, 2 to 8"),
+        ("--glare streaks:base=a", "'streaks:base=a': base: 'a' is not a number"),
+        ("--glare streaks:base", "'streaks:base': 'base' is not NAME=VALUE"),
+        ("--glare ghosts:scales=1", "scales: 1 is not a sequence of numbers"),
+        ("--glare godot_dirt:seed=1", "godot_dirt is a published glare, which takes no fields"),
+        ("--psf gaussian", "'--psf': 'gaussian': psf: gaussian needs a value for sigma"),
+        ("--psf gauss", "'--psf': 'gauss': is neither a file nor one of "),
         ("--streaks 17", "'--streaks': 17 is not in the range"),
         ("--tonemap filmic", "'--tonemap': 'filmic' is not one of 'none'"),
         ("--threshold high", "'--threshold': 'high' is not float|none"),

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +12,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.processes import python
+from tests.processes import python
 from vkbloom.cli.program import program
 from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
@@ -357,6 +354,8 @@ class TestErrors:
             ("bad.png b.png", 1, "bad.png: is not a readable image"),
             ("bad.exr b.png", 1, "bad.exr: is not a readable image"),
             ("cut.exr b.png", 1, "cut.exr: damaged"),
+            ("a.exr b.png --dirt cut.png", 1, "cut.png: damaged"),
+            ("a.exr b.png --method convolution --psf cut.exr", 1, "cut.exr: damaged"),
             ("xyz.exr b.png", 1, "xyz.exr: the channels X, Y, Z are not R, G, B or a single one"),
             ("a.exr none/b.png", 1, "none/b.png: No such file or directory"),
             ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold this picture"),
@@ -395,6 +394,8 @@ class TestErrors:
         monkeypatch.chdir(tmp_path)
         content = stored(Path("a.exr"), light(20, 30, 3)).read_bytes()
         Path("cut.exr").write_bytes(content[: len(content) // 2])
+        content = png(Path("cut.png"), light(20, 30, 3, dtype="uint8")).read_bytes()
+        Path("cut.png").write_bytes(content[: len(content) // 2])
         for name in ("bad.png", "bad.exr"):
             Path(name).write_bytes(b"nothing of the kind")
         spec = oiio.ImageSpec(2, 2, 3, "float")
@@ -411,7 +412,7 @@ class TestErrors:
         assert message in result.stderr
         assert Path("b.png").read_bytes() == b"before"
         assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
-            ["a.exr", "b.png", "bad.exr", "bad.png", "cut.exr", "xyz.exr"]
+            ["a.exr", "b.png", "bad.exr", "bad.png", "cut.exr", "cut.png", "xyz.exr"]
         )
 
     @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "tif"])
@@ -422,13 +423,7 @@ class TestErrors:
         content = path.read_bytes()
         path.write_bytes(content[: len(content) // 2])
         # As a process, because libpng writes to the descriptor.
-        ended = subprocess.run(
-            [sys.executable, "-m", "vkbloom.cli", "apply", str(path), str(tmp_path / "b.png")],
-            env=dict(os.environ),
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        ended = python("-m", "vkbloom.cli", "apply", path, tmp_path / "b.png")
         assert (ended.returncode, ended.stdout) == (1, "")
         assert ended.stderr.startswith(f"vkbloom: {path}: ")
         assert ended.stderr.count("\n") == 1

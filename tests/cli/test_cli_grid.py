@@ -267,6 +267,8 @@ def test_presets_as_an_axis(tmp_path: Path, image_file: Path) -> None:
         ((), "there is no --axis; give one"),
         (("--axis", "preset=kino", "--intensity", "0.5"), "leave out options of settings"),
         (("--axis", "preset=kino,filament", "--axis", "levels=1,2"), "not all of these presets"),
+        (("--axis", "exposure=0", "--axis", "exposure=1"), "exposure is given twice"),
+        (("--glare", "dirt", "--axis", "glare.0.image=a.png"), "use Renderer.grid"),
     ],
 )
 def test_axes_that_cannot_be(

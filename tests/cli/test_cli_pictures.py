@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 import vkbloom
 from tests.io.profiles import DISPLAY_P3, profile, profile_chunk, store_png
 from tests.io.test_array_files import halves, store_exr
+from tests.processes import python
 from vkbloom.cli.program import program
 
 pytest.importorskip("OpenImageIO")
@@ -100,12 +101,7 @@ class TestSequences:
         content = (frames / "f.0011.png").read_bytes()
         (frames / "f.0011.png").write_bytes(content[: len(content) // 2])
         words = ("f.*.png", "out", "--method", "pyramid", "--threshold", "1")
-        ended = subprocess.run(
-            [sys.executable, "-m", "vkbloom.cli", "apply", *words],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        ended = python("-m", "vkbloom.cli", "apply", *words)
         assert ended.returncode == 1
         lines = ended.stderr.splitlines()
         assert len(lines) == 4

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.cli.processes import python
+from tests.processes import python
 from vkbloom import doctor
 from vkbloom.doctor import child, drivers, installation, trial
 from vkbloom.doctor.finding import Finding

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 
 import vkbloom
 from tests.conftest import ADAPTER
+from tests.processes import output, python
 from vkbloom import AdapterInfo, AdapterNotFoundError, Renderer, adapters
 
 VK_ERROR_INCOMPATIBLE_DRIVER = -9
@@ -34,14 +34,7 @@ print(json.dumps(result))
 
 def run(**environment: str) -> Any:
     """Run PROGRAM with these environment variables, and return what it printed."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return json.loads(done.stdout)
+    return json.loads(output("-c", PROGRAM, **environment))
 
 
 def test_the_list() -> None:
@@ -183,13 +176,7 @@ def test_a_damaged_manifest_beside_a_good_one(tmp_path: Path) -> None:
     damaged.write_text("{ no JSON")
     icds = [str(damaged), *map(str, Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))]
     files = os.pathsep.join(icds)
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
-        env={**os.environ, "VK_ICD_FILENAMES": files, "VK_DRIVER_FILES": files},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python("-c", PROGRAM, VK_ICD_FILENAMES=files, VK_DRIVER_FILES=files)
     if done.returncode == 0:
         assert json.loads(done.stdout)["type"] == "cpu"
         return
@@ -224,13 +211,7 @@ except vkbloom.Error as error:
         for name in ("VK_LAYER_PATH", "XDG_DATA_DIRS", "XDG_DATA_HOME", "XDG_CONFIG_DIRS")
     }
     icds = [str(path) for path in Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json")]
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env={**os.environ, **environment, "VK_DRIVER_FILES": ":".join(icds)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.startswith("Error ")
-    assert "VK_LAYER_KHRONOS_validation is not installed" in done.stdout
-    assert "apt install" in done.stdout
+    printed = output("-c", program, VK_DRIVER_FILES=":".join(icds), **environment)
+    assert printed.startswith("Error ")
+    assert "VK_LAYER_KHRONOS_validation is not installed" in printed
+    assert "apt install" in printed

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import vkbloom
 from tests.core.builds import ROOT
+from tests.processes import output
 from vkbloom import Renderer
 
 # Prints the passes of a plan, then captures them; and that an exception leaves no file.
@@ -74,15 +74,7 @@ def test_a_capture_names_the_passes_in_their_order(tmp_path: Path) -> None:
         "VKBLOOM_DRIVER": "system",
         "VKBLOOM_CACHE_DIR": "",
     }
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, tmp_path],
-        env={**os.environ, **variables},
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    output("-c", PROGRAM, tmp_path, cwd=ROOT, **variables)
     assert [path.name for path in tmp_path.iterdir()] == ["bloom.rdc"]
     python = "/usr/bin/python3"
     found = [python, "-c", "import renderdoc"]

@@ -17,6 +17,7 @@ import pytest
 
 import vkbloom
 from tests.core.builds import ROOT, core_with_faults
+from tests.processes import output
 
 pytestmark = pytest.mark.skipif(
     "VKBLOOM_SANITIZED" in os.environ, reason="the walk has a core of its own, without sanitizers"
@@ -25,24 +26,20 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of a process with the core that fails on demand."""
+    """The environment variables of a process with the core that fails on demand."""
     package = core_with_faults(tmp_path_factory.getbasetemp()) / "python"
     # Without the cache on disk, which has its own test.
-    return {**os.environ, "PYTHONPATH": str(package), "VKBLOOM_CACHE_DIR": ""}
+    return {"PYTHONPATH": str(package), "VKBLOOM_CACHE_DIR": ""}
 
 
 def run(faulty: dict[str, str], walk: str, *arguments: str) -> str:
     """Return what a walk of this folder prints."""
-    done = subprocess.run(
-        [sys.executable, "-m", f"tests.core.{walk}", *arguments],
-        cwd=ROOT,
-        env=faulty,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    # A walk with stride 1 takes longer than the limit of `output`.
+    command = [sys.executable, "-m", f"tests.core.{walk}", *arguments]
+    environment = {**os.environ, **faulty}
+    return subprocess.run(
+        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True, check=True
+    ).stdout
 
 
 def walk(faulty: dict[str, str], stride: int) -> dict[str, dict[str, Any]]:
@@ -122,10 +119,7 @@ print(_core.fault_state()[0])
 
 def test_one_instance_with_the_validation_layer_and_one_without(faulty: dict[str, str]) -> None:
     """NVIDIA's driver 580 allows a process about 30 instances, even one after the other."""
-    done = subprocess.run(
-        [sys.executable, "-c", INSTANCES], env=faulty, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == ["2"]
+    assert output("-c", INSTANCES, **faulty).split() == ["2"]
 
 
 def test_memory_that_python_does_not_get(

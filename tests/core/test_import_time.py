@@ -3,12 +3,10 @@ frame."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import pytest
 
 import vkbloom
+from tests.processes import output
 
 # NumPy loads some of the standard library itself, differently by version.
 LATE = (
@@ -43,8 +41,7 @@ LATE = (
 
 def loaded(code: str) -> set[str]:
     code += "; import sys; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    return set(output("-c", code).split())
 
 
 def test_the_import_loads_what_is_needed() -> None:

@@ -6,13 +6,13 @@ import gc
 import math
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.images import picture
+from tests.processes import output
 from vkbloom import DeviceLostError, Frames, Renderer, Scene, Separable, gaussian_weights
 
 LEAVES_BEHIND = pytest.mark.skipif(
@@ -80,17 +81,43 @@ def long_work(renderer: Renderer, image: NDArray[np.float32]) -> None:
     renderer.apply(image, LONG, attachments="final")
 
 
-def check(renderer: Renderer, scene: Scene) -> None:
-    """The renderer gives the exact pictures of a new one."""
-    with Renderer() as new:
-        for settings in (SHORT, Separable(bloom_size=(7, 5))):
-            expected = new.render(scene, settings, RIGHT_SIZE)
-            frames = renderer.render(scene, settings, RIGHT_SIZE)
-            for name, array in expected.items():
-                np.testing.assert_array_equal(frames[name], array)
-        np.testing.assert_array_equal(
-            renderer.apply(picture(9, 9), SHORT)["final"], new.apply(picture(9, 9), SHORT)["final"]
-        )
+class Case(NamedTuple):
+    """A new renderer, an image with which its work is long, and an alarm."""
+
+    renderer: Renderer
+    image: NDArray[np.float32]
+    alarm: Callable[[float], None]
+    scene: Scene
+
+    @contextmanager
+    def interrupted(self, seconds: float = 0.1) -> Iterator[None]:
+        """The alarm ends the work within."""
+        self.alarm(seconds)
+        with pytest.raises(Alarm):
+            yield
+
+    def check(self) -> None:
+        """The renderer gives the exact pictures of a new one."""
+        with Renderer() as new:
+            for settings in (SHORT, Separable(bloom_size=(7, 5))):
+                expected = new.render(self.scene, settings, RIGHT_SIZE)
+                frames = self.renderer.render(self.scene, settings, RIGHT_SIZE)
+                for name, array in expected.items():
+                    np.testing.assert_array_equal(frames[name], array)
+            after, expected_after = (
+                each.apply(picture(9, 9), SHORT)["final"] for each in (self.renderer, new)
+            )
+            np.testing.assert_array_equal(after, expected_after)
+
+
+@pytest.fixture
+def case(
+    new_renderer: Callable[[], Renderer],
+    large: NDArray[np.float32],
+    alarm: Callable[[float], None],
+    scene: Scene,
+) -> Case:
+    return Case(new_renderer(), large, alarm, scene)
 
 
 def quarter(image: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -101,32 +128,21 @@ def quarter(image: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @UNIX
-def test_a_long_frame_is_interrupted(
-    new_renderer: Callable[[], Renderer],
-    scene: Scene,
-    alarm: Callable[[float], None],
-    large: NDArray[np.float32],
-) -> None:
-    renderer = new_renderer()
-    renderer.apply(picture(8, 8), LONG)
+def test_a_long_frame_is_interrupted(case: Case) -> None:
+    case.renderer.apply(picture(8, 8), LONG)
     for _ in range(2):
-        alarm(0.1)
-        with pytest.raises(Alarm):
-            long_work(renderer, large)
-    check(renderer, scene)
+        with case.interrupted():
+            long_work(case.renderer, case.image)
+    case.check()
 
 
 @UNIX
-def test_an_interrupted_frame_keeps_its_arrays(
-    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], large: NDArray[np.float32]
-) -> None:
+def test_an_interrupted_frame_keeps_its_arrays(case: Case) -> None:
     # The device writes into the array when no one else refers to it.
-    renderer = new_renderer()
-    image = large
+    renderer, image = case.renderer, case.image
     expected = renderer.apply(image, LONG, attachments="final")["final"]
     renderer.apply(image[:8, :8], LONG)
-    alarm(0.1)
-    with pytest.raises(Alarm):
+    with case.interrupted():
         renderer.apply(image, LONG, attachments="final", out={"final": np.zeros_like(image)})
     gc.collect()
     others = [np.zeros_like(image) for _ in range(4)]
@@ -136,11 +152,9 @@ def test_an_interrupted_frame_keeps_its_arrays(
 
 
 @UNIX
-def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
-    new_renderer: Callable[[], Renderer], alarm: Callable[[float], None], large: NDArray[np.float32]
-) -> None:
+def test_a_finalizer_of_an_array_may_wait_for_the_renderer(case: Case) -> None:
     """Regression: the array of an interrupted call was released with the renderer's lock held."""
-    renderer = new_renderer()
+    renderer = case.renderer
     renderer.apply(picture(8, 8), LONG)
     finished: list[bool] = []
 
@@ -150,11 +164,10 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
         thread.join(20.0)
         finished.append(not thread.is_alive())
 
-    array = np.zeros_like(large)
+    array = np.zeros_like(case.image)
     weakref.finalize(array, use_elsewhere)
-    alarm(0.1)
-    with pytest.raises(Alarm):
-        renderer.apply(large, LONG, attachments="final", out={"final": array})
+    with case.interrupted():
+        renderer.apply(case.image, LONG, attachments="final", out={"final": array})
     del array
     gc.collect()
     assert not finished
@@ -164,19 +177,12 @@ def test_what_hears_of_an_array_s_end_may_wait_for_the_renderer(
 
 
 @UNIX
-def test_a_sequence_is_interrupted(
-    new_renderer: Callable[[], Renderer],
-    scene: Scene,
-    alarm: Callable[[float], None],
-    large: NDArray[np.float32],
-) -> None:
-    renderer = new_renderer()
+def test_a_sequence_is_interrupted(case: Case) -> None:
     settings = [LONG.replace(exposure=step / 8, blur_strength=1 + step / 8) for step in range(3)]
-    alarm(0.3)
-    with pytest.raises(Alarm):
-        for _ in renderer.apply_many(large, settings):
+    with case.interrupted(0.3):
+        for _ in case.renderer.apply_many(case.image, settings):
             pass
-    check(renderer, scene)
+    case.check()
 
 
 STRENGTHS = {"blur_strength": np.linspace(1, 2, 24).tolist()}
@@ -197,27 +203,19 @@ class Stopper:
 
 
 @UNIX
-def test_a_grid_is_interrupted(
-    new_renderer: Callable[[], Renderer],
-    scene: Scene,
-    alarm: Callable[[float], None],
-    large: NDArray[np.float32],
-) -> None:
-    renderer = new_renderer()
-    stopper = Stopper(alarm)
+def test_a_grid_is_interrupted(case: Case) -> None:
+    stopper = Stopper(case.alarm)
     with pytest.raises(Alarm):
-        renderer.grid(quarter(large), LONG, STRENGTHS, reduce={"mean": stopper}, progress=False)
+        case.renderer.grid(
+            quarter(case.image), LONG, STRENGTHS, reduce={"mean": stopper}, progress=False
+        )
     assert stopper.points < 24
-    check(renderer, scene)
+    case.check()
 
 
 @UNIX
-def test_an_interrupted_store_is_gone_on_with(
-    new_renderer: Callable[[], Renderer],
-    alarm: Callable[[float], None],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    large: NDArray[np.float32],
+def test_an_interrupted_store_is_completed(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     closers: list[threading.Thread] = []
     close = Renderer.close
@@ -230,7 +228,7 @@ def test_an_interrupted_store_is_gone_on_with(
 
     def to_store(stopper: Stopper) -> xarray.Dataset:
         return vkbloom.grid_to_zarr(
-            quarter(large),
+            quarter(case.image),
             LONG,
             STRENGTHS,
             tmp_path / "grid",
@@ -240,7 +238,7 @@ def test_an_interrupted_store_is_gone_on_with(
             progress=False,
         )
 
-    first, second = Stopper(alarm), Stopper(None)
+    first, second = Stopper(case.alarm), Stopper(None)
     with pytest.raises(Alarm):
         to_store(first)
     # The caller does not wait for pending submissions after an interruption.
@@ -251,8 +249,8 @@ def test_an_interrupted_store_is_gone_on_with(
     assert closers[1:] == [threading.main_thread()]
     # And the first point, for its shape. A block may be complete without a mark.
     assert second.points <= 24 - done + 1
-    right = new_renderer().grid(
-        quarter(large), LONG, STRENGTHS, reduce={"mean": Stopper(None)}, progress=False
+    right = case.renderer.grid(
+        quarter(case.image), LONG, STRENGTHS, reduce={"mean": Stopper(None)}, progress=False
     )
     assert bool(got["done"].all())
     for name in ("final", "mean"):
@@ -260,48 +258,30 @@ def test_an_interrupted_store_is_gone_on_with(
 
 
 @UNIX
-def test_an_interrupted_close_leaves_the_renderer_open(
-    new_renderer: Callable[[], Renderer],
-    scene: Scene,
-    alarm: Callable[[float], None],
-    large: NDArray[np.float32],
-) -> None:
-    renderer = new_renderer()
-    alarm(0.1)
-    with pytest.raises(Alarm):
-        long_work(renderer, large)
-    alarm(0.1)
-    with pytest.raises(Alarm):
-        renderer.close()
-    assert not renderer.closed
-    check(renderer, scene)
-    renderer.close()
-    assert renderer.closed
+def test_an_interrupted_close_leaves_the_renderer_open(case: Case) -> None:
+    with case.interrupted():
+        long_work(case.renderer, case.image)
+    with case.interrupted():
+        case.renderer.close()
+    assert not case.renderer.closed
+    case.check()
+    case.renderer.close()
+    assert case.renderer.closed
 
 
 @UNIX
-def test_waiting_for_another_thread_is_interrupted(
-    new_renderer: Callable[[], Renderer],
-    scene: Scene,
-    alarm: Callable[[float], None],
-    large: NDArray[np.float32],
-) -> None:
-    renderer = new_renderer()
-    thread = threading.Thread(target=long_work, args=(renderer, large))
+def test_waiting_for_another_thread_is_interrupted(case: Case) -> None:
+    thread = threading.Thread(target=long_work, args=(case.renderer, case.image))
     thread.start()
     time.sleep(0.05)
-    alarm(0.1)
-    with pytest.raises(Alarm):
-        list(map(renderer.apply, [picture(8, 8)] * 1000))
+    with case.interrupted():
+        list(map(case.renderer.apply, [picture(8, 8)] * 1000))
     thread.join()
-    check(renderer, scene)
+    case.check()
 
 
 @UNIX
-def test_a_handler_that_uses_the_renderer_gets_an_error(
-    new_renderer: Callable[[], Renderer], scene: Scene, large: NDArray[np.float32]
-) -> None:
-    renderer = new_renderer()
+def test_a_handler_that_uses_the_renderer_gets_an_error(case: Case) -> None:
     caught: list[str] = []
 
     def handler(number: int, frame: object) -> None:
@@ -310,7 +290,7 @@ def test_a_handler_that_uses_the_renderer_gets_an_error(
         if caught:
             return
         try:
-            renderer.render(scene, SHORT, RIGHT_SIZE)
+            case.renderer.render(case.scene, SHORT, RIGHT_SIZE)
         except Exception as error:
             caught.append(str(error))
             signal.setitimer(signal.ITIMER_REAL, 0)
@@ -318,11 +298,11 @@ def test_a_handler_that_uses_the_renderer_gets_an_error(
     before = signal.signal(signal.SIGALRM, handler)
     signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
     while not caught:
-        long_work(renderer, large)
+        long_work(case.renderer, case.image)
     signal.signal(signal.SIGALRM, before)
     (message,) = set(caught)
     assert "at work in this thread" in message
-    check(renderer, scene)
+    case.check()
 
 
 # Limits of time
@@ -403,16 +383,9 @@ def test_collecting_a_renderer_at_work(
 ) -> None:
     """Regression: this wait had no limit, and Ctrl-C did not end it."""
     # Twice the side: four times as long as half a second.
-    done = subprocess.run(
-        [sys.executable, "-c", COLLECT, str(2 * len(large)), how],
-        env={**os.environ, "VKBLOOM_TIMEOUT": limit},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    ending, seconds = done.stdout.split()
+    side = str(2 * len(large))
+    printed = output("-c", COLLECT, side, how, VKBLOOM_TIMEOUT=limit)
+    ending, seconds = printed.split()
     assert ending == words
     assert float(seconds) < 1.0
 
@@ -482,13 +455,7 @@ print("parent done")
 def test_a_forked_process(how: str, renderer: Renderer) -> None:
     if how == "exit" and renderer.info.type != "cpu":
         pytest.skip("drivers of GPUs may not end in a child (docs/robustness.md, Forks)")
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD, how], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert (done.returncode, done.stdout.split("\n")) == (
-        0,
-        ["child done", "parent done", ""],
-    ), done.stdout + done.stderr
+    assert output("-c", CHILD, how) == "child done\nparent done\n"
 
 
 # Prints the error of a child whose driver opens no device.
@@ -511,10 +478,7 @@ for _ in range(2):
 
 @UNIX
 def test_a_child_without_an_adapter_is_told_to_spawn() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", ADVICE], capture_output=True, text=True, timeout=120, check=True
-    )
-    told = done.stdout.splitlines()
+    told = output("-c", ADVICE).splitlines()
     assert len(told) == 2
     for line in told:
         assert "no such adapter" in line

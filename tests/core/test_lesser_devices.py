@@ -10,13 +10,13 @@ import json
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.core.builds import ROOT, compiler, require_header
+from tests.processes import python
 from vkbloom import AdapterInfo
 
 SOURCE = Path(__file__).with_name("lesser_device.c")
@@ -84,24 +84,17 @@ def run(
     layer: Path, name: str, lesser: str, program: tuple[str, ...] = WORK, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     folders = (os.environ.get("VK_LAYER_PATH"), *EXPLICIT_LAYERS)
-    return subprocess.run(
-        [sys.executable, *program],
-        cwd=ROOT,
-        env={
-            **os.environ,
-            "VK_LAYER_PATH": os.pathsep.join(filter(None, (*folders, str(layer)))),
-            "VK_INSTANCE_LAYERS": os.pathsep.join(
-                ("VK_LAYER_KHRONOS_validation", "VK_LAYER_VKBLOOM_lesser_device")
-            ),
-            "VKBLOOM_LESSER": lesser,
-            "VKBLOOM_TEST_NAME": name,
-            "VKBLOOM_CACHE_DIR": "",
-            **environment,
-        },
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    variables = {
+        "VK_LAYER_PATH": os.pathsep.join(filter(None, (*folders, str(layer)))),
+        "VK_INSTANCE_LAYERS": os.pathsep.join(
+            ("VK_LAYER_KHRONOS_validation", "VK_LAYER_VKBLOOM_lesser_device")
+        ),
+        "VKBLOOM_LESSER": lesser,
+        "VKBLOOM_TEST_NAME": name,
+        "VKBLOOM_CACHE_DIR": "",
+        **environment,
+    }
+    return python(*program, cwd=ROOT, **variables)
 
 
 @pytest.mark.parametrize(
@@ -165,6 +158,7 @@ TOO_LARGE = """
 import os
 import numpy as np
 import vkbloom
+from tests.processes import python
 
 size = (2000, 2000)
 small = vkbloom.Convolution(np.ones((3, 3), np.float32), bloom_size=size)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import os
-import subprocess
 import sys
 import threading
 import weakref
@@ -18,6 +17,7 @@ import pytest
 
 from tests.core.descriptors import open_descriptors
 from tests.framebuffers import assert_same
+from tests.processes import output
 from tests.screens import noise, screen
 from vkbloom import Frames, Renderer, Scene, Separable, adapters, gaussian_weights
 
@@ -99,6 +99,7 @@ def test_two_renderers_do_not_know_each_other(scene: Scene) -> None:
 # Prints the exception of a renderer if there is a validation message.
 OBJECTION = """
 import vkbloom
+from tests.processes import output
 try:
     with vkbloom.Renderer(validation=True) as renderer:
         renderer.render(vkbloom.Scene.ufo(), size=(8, 8))
@@ -113,14 +114,7 @@ def test_a_message_of_the_validation_layer_is_an_error() -> None:
     # All other tests pass where the layer is silent. With its checks of best practices, which the
     # environment turns on, it is not: it warns of the extension that its messages come through.
     more = {"VK_LAYER_ENABLES": "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT"}
-    done = subprocess.run(
-        [sys.executable, "-c", OBJECTION],
-        env={**os.environ, **more},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    raised, without = done.stdout.strip().splitlines()
+    raised, without = output("-c", OBJECTION, **more).strip().splitlines()
     assert raised.startswith("raised Validation")
     assert "BestPractices" in raised
     assert without == "without (8, 8, 4)"
@@ -138,10 +132,7 @@ def grown() -> Measured:
     if os.environ.get("VKBLOOM_SANITIZED"):
         pytest.skip("a sanitizer's own heap is not what is measured")
     tool = Path(__file__).resolve().parents[2] / "tools" / "renderer_memory.py"
-    done = subprocess.run(
-        [sys.executable, str(tool), "100"], capture_output=True, text=True, check=True
-    )
-    measured: Measured = json.loads(done.stdout)
+    measured: Measured = json.loads(output(tool, "100"))
     return measured
 
 

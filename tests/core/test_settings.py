@@ -9,8 +9,6 @@ import json
 import math
 import pickle
 import re
-import subprocess
-import sys
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -20,6 +18,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.processes import output
 from vkbloom import TUTORIAL, Separable, Settings, _core, gaussian_weights, presets
 from vkbloom.fields import field_range
 from vkbloom.settings import methods
@@ -414,8 +413,7 @@ def test_methods_have_the_order_of_the_core() -> None:
     header = Path(__file__).parents[2] / "csrc/passes/settings.h"
     rows = re.findall(r"^    METHOD\(\w+, (\w+), ", header.read_text(), re.MULTILINE)
     code = "import vkbloom.methods.pygfx; from vkbloom.settings import methods; print(*methods())"
-    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert names.stdout.split() == rows
+    assert output("-c", code).split() == rows
     assert [kind.method for kind in methods().values()] == rows
 
 

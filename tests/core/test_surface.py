@@ -7,7 +7,6 @@ import itertools
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ import pytest
 import vkbloom
 from tests.core.builds import ROOT
 from tests.images import picture
+from tests.processes import output
 from vkbloom import Renderer, Scene, Separable, Surface, _core
 
 SIZE = (48, 27)
@@ -51,15 +51,7 @@ def surface(renderer: Renderer) -> Iterator[Surface]:
 
 
 def run_windows(display: dict[str, str], *arguments: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.core.windows", *arguments],
-        cwd=ROOT,
-        env=display,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    output("-m", "tests.core.windows", *arguments, cwd=ROOT, **display)
 
 
 def test_windows(display: dict[str, str]) -> None:

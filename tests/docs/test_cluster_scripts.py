@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import vkbloom
+from tests.processes import output
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
 SCRIPTS = sorted(FOLDER.glob("on_*.py"))
@@ -22,15 +20,7 @@ def test_on_this_machine(tmp_path: Path) -> None:
     for script in FOLDER.glob("*.py"):
         shutil.copy(script, tmp_path)
     package = str(Path(vkbloom.__file__).parents[1])
-    done = subprocess.run(
-        [sys.executable, "on_this_machine.py"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": package},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    output("on_this_machine.py", cwd=tmp_path, PYTHONPATH=package)
     with xarray.open_zarr(tmp_path / "local.zarr", consolidated=False) as stored:
         assert stored["final"].shape == (8, 4, 90, 160, 3)
         assert bool(stored["done"].all())

@@ -86,7 +86,9 @@ def with_methods() -> Iterator[Any]:
     for parameters in public():
         yield parameters
         member = parameters.values[0]
-        for name in vars(member) if member in METHODS_OF else ():
+        owners = inspect.getmro(member) if member in METHODS_OF else ()
+        own = [owner for owner in owners if owner.__module__.startswith("vkbloom.")]
+        for name in {name: None for owner in own for name in vars(owner)}:
             method = getattr(member, name)
             if not name.startswith("_") and (
                 inspect.isfunction(method) or inspect.ismethod(method)

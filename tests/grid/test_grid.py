@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +15,7 @@ import pytest
 
 import vkbloom
 from tests.framebuffers import noise
+from tests.processes import output
 from vkbloom import (
     Convolution,
     DualKawase,
@@ -551,7 +551,7 @@ class TestExtras:
             "import sys; sys.modules.update(dict.fromkeys(['xarray', 'zarr', 'dask', 'distributed',"
             " 'matplotlib', 'tqdm'])); import vkbloom"
         )
-        subprocess.run([sys.executable, "-c", code], check=True)
+        output("-c", code)
 
     def test_grids_are_imported_late(self) -> None:
         code = (
@@ -560,7 +560,7 @@ class TestExtras:
             "assert all(hasattr(vkbloom, name) for name in vkbloom.__all__)\n"
             "from vkbloom import reductions"
         )
-        subprocess.run([sys.executable, "-c", code], check=True)
+        output("-c", code)
         with pytest.raises(AttributeError, match="no attribute 'grids'"):
             vkbloom.grids  # noqa: B018
 

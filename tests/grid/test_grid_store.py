@@ -21,7 +21,8 @@ import pytest
 import vkbloom
 from tests.framebuffers import noise
 from tests.grid.stores import contents
-from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, reductions
+from tests.processes import output, python
+from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, psf, reductions
 from vkbloom.grid.filling import Filler
 from vkbloom.grid.identity import differences
 from vkbloom.grid.store import GridStore
@@ -135,6 +136,32 @@ class TestWhole:
         )
         assert list(listed["image"].values) == ["x", "y"]
         assert check_grid(tmp_path / "c.zarr").complete
+
+    @pytest.mark.parametrize(
+        ("settings", "axis", "values"),
+        [
+            (Pyramid(levels=2), "glare", [(), vkbloom.Halo(), "godot_dirt"]),
+            (vkbloom.Convolution(), "psf", [psf.gaussian(1), np.ones((3, 5), np.float32)]),
+            (
+                Pyramid(glare=(vkbloom.Dirt(),)),
+                "glare.0.image",
+                [None, np.ones((2, 3), np.float32)],
+            ),
+        ],
+    )
+    def test_fields_that_are_objects_are_axes(
+        self, tmp_path: Path, renderer: Renderer, settings: Any, axis: str, values: Any
+    ) -> None:
+        stored = grid_to_zarr(source(), settings, {axis: values}, tmp_path / "a.zarr")
+        for place, value in enumerate(values):
+            expected = renderer.apply(source(), settings.replace(**{axis: value}))["final"]
+            np.testing.assert_array_equal(stored["final"][place], expected)
+        in_memory = renderer.grid(source(), settings, {axis: values}, progress=False)
+        assert list(in_memory[axis].values) == list(stored[axis].values)
+        again = grid_to_zarr(source(), settings, {axis: values}, tmp_path / "a.zarr")
+        assert again.attrs["passes_run"] == 0
+        with pytest.raises(ValueError, match=rf"axes\.{axis}"):
+            grid_to_zarr(source(), settings, {axis: values[:1]}, tmp_path / "a.zarr")
 
     def test_masks_and_emissions_belong_to_the_source(
         self, tmp_path: Path, renderer: Renderer
@@ -275,8 +302,8 @@ class TestResumed:
                 process.wait()
             if (store / "zarr.json").exists():
                 assert int(xr.open_zarr(store)["done"].sum()) < 1000
-        subprocess.run([sys.executable, str(script), str(store)], check=True)
-        subprocess.run([sys.executable, str(script), str(whole)], check=True)
+        output(script, store)
+        output(script, whole)
         assert contents(store) == contents(whole)
 
     def test_resume_can_be_declined(self, copy: Path) -> None:
@@ -687,9 +714,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
         "                     chunks={'intensity': 2})\n"
     )
     store = tmp_path / "a.zarr"
-    ended = subprocess.run(
-        [sys.executable, "-c", code, str(store)], capture_output=True, text=True, check=False
-    )
+    ended = python("-c", code, store)
     assert f"OSError: [Errno 27] File too large: '{store}/" in ended.stderr
     assert not list(store.rglob("*.partial"))
     assert check_grid(store).done == 0

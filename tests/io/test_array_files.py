@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.io.parts import store_parts
 from tests.io.profiles import (
     DISPLAY_P3,
     REC_709,
@@ -233,15 +234,7 @@ class TestRead:
     def test_layers_in_parts(self, tmp_path: Path) -> None:
         path = tmp_path / "a.exr"
         parts = [RNG.random((2, 3, 3)).astype(np.float16) for _ in range(2)]
-        specs = [oiio.ImageSpec(3, 2, 3, "half") for _ in parts]
-        for spec, name in zip(specs, ("one", "two"), strict=True):
-            spec.attribute("oiio:subimagename", name)
-        writer = oiio.ImageOutput.create(str(path))
-        assert writer.open(str(path), specs)
-        for index, part in enumerate(parts):
-            assert not index or writer.open(str(path), specs[index], "AppendSubimage")
-            assert writer.write_image(part)
-        assert writer.close()
+        store_parts(path, {"one": parts[0], "two": parts[1]})
         assert np.array_equal(vkbloom.read(path, subimage=1), parts[1])
         assert np.array_equal(vkbloom.read(path, layer="two"), parts[1])
         with pytest.raises(ValueError, match="no layer 'one'; its layers are two"):

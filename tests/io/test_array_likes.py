@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.checks import check_image
+from vkbloom.checks import check_image, check_mask
 
 IMAGE = np.random.default_rng(2).random((5, 7, 3), dtype=np.float32)
 
@@ -48,7 +48,7 @@ def test_data_arrays_in_any_order(renderer: vkbloom.Renderer) -> None:
     for dims in (("y", "x", "channel"), ("channel", "y", "x"), ("x", "channel", "y")):
         assert np.array_equal(renderer.apply(image.transpose(*dims))["final"], expected)
     with pytest.raises(
-        ValueError, match=r"dimensions \('a', 'b', 'c'\) are not y, x, channel; select"
+        ValueError, match=r"\('a', 'b', 'c'\) are not y, x, channel; rename them: image\.rename"
     ):
         renderer.apply(image.rename(y="a", x="b", channel="c"))
     grid: Any = renderer.grid(image, axes={"intensity": [0.5, 1]}, attachments=("final", "bloom"))
@@ -60,8 +60,9 @@ def test_data_arrays_in_any_order(renderer: vkbloom.Renderer) -> None:
         renderer.apply(grid["final"])
 
 
-def test_float64_is_computed_in_float32(renderer: vkbloom.Renderer) -> None:
-    made = renderer.apply(IMAGE.astype(np.float64))["final"]
+@pytest.mark.parametrize("dtype", ["<f8", ">f8"])
+def test_float64_is_computed_in_float32(renderer: vkbloom.Renderer, dtype: str) -> None:
+    made = renderer.apply(IMAGE.astype(dtype))["final"]
     assert made.dtype == np.float32
     assert np.array_equal(made, renderer.apply(IMAGE)["final"])
 
@@ -73,8 +74,9 @@ def test_float64_is_computed_in_float32(renderer: vkbloom.Renderer) -> None:
         (IMAGE[..., 0], ValueError, "np.repeat(image[..., None], 3, axis=2)"),
         (IMAGE[..., :1], ValueError, "np.repeat(image, 3, axis=2)"),
         (IMAGE.transpose(2, 0, 1), ValueError, "np.moveaxis(image, 0, -1)"),
+        (IMAGE.astype(np.longdouble), TypeError, "image.astype(np.float32)"),
     ],
-    ids=["uint16", "grey", "one channel", "channels first"],
+    ids=["uint16", "grey", "one channel", "channels first", "longdouble"],
 )
 def test_errors_say_the_cure(image: NDArray[Any], error: type[Exception], cure: str) -> None:
     with pytest.raises(error) as caught:
@@ -110,3 +112,21 @@ def test_unknown_presets_suggest_the_nearest() -> None:
     assert all(name in text for name in vkbloom.presets)
     assert vkbloom.presets.get("unity") is None
     assert "unity" not in vkbloom.presets
+
+
+@pytest.mark.parametrize(
+    ("mode", "cure"),
+    [("CMYK", "RGB"), ("YCbCr", "RGB"), ("P", "RGB"), ("L", "RGB"), ("LA", "RGBA")],
+)
+def test_pictures_of_other_colours_are_refused(mode: str, cure: str) -> None:
+    """Their arrays may have the shape of RGB or RGBA."""
+    pil = pytest.importorskip("PIL.Image")
+    with pytest.raises(ValueError, match=rf"mode {mode} is not.*image\.convert\(\"{cure}\"\)"):
+        check_image(pil.new(mode, (7, 5)))
+
+
+def test_palettes_are_no_masks() -> None:
+    pil = pytest.importorskip("PIL.Image")
+    with pytest.raises(ValueError, match=r'palette; convert it: mask\.convert\("L"\)'):
+        check_mask(pil.new("P", (7, 5)), (5, 7))
+    assert check_mask(pil.new("L", (7, 5), 255), (5, 7)).min() == 1

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.io.parts import store_parts
 from vkbloom.io import safe_writing
 from vkbloom.io.image_reading import decode, load
 from vkbloom.io.image_writing import check_writable, save
@@ -192,15 +193,7 @@ class TestLoad:
     def test_parts(self, tmp_path: Path) -> None:
         path = tmp_path / "a.exr"
         parts = [noise(2, 3, 3, numbers="half", seed=seed) for seed in range(3)]
-        specs = [oiio.ImageSpec(3, 2, 3, "half") for _ in parts]
-        for index, spec in enumerate(specs):
-            spec.attribute("oiio:subimagename", f"part {index}")
-        writer = oiio.ImageOutput.create(str(path))
-        assert writer.open(str(path), specs)
-        for index, part in enumerate(parts):
-            assert not index or writer.open(str(path), specs[index], "AppendSubimage")
-            assert writer.write_image(part)
-        assert writer.close()
+        store_parts(path, {f"part {index}": part for index, part in enumerate(parts)})
         assert np.array_equal(load(path).pixels, parts[0])
         assert np.array_equal(load(path, 2).pixels, parts[2])
         assert load(path).parts == load(path, 2).parts == ("part 0", "part 1", "part 2")

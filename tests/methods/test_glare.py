@@ -128,8 +128,10 @@ CASES: dict[str, Case] = {
         FilamentBloom(glare=(SHORT,), resolution=32, format="rgba32float"), given=("mask",)
     ),
     "godot": Case(GodotBloom(glare=(SHORT,), composite="soft_light", format="rgba32float")),
+    # The mask has the size of the image, and not of the buffers.
     "godot-mix": Case(
-        GodotBloom(glare=(SHORT,), composite="mix", format="rgba32float"), given=("mask",)
+        GodotBloom(glare=(SHORT,), composite="mix", format="rgba32float", bloom_scale=0.6),
+        given=("mask",),
     ),
     "no-intensity": Case(Pyramid(glare=(SHORT,), intensity=0)),
 }

@@ -229,6 +229,17 @@ def test_the_largest_halves_stay_finite(varied: Renderer, threshold: float | Non
         np.testing.assert_array_equal(alone, image)
 
 
+def test_lines_of_a_large_image(monkeypatch: pytest.MonkeyPatch, unfused: Renderer) -> None:
+    # On a CPU, lines are unrolled only for more than 2^18 pixels.
+    monkeypatch.setenv("VKBLOOM_FORM", "cpu")
+    image = hdr_picture(257, 1028, 4, "uint8")
+    with Renderer(validation=True) as renderer:
+        frames = renderer.apply(image, Separable(), attachments=("blur_vertical", "bloom"))
+    expected = unfused.apply(image, Separable(), attachments=("blur_vertical", "bloom"))
+    for framebuffer in expected:
+        np.testing.assert_array_equal(frames[framebuffer], expected[framebuffer], framebuffer)
+
+
 def test_large_images_in_the_variant_of_gpus(monkeypatch: pytest.MonkeyPatch) -> None:
     # GPUs use strips only for large images.
     monkeypatch.setenv("VKBLOOM_FORM", "gpu")

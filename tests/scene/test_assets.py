@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -234,29 +235,29 @@ def test_the_meshes_are_fine_but_small() -> None:
     assert PACKED.stat().st_size < 1_600_000
 
 
-@pytest.mark.parametrize("name", MESHES)
-def test_bounds_of_positions_are_exact(name: str) -> None:
+def attributes_of(name: str, attribute: str) -> Iterator[tuple[Any, npt.NDArray[Any]]]:
+    """The accessors and the values of an attribute of all primitives of a mesh's file."""
     document = read_json(FILES / f"{name}.gltf")
     blob = (FILES / f"{name}.bin").read_bytes()
     for mesh in document["meshes"]:
         for primitive in mesh["primitives"]:
-            index = primitive["attributes"]["POSITION"]
-            positions = read_accessor(document, blob, index)
-            accessor = document["accessors"][index]
-            np.testing.assert_array_equal(positions.min(0), np.float32(accessor["min"]))
-            np.testing.assert_array_equal(positions.max(0), np.float32(accessor["max"]))
+            index = primitive["attributes"][attribute]
+            yield document["accessors"][index], read_accessor(document, blob, index)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_bounds_of_positions_are_exact(name: str) -> None:
+    for accessor, positions in attributes_of(name, "POSITION"):
+        np.testing.assert_array_equal(positions.min(0), np.float32(accessor["min"]))
+        np.testing.assert_array_equal(positions.max(0), np.float32(accessor["max"]))
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_stored_normals_are_of_unit_length(name: str) -> None:
-    document = read_json(FILES / f"{name}.gltf")
-    blob = (FILES / f"{name}.bin").read_bytes()
-    for mesh in document["meshes"]:
-        for primitive in mesh["primitives"]:
-            normals = read_accessor(document, blob, primitive["attributes"]["NORMAL"])
-            lengths = np.linalg.norm(normals.astype(np.float64), axis=1)
-            # Components are kept to 6 decimals.
-            np.testing.assert_allclose(lengths, 1, rtol=0, atol=2e-6)
+    for _, normals in attributes_of(name, "NORMAL"):
+        lengths = np.linalg.norm(normals.astype(np.float64), axis=1)
+        # Components are kept to 6 decimals.
+        np.testing.assert_allclose(lengths, 1, rtol=0, atol=2e-6)
 
 
 def test_indices_are_in_range_and_use_every_vertex(parts: list[Part]) -> None:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import given
 
+from tests.scene.changed_bytes import CHANGES, many
 from tests.scene.gltf_documents import (
     BYTE,
     DTYPES,
@@ -560,12 +560,8 @@ def test_a_glb_with_a_wrong_header(tmp_path: Path, place: int, message: str) -> 
         load_mesh(path)
 
 
-@settings(
-    max_examples=1000,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
-@given(changes=st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1, max_size=4))
+@many
+@given(changes=CHANGES)
 def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[int, int]]) -> None:
     content = bytearray(nested().as_glb())
     for place, value in changes:

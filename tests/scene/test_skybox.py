@@ -14,10 +14,10 @@ from typing import Any, Literal
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import given
 from numpy.typing import NDArray
 
+from tests.scene.changed_bytes import CHANGES, many
 from vkbloom.scene import ktx, skybox
 from vkbloom.scene.skybox import Cubemap
 
@@ -314,12 +314,8 @@ def test_a_ktx_cut_anywhere_is_refused(tmp_path: Path) -> None:
             skybox.load(path)
 
 
-@settings(
-    max_examples=1000,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
-@given(changes=st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1, max_size=4))
+@many
+@given(changes=CHANGES)
 def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[int, int]]) -> None:
     content = bytearray(ktx_bytes([faces_of(2, 3, "f2"), faces_of(1, 3, "f2")], "RGB16F"))
     for place, value in changes:

@@ -70,6 +70,8 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
             raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
         if name not in types:
             raise click.UsageError(f"--axis: {lacking} {name!r}")
+        if name in found:
+            raise click.UsageError(f"--axis: {name} is given twice; list all values in one")
         room = _MOST_VALUES - sum(map(len, found.values()))
         found[name] = _values(word, text, types[name], room)
     return found
@@ -107,7 +109,12 @@ def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any
         raise click.UsageError(f"--axis {word}: there are no values; give at least one")
     # The option's own type converts each value, so that axes and options have one syntax.
     plain = {bool: click.BOOL, str: click.STRING}
-    kind = plain[annotation] if annotation in plain else fields.option_type(annotation)
+    try:
+        kind = plain[annotation] if annotation in plain else fields.option_type(annotation)
+    except TypeError:
+        raise click.UsageError(
+            f"--axis {word}: values of this field cannot be written here; use Renderer.grid"
+        ) from None
     try:
         return [kind.convert(part.strip(), None, None) for part in values]
     except click.BadParameter as error:

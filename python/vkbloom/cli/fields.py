@@ -5,17 +5,21 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
+import os
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol
 
 import click
+from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom import psf
+from vkbloom.cli.image_files import silenced
 from vkbloom.cli.program import given
-from vkbloom.glare.base import Glare
+from vkbloom.glare.base import STAGES, Glare
 from vkbloom.methods.convolution import PSFLike
 from vkbloom.named_glares import glares
 from vkbloom.psf.base import PSF
@@ -29,11 +33,15 @@ else:
 
 
 class _Word(_ParamType):
-    """The type of an option whose value is one word, such as 256x256."""
+    """The type of an option whose value is one word, such as 256x256.
 
-    def __init__(self, form: str, read: Callable[[str], Any]) -> None:
+    An error says that the word does not have the form, or with `explains` the reader's reason.
+    """
+
+    def __init__(self, form: str, read: Callable[[str], Any], *, explains: bool = False) -> None:
         self.name = form
         self._read = read
+        self._explains = explains
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """Return the placeholder of the value in the help."""
@@ -45,8 +53,9 @@ class _Word(_ParamType):
         """Parse the word."""
         try:
             return self._read(value)
-        except (ValueError, click.BadParameter):
-            self.fail(f"{value!r} is not {self.name}", param, ctx)
+        except (TypeError, ValueError, click.BadParameter) as error:
+            reason = f": {error}" if self._explains else f" is not {self.name}"
+            self.fail(f"{value!r}{reason}", param, ctx)
 
 
 def _read_size(word: str) -> tuple[int, int]:
@@ -62,13 +71,42 @@ def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
     return tuple(_read_numbers(pair, ":") for pair in word.split(","))
 
 
+_PSFS: Final = [
+    name
+    for name, kind in vars(psf).items()
+    if isinstance(kind, type) and issubclass(kind, PSF) and kind is not PSF
+]
+
+
 def _read_psf(word: str) -> PSF:
     """Parse a function with its parameters, such as spencer:state=scotopic, or an image file."""
     name, _, rest = word.partition(":")
-    if name not in psf.__all__:
-        return psf.samples(vkbloom.read(word)[..., :3])
-    parameters = dict(part.split("=", 1) for part in rest.split(",") if part)
-    return PSF.from_dict({"psf": name} | {key: _plain(text) for key, text in parameters.items()})
+    if name in _PSFS:
+        return PSF.from_dict({"psf": name} | _read_fields(rest))
+    if not os.path.exists(word):
+        raise ValueError(f"is neither a file nor one of {', '.join(_PSFS)}")
+    return psf.samples(read_colours(word))
+
+
+def read_colours(path: str) -> NDArray[Any]:
+    """Read the colours of an image file, (H, W, 3), or raise OSError or click.ClickException."""
+    try:
+        with silenced():
+            return vkbloom.read(path)[..., :3]
+    except ValueError as error:
+        # The file is at fault, and not the use of the option.
+        raise click.ClickException(str(error)) from error
+
+
+def _read_fields(text: str) -> dict[str, object]:
+    """Parse A=1,B=[2,3]: values by name. Lists are written as in JSON."""
+    fields: dict[str, object] = {}
+    for part in re.split(r",(?=[^=\[\]]*(?:=|$))", text) if text else ():
+        name, sign, value = part.partition("=")
+        if not sign:
+            raise ValueError(f"{part!r} is not NAME=VALUE")
+        fields[name.strip()] = _plain(value)
+    return fields
 
 
 def _plain(text: str) -> object:
@@ -88,18 +126,22 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
         return ()
     found: list[Glare] = []
     for one in word.split("+"):
-        name, _, rest = one.partition(":")
+        name, sign, rest = one.partition(":")
         if name in glares:
+            if sign:
+                raise ValueError(f"{name} is a published glare, which takes no fields")
             found += glares[name]
             continue
-        fields = dict(part.split("=", 1) for part in rest.split(",") if part)
-        found.append(Glare.from_dict({"stage": name} | {k: _plain(v) for k, v in fields.items()}))
+        if name not in STAGES:
+            known = ", ".join([*STAGES, *glares])
+            raise ValueError(f"{name!r} is not one of {known}")
+        found.append(Glare.from_dict({"stage": name} | _read_fields(rest)))
     return tuple(found)
 
 
 _OPTION_TYPES: Final[Mapping[object, _ParamType]] = {
-    PSFLike: _Word("NAME[:A=1,...]|FILE", _read_psf),
-    tuple[Glare, ...]: _Word("NAME[:A=1,...]+...", _read_glare),
+    PSFLike: _Word("NAME[:A=1,...]|FILE", _read_psf, explains=True),
+    tuple[Glare, ...]: _Word("NAME[:A=1,...]+...", _read_glare, explains=True),
     float: click.FLOAT,
     int: click.INT,
     tuple[int, int]: SIZE,

@@ -80,8 +80,9 @@ def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
         if halo:
             added.append(vkbloom.Halo())
         if dirt is not None:
+            picture = fields.read_colours(dirt)
             with as_wrong_use():
-                added.append(vkbloom.Dirt(image=vkbloom.read(dirt)[..., :3]))
+                added.append(vkbloom.Dirt(image=picture))
         return command(added=tuple(added), **rest)
 
     return run

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final
 
 from vkbloom import _core
 from vkbloom.checks import check_like
-from vkbloom.fields import import_class, make_from_fields, number_field
+from vkbloom.fields import Record, import_class, number_field
 
 #: The class of each stage, imported on first use. The order is that of `stages`.
 STAGES: Final = {
@@ -25,7 +25,7 @@ def stage_field(name: str, default: float | None = None, unit: str = "1") -> Any
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Glare:
+class Glare(Record):
     """Base class of the stages of glare; use a stage's class, such as `Streaks`.
 
     Stages are frozen and hashable. Their light is added to the bloom: the composite adds
@@ -55,6 +55,8 @@ class Glare:
     ['glow', 'streaks_0', 'streaks_1']
     """
 
+    _class_key: ClassVar[str] = "stage"
+    _subject: ClassVar[str] = "glare"
     stage: ClassVar[str]
 
     def __post_init__(self) -> None:
@@ -66,58 +68,9 @@ class Glare:
                 value = check_like(field.default, field.name, getattr(self, field.name), low, high)
                 object.__setattr__(self, field.name, value)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name, and ``stage``.
-
-        Returns
-        -------
-        dict
-            Values that JSON can represent.
-
-        See Also
-        --------
-        from_dict : Makes a stage from the result.
-
-        Examples
-        --------
-        >>> vkbloom.Streaks(directions=4).to_dict()["stage"]
-        'streaks'
-        """
-        return {"stage": self.stage, **dataclasses.asdict(self)}
-
     @classmethod
-    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """Make a stage from the result of `to_dict`.
-
-        Parameters
-        ----------
-        fields : mapping of str to object
-            Values by field. Missing fields have their defaults. ``stage`` names the class; it may
-            be missing in calls on a stage's class, such as ``Streaks.from_dict``.
-
-        Returns
-        -------
-        Glare
-
-        Raises
-        ------
-        ValueError
-            There is no such stage or field, the stage is not that of the class, or a value is out
-            of range.
-        TypeError
-            A value has the wrong type.
-
-        See Also
-        --------
-        to_dict : The fields by name.
-
-        Examples
-        --------
-        >>> vkbloom.Streaks.from_dict({"stage": "streaks", "directions": 4}).directions
-        4
-        """
-        made: Self = make_from_fields(cls, stages(), "stage", fields, "glare")
-        return made
+    def _classes(cls) -> Mapping[str, type[Glare]]:
+        return stages()
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -77,10 +77,6 @@ class Dirt(Glare):
 
             object.__setattr__(self, "image", check_values("image", self.image))
 
-    def to_dict(self) -> dict[str, Any]:  # noqa: D102  as of Glare
-        image = None if self.image is None else self.image.to_plain()
-        return {**super().to_dict(), "image": image}
-
     @property
     def lerp(self) -> int:
         """Whether the mode is "lerp", for the core."""

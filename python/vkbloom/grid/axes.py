@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_time
+from vkbloom.fields import plain_value
 from vkbloom.glare.base import stage_field_of
 from vkbloom.named_settings import presets
 from vkbloom.settings import Settings, check_settings
@@ -69,8 +70,8 @@ class Axis:
     def coordinate(self) -> NDArray[Any]:
         """The values as an array of numbers, bools or text.
 
-        None is NaN among numbers and "none" among text; tuples (sizes, weights, layers) are JSON
-        text, such as "[256, 256]", and so are settings.
+        None is NaN among numbers and "none" among text. All others (sizes, weights, stages,
+        point-spread functions, settings) are JSON text, such as "[256, 256]".
         """
         present = [value for value in self.values if value is not None]
         if present and all(isinstance(value, bool) for value in self.values):
@@ -102,9 +103,7 @@ class Axis:
 def _text(value: Any) -> str:
     if value is None:
         return "none"
-    if isinstance(value, Settings):
-        return value.to_json()
-    return value if isinstance(value, str) else json.dumps(value)
+    return value if isinstance(value, str) else json.dumps(plain_value(value))
 
 
 def _whole_axis(name: str, values: object) -> Axis:

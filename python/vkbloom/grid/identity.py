@@ -9,11 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from vkbloom.fields import plain_value
 from vkbloom.grid.order import Index
 from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.reductions import Reduction
 from vkbloom.grid.sources import digest
-from vkbloom.settings import Settings
 
 __all__ = ["FORMAT", "chunk_in", "differences", "identity", "short"]
 
@@ -43,7 +43,7 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
         "driver": layout.driver,
         "source": grid.source.description,
         "settings": grid.remaining_settings,
-        "axes": {axis.name: [_plain(value) for value in axis.values] for axis in grid.axes},
+        "axes": {axis.name: [plain_value(value) for value in axis.values] for axis in grid.axes},
         "order of axes": [axis.name for axis in grid.axes],
         "variables": {
             name: {"shape": variable.shape, "dtype": variable.dtype.name}
@@ -74,10 +74,6 @@ def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
         if type(count) is not int or not 1 <= count <= max(size, 1):
             return None
     return tuple(held)
-
-
-def _plain(value: Any) -> Any:
-    return value.to_dict() if isinstance(value, Settings) else value
 
 
 def _reduction(reduction: Any) -> str:

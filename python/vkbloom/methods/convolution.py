@@ -110,18 +110,6 @@ class Convolution(Settings):
         if self.kernel_size is not None:
             object.__setattr__(self, "kernel_size", check_size("kernel_size", self.kernel_size))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name, ``method``, and the psf by its name and parameters.
-
-        Returns
-        -------
-        dict
-            Values that JSON can represent.
-        """
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        values["glare"] = [stage.to_dict() for stage in self.glare]
-        return {"method": self.method, **values, "psf": cast("PSF", self.psf).to_dict()}
-
     @property
     def prefilter(self) -> tuple[float, float, float]:
         """min, max and mult of the prefilter of `vkbloom.psf.unreal`.

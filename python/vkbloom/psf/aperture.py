@@ -64,8 +64,7 @@ class iris:
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> mask = np.asarray(psf.iris(blades=6, size=64))
+    >>> mask = np.asarray(vkbloom.psf.iris(blades=6, size=64))
     >>> mask.shape, round(float(mask.sum()) / 32**2, 2)  # 3 sqrt(3) / 2
     ((64, 64), 2.6)
     """
@@ -107,8 +106,7 @@ class iris:
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.iris(blades=7).to_dict()["blades"]
+        >>> vkbloom.psf.iris(blades=7).to_dict()["blades"]
         7
         """
         return dataclasses.asdict(self)
@@ -181,8 +179,7 @@ class aperture(SampledPSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> star = psf.aperture(psf.iris(blades=6, size=64), f_number=22)
+    >>> star = vkbloom.psf.aperture(vkbloom.psf.iris(blades=6, size=64), f_number=22)
     >>> star.energy().round(6)
     array([1., 1., 1.])
     """

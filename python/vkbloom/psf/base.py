@@ -6,15 +6,14 @@ import abc
 import dataclasses
 import math
 import os
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, cast
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom.checks import as_float, check_size
-from vkbloom.fields import make_from_fields
-from vkbloom.psf.values import ArrayValue
+from vkbloom.fields import Record
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +26,7 @@ Array = NDArray[np.float64]
 FRAME_DEGREES = 50.0
 
 
-class PSF(abc.ABC):
+class PSF(Record, abc.ABC):
     """Base class of the point-spread functions of `vkbloom.psf`.
 
     A point-spread function describes how the light of one point is distributed over a picture. If
@@ -45,14 +44,15 @@ class PSF(abc.ABC):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> spread = psf.gaussian(sigma=2)
+    >>> spread = vkbloom.psf.gaussian(sigma=2)
     >>> spread.array((9, 9)).shape
     (9, 9, 3)
-    >>> psf.PSF.from_json(spread.to_json()) == spread
+    >>> vkbloom.psf.PSF.from_json(spread.to_json()) == spread
     True
     """
 
+    _class_key: ClassVar[str] = "psf"
+    _subject: ClassVar[str] = "psf"
     unit: ClassVar[Literal["degree", "pixel"]]
 
     @abc.abstractmethod
@@ -79,8 +79,7 @@ class PSF(abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
+        >>> vkbloom.psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
         array([[0.058, 0.093, 0.058],
                [0.093, 0.147, 0.093],
                [0.058, 0.093, 0.058]])
@@ -102,8 +101,7 @@ class PSF(abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).energy()
+        >>> vkbloom.psf.gaussian(sigma=1).energy()
         array([1., 1., 1.])
         """
 
@@ -127,8 +125,7 @@ class PSF(abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).encircled_energy([1, 3])[:, 0].round(3)
+        >>> vkbloom.psf.gaussian(sigma=1).encircled_energy([1, 3])[:, 0].round(3)
         array([0.393, 0.989])
         """
 
@@ -152,8 +149,7 @@ class PSF(abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).mtf([0, 0.1])[:, 0].round(3)
+        >>> vkbloom.psf.gaussian(sigma=1).mtf([0, 0.1])[:, 0].round(3)
         array([1.   , 0.821])
         """
 
@@ -185,8 +181,7 @@ class PSF(abc.ABC):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=1).kernel((8, 6)).shape
+        >>> vkbloom.psf.gaussian(sigma=1).kernel((8, 6)).shape
         (11, 15, 3)
         """
         width, height = frame
@@ -225,9 +220,8 @@ class PSF(abc.ABC):
         Examples
         --------
         >>> import tempfile
-        >>> from vkbloom import psf
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     path = psf.gaussian(sigma=1).save(f"{folder}/kernel.exr", size=(9, 9))
+        ...     path = vkbloom.psf.gaussian(sigma=1).save(f"{folder}/kernel.exr", size=(9, 9))
         ...     vkbloom.read(path).shape
         (9, 9, 3)
         """
@@ -235,109 +229,13 @@ class PSF(abc.ABC):
 
         return array_files.write(path, self.array(size, pixels_per_degree).astype(np.float32))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the parameters by name, and the function's name as ``psf``.
-
-        Returns
-        -------
-        dict
-            Values that JSON can represent.
-
-        See Also
-        --------
-        from_dict : Makes the function from the result.
-
-        Examples
-        --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=2).to_dict()
-        {'psf': 'gaussian', 'sigma': 2.0}
-        """
-        fields = dataclasses.fields(cast("Any", self))
-        values = {field.name: _plain(getattr(self, field.name)) for field in fields}
-        return {"psf": type(self).__name__, **values}
+    @classmethod
+    def _class_name(cls) -> str | None:
+        return cls.__name__ if dataclasses.is_dataclass(cls) else None
 
     @classmethod
-    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """Make a function from the result of `to_dict`.
-
-        Parameters
-        ----------
-        fields : mapping of str to object
-            Values by parameter. Missing parameters have their defaults.
-
-        Returns
-        -------
-        PSF
-
-        Raises
-        ------
-        ValueError
-            There is no such function or parameter, or a value is out of range.
-        TypeError
-            `fields` is not a mapping, or a value has the wrong type.
-
-        See Also
-        --------
-        to_dict : The parameters by name.
-
-        Examples
-        --------
-        >>> from vkbloom import psf
-        >>> psf.PSF.from_dict({"psf": "gaussian", "sigma": 2})
-        gaussian(sigma=2.0)
-        """
-        kinds = {kind.__name__: kind for kind in _leaves(PSF)}
-        made: Self = make_from_fields(cls, dict(sorted(kinds.items())), "psf", fields, "psf")
-        return made
-
-    def to_json(self) -> str:
-        """Return `to_dict` as JSON text.
-
-        See Also
-        --------
-        from_json : Makes the function from the result.
-
-        Examples
-        --------
-        >>> from vkbloom import psf
-        >>> psf.gaussian(sigma=2).to_json()
-        '{"psf": "gaussian", "sigma": 2.0}'
-        """
-        import json  # noqa: PLC0415  costs start-up time
-
-        return json.dumps(self.to_dict())
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Make a function from the result of `to_json`.
-
-        Parameters
-        ----------
-        text : str
-
-        Returns
-        -------
-        PSF
-
-        Raises
-        ------
-        ValueError, TypeError
-            The text is not a JSON object, or an error of `from_dict`.
-
-        See Also
-        --------
-        to_json : Returns the text.
-
-        Examples
-        --------
-        >>> from vkbloom import psf
-        >>> psf.PSF.from_json('{"psf": "gaussian", "sigma": 2}')
-        gaussian(sigma=2.0)
-        """
-        import json  # noqa: PLC0415  costs start-up time
-
-        return cls.from_dict(json.loads(text))
+    def _classes(cls) -> Mapping[str, type[PSF]]:
+        return dict(sorted((kind.__name__, kind) for kind in _leaves(PSF)))
 
     def _repr_png_(self) -> bytes:
         """Return a picture of 256 x 256, logarithmic, with six decades below the peak."""
@@ -385,14 +283,3 @@ def _leaves(kind: type[Any]) -> list[type[Any]]:
     for below in kind.__subclasses__():
         found += [below] if dataclasses.is_dataclass(below) else _leaves(below)
     return found
-
-
-def _plain(value: Any) -> Any:
-    """Return a parameter as values that JSON can represent."""
-    if isinstance(value, ArrayValue):
-        return value.to_plain()
-    if hasattr(value, "to_dict"):
-        return value.to_dict()
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(item) for item in value]
-    return value

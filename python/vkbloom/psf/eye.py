@@ -56,8 +56,7 @@ class spencer(RadialPSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> psf.spencer().energy().round(2)
+    >>> vkbloom.psf.spencer().energy().round(2)
     array([1., 1., 1.])
     """
 
@@ -126,8 +125,7 @@ class cie_general(_AgeingEye):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> psf.cie_general(age=35).density([1.0, 10.0])[:, 0].round(3)
+    >>> vkbloom.psf.cie_general(age=35).density([1.0, 10.0])[:, 0].round(3)
     array([15.548,  0.072])
     """
 
@@ -170,8 +168,7 @@ class cie_total(_AgeingEye):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> bool(abs(psf.cie_total(age=70).energy()[0] - 1) < 0.032)
+    >>> bool(abs(vkbloom.psf.cie_total(age=70).energy()[0] - 1) < 0.032)
     True
     """
 

@@ -36,8 +36,7 @@ class gaussian(PSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> psf.gaussian(1).array((5, 5))[2, :, 0].round(4)
+    >>> vkbloom.psf.gaussian(1).array((5, 5))[2, :, 0].round(4)
     array([0.0232, 0.0926, 0.1466, 0.0926, 0.0232])
     """
 
@@ -101,8 +100,7 @@ class airy(PSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> rings = psf.airy(f_number=8, wavelength=550, pixel_pitch=4)
+    >>> rings = vkbloom.psf.airy(f_number=8, wavelength=550, pixel_pitch=4)
     >>> rings.encircled_energy([1.22 * 0.55 * 8 / 4])[0, 0].round(3)  # the first dark ring
     np.float64(0.838)
     """
@@ -177,8 +175,7 @@ class harvey_shack(RadialPSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> psf.harvey_shack().energy().round(3)
+    >>> vkbloom.psf.harvey_shack().energy().round(3)
     array([0.025, 0.025, 0.025])
     """
 

@@ -42,8 +42,7 @@ class measured(SampledPSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> spread = psf.measured(vkbloom.Pyramid(levels=3), size=(64, 64))
+    >>> spread = vkbloom.psf.measured(vkbloom.Pyramid(levels=3), size=(64, 64))
     >>> spread.energy().round(3)
     array([1., 1., 1.])
     """

@@ -123,8 +123,7 @@ class RadialPSF(PSF):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.cie_general(age=35).density(10.0).round(3)
+        >>> vkbloom.psf.cie_general(age=35).density(10.0).round(3)
         array([0.072, 0.072, 0.072])
         """
 

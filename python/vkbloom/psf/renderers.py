@@ -44,8 +44,7 @@ class fog_glow(SampledPSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> kernel = psf.fog_glow(64)
+    >>> kernel = vkbloom.psf.fog_glow(64)
     >>> kernel.array((64, 64))[32, 32]
     array([1., 1., 1.])
     """
@@ -102,10 +101,9 @@ class unreal(SampledPSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
     >>> image = np.zeros((9, 9), np.float32)
     >>> image[4, 4], image[4, :] = 1, 0.125
-    >>> psf.unreal(image).energy()
+    >>> vkbloom.psf.unreal(image).energy()
     array([1., 1., 1.])
     """
 

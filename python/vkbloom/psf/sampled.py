@@ -35,8 +35,7 @@ class SampledPSF(PSF):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).own_array().shape
+        >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).own_array().shape
         (3, 3, 3)
         """
 
@@ -66,8 +65,7 @@ class SampledPSF(PSF):
 
         Examples
         --------
-        >>> from vkbloom import psf
-        >>> psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).encircled_energy([0, 1])[:, 0]
+        >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).encircled_energy([0, 1])[:, 0]
         array([4., 8.])
         """
         values = self.own_array()
@@ -102,8 +100,7 @@ class samples(SampledPSF):
 
     Examples
     --------
-    >>> from vkbloom import psf
-    >>> psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).energy()
+    >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).energy()
     array([8., 8., 8.])
     """
 

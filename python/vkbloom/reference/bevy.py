@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .levels import WIDEST_LEVEL, halved
 from .pyramid import downsample, groups
 from .sampling import Array
@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["gain", "passes"]
 
 
-def passes(
-    glow: Array,
-    settings: BevyBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     down_0 is `max_mip_dimension` high, and its width follows from the aspect of the frame, up to
@@ -42,21 +36,21 @@ def passes(
     f_k+1, and the level itself 1 - f_k+1 ("mix") or 1 ("add"). The scale multiplies the distances
     of all taps.
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     limit = settings.max_mip_dimension
     scale = (settings.scale_x, settings.scale_y)
     up = partial(tent, x_step=settings.scale_x, y_step=settings.scale_y)
     level = (min(max(1, math.floor(width * limit / height + 0.5)), WIDEST_LEVEL), limit)
-    downs = [store(masked(_prefilter(glow, level, settings), mask))]
+    downs = [source.store(masked(_prefilter(source.image, level, settings), source.mask))]
     for _ in range(1, _level_count(settings)):
         level = halved(level)
-        downs.append(store(downsample(downs[-1], level, scale=scale)))
+        downs.append(source.store(downsample(downs[-1], level, scale=scale)))
     own, coarse = _shares(settings)
-    return combine(downs, size, store, own=own, coarse=coarse, upsample=up, last=up)
+    return combine(downs, source, own=own, coarse=coarse, upsample=up, last=up)
 
 
 def gain(settings: BevyBloom) -> float:
-    """Return what a flat image of 1 becomes.
+    """Return the bloom of a flat image of 1.
 
     The groups' weights darken it to 0.5 / (1 + 0.5 / 4) + 4 * 0.125 / (1 + 0.125 / 4) = 0.929.
     """

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .levels import halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
@@ -33,13 +33,7 @@ _GROUPS = (
 )
 
 
-def passes(
-    glow: Array,
-    settings: BlenderGlare,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     """Return the framebuffers.
 
     There are n = max(1, floor(log2(size * shorter side))) levels. down_0 has the size of the
@@ -48,19 +42,19 @@ def passes(
     1 / (1 + brightest channel). up_k = down_k + tent(up_k+1) with a tent of one pixel of the
     larger level; the bloom is up_0 / n.
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     count = max(1, math.floor(math.log2(max(1.0, min(width, height) * settings.size))))
-    downs = [store(masked(_highlights(glow, settings), mask))]
+    downs = [source.store(masked(_highlights(source.image, settings), source.mask))]
     level = (width, height)
     for k in range(1, count):
         level = halved(level)
         shrink = _weighted_taps if k == 1 else downsample
-        downs.append(store(shrink(downs[-1], level)))
-    return combine(downs, size, store, upsample=tent_of_target, last=linear, gain=1 / count)
+        downs.append(source.store(shrink(downs[-1], level)))
+    return combine(downs, source, upsample=tent_of_target, last=linear, gain=1 / count)
 
 
 def gain(settings: BlenderGlare) -> float:
-    """Return what a flat image of 1 becomes: the threshold may change it, the levels do not."""
+    """Return the bloom of a flat image of 1: the threshold may change it, the levels do not."""
     return float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
 
 

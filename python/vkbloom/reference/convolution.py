@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .sampling import Array, sample
 from .threshold import luminance
 
@@ -23,32 +23,23 @@ class ConvolutionSettings(Protocol):
     def kernel(self, frame: tuple[int, int], buffers: tuple[int, int] | None = None) -> Array: ...
 
 
-def passes(
-    glow: Array, settings: ConvolutionSettings, size: tuple[int, int], store: Storage
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: ConvolutionSettings) -> dict[str, Array]:
     """Return "kernel" and "bloom".
 
-    Parameters
-    ----------
-    glow : ndarray of float64, shape (H, W, C)
-        A fourth channel, and each where there are not three or four, is convolved with the mean
-        of the kernel's.
-    settings : Convolution
-    size : (int, int)
-        Width and height of the final image.
-    store : Storage
+    Three channels are convolved with the channels of the kernel. A fourth channel is convolved with
+    the mean of these, and so is every channel of an image with another number of channels.
     """
-    height, width, channels = glow.shape
-    kernel = settings.kernel(size, (width, height))
+    height, width, channels = source.image.shape
+    kernel = settings.kernel(source.size, (width, height))
     mean = kernel.mean(axis=2, keepdims=True)
     colours = kernel if channels in (3, 4) else mean
     used = np.concatenate([colours, *[mean] * (channels - colours.shape[2])], axis=2)
-    spread = convolve(prefiltered(glow, settings.prefilter), used, settings.boundary)
-    return {"kernel": kernel, "bloom": store(sample(spread, size))}
+    spread = convolve(prefiltered(source.image, settings.prefilter), used, settings.boundary)
+    return {"kernel": kernel, "bloom": source.store(sample(spread, source.size))}
 
 
 def gain(settings: ConvolutionSettings, size: tuple[int, int]) -> Array:
-    """Return what a flat image of 1 becomes far from a boundary of zeros: the kernel's sums."""
+    """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums."""
     one = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
     sums: Array = one * settings.kernel(size).sum(axis=(0, 1))
     return sums

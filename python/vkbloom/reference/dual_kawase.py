@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .image import Storage
+from .image import BlurInput
 from .levels import level_sizes
 from .sampling import CENTRE, Array, Taps, sample
 
@@ -17,29 +17,24 @@ if TYPE_CHECKING:
 __all__ = ["gain", "passes"]
 
 
-def passes(
-    glow: Array,
-    settings: DualKawase,
-    size: tuple[int, int],
-    store: Storage,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: DualKawase) -> dict[str, Array]:
     """Return the framebuffers on the way down and up; nothing is added on the way up."""
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     sizes = level_sizes((width, height), settings.levels)
     framebuffers: dict[str, Array] = {}
-    image = glow
+    image = source.image
     for k, level_size in enumerate(sizes):
-        image = store(_down(image, level_size, settings.offset))
+        image = source.store(_down(image, level_size, settings.offset))
         framebuffers[f"down_{k}"] = image
     for k in range(len(sizes) - 2, -1, -1):
-        image = store(_up(image, sizes[k], settings.offset))
+        image = source.store(_up(image, sizes[k], settings.offset))
         framebuffers[f"up_{k}"] = image
-    framebuffers["bloom"] = store(_up(image, size, settings.offset))
+    framebuffers["bloom"] = source.store(_up(image, source.size, settings.offset))
     return framebuffers
 
 
 def gain(settings: DualKawase) -> float:
-    """Return what a flat image of 1 becomes: 1, since the weights of both filters sum to 1."""
+    """Return the bloom of a flat image of 1: 1, since the weights of both filters sum to 1."""
     return 1.0
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .levels import WIDEST_LEVEL, halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["gain", "passes"]
 
 
-def passes(
-    glow: Array,
-    settings: FilamentBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: FilamentBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     down_0 is `resolution` high, and its width follows from the aspect of the frame, up to
@@ -41,30 +35,31 @@ def passes(
     13 if a side of the level above is odd. up_k = down_k + tent(up_k+1) with a tent of one pixel of
     the larger level; the bloom is up_0, bilinear, divided by the number of levels.
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     top = settings.resolution
     across = min(top * width / height, WIDEST_LEVEL)
     level = (
         16 * max(1, math.floor(across / 16)),
         16 * max(1, math.floor(top / 16)),
     )
-    image, above, threshold = glow, (width, height), settings.threshold
+    image, above = source.image, (width, height)
+    threshold, mask = settings.threshold, source.mask
     while level[0] * 2 < above[0] or level[1] * 2 < above[1]:
         above = halved(above)
-        image = store(masked(_reduce(image, above, threshold, settings.highlight), mask))
+        image = source.store(masked(_reduce(image, above, threshold, settings.highlight), mask))
         threshold = mask = None
-    downs = [store(masked(_reduce(image, level, threshold, settings.highlight), mask))]
+    downs = [source.store(masked(_reduce(image, level, threshold, settings.highlight), mask))]
     longer = math.floor(max(across, top))
     count = min(settings.levels, math.floor(math.log2(longer)) + 1)
     for _ in range(1, count):
         is_even = level[0] % 2 == 0 and level[1] % 2 == 0
         level = halved(level)
-        downs.append(store((_nine_taps if is_even else downsample)(downs[-1], level)))
-    return combine(downs, size, store, upsample=tent_of_target, last=linear, gain=1 / count)
+        downs.append(source.store((_nine_taps if is_even else downsample)(downs[-1], level)))
+    return combine(downs, source, upsample=tent_of_target, last=linear, gain=1 / count)
 
 
 def gain(settings: FilamentBloom) -> float:
-    """Return what a flat image of 1 becomes: what passes the threshold."""
+    """Return the bloom of a flat image of 1: what passes the threshold."""
     if settings.threshold is None:
         return 1.0
     kept = max(0.0, 1.0 - settings.threshold)

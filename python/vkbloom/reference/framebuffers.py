@@ -26,7 +26,7 @@ from . import (
     urp,
 )
 from .compositing import CompositeSettings, check_settings, composite
-from .image import as_float, as_mask, finite, format_of, storage
+from .image import BlurInput, as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
 from .threshold import apply_threshold, masked
 
@@ -58,12 +58,8 @@ class _Method(NamedTuple):
     Parameters
     ----------
     passes : callable
-        ``passes(glow, settings, size, store)`` returns the framebuffers after the glow, in the
-        order of the data flow; the last one is "bloom". `glow` is the content of the first bloom
-        buffer, (H, W, C) of float64, with 1, 3 or, with alpha, 4 channels where a method reads a
-        luminance. `size` is the width and height of the bloom. `store` converts values as a store
-        to a bloom buffer does. A published method also takes a mask, (h, w, 1) of float64 or None,
-        which multiplies the result of its threshold.
+        ``passes(source, settings)`` returns the framebuffers after the glow, in the order of the
+        data flow; the last one is "bloom". `source` is a `BlurInput`.
     gain : callable
         ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns the bloom of a flat
         image of 1.
@@ -73,7 +69,7 @@ class _Method(NamedTuple):
         Whether the gain depends on the size of the frame.
     """
 
-    passes: Callable[..., dict[str, Array]]
+    passes: Callable[[BlurInput, Any], dict[str, Array]]
     gain: Callable[..., Any]
     published: bool = False
     sized: bool = False
@@ -116,8 +112,8 @@ def apply(
     colours (such as a clamp against overflow) do not apply to alpha.
 
     Every store to a bloom buffer clamps: to 0..1 in "rgba8unorm", to +-65504 in "rgba16float". Only
-    "rg11b10ufloat" also rounds to the steps of the format. Published methods store only their
-    levels in that format: their "glow" and "bloom" are not rounded.
+    "rg11b10ufloat" also rounds to the steps of the format. Published methods use this format only
+    for their levels, so their "glow" and "bloom" are not rounded.
 
     Parameters
     ----------
@@ -135,10 +131,9 @@ def apply(
     -------
     dict of str to ndarray of float64
         In the order of the data flow: "glow", those of the stages of glare, those of `passes`, then
-        "final". The values are
-        in real units: 0..1 for unorm formats. Bloom buffers have 4 channels. Their alpha is 1,
-        except with ``settings.alpha`` "blur". "final" has the image's channels. With
-        ``settings.bloom`` off there is only "final".
+        "final". The values are in real units: 0..1 for unorm formats. Bloom buffers have 4
+        channels. Their alpha is 1, except with ``settings.alpha`` "blur". "final" has the image's
+        channels. With ``settings.bloom`` off there is only "final".
 
     Raises
     ------
@@ -151,7 +146,8 @@ def apply(
     See Also
     --------
     passes : Only the blur.
-    composite : Only the last step. vkbloom.Renderer.apply : The same on a device.
+    composite : Only the last step.
+    vkbloom.Renderer.apply : The same on a device.
 
     Examples
     --------
@@ -181,13 +177,12 @@ def apply(
     reduced = sample(finite(source[..., :channels]), _bloom_size(settings, (width, height)))
     if method.published:
         glow = store.end(reduced)
-        blurred = method.passes(glow, settings, (width, height), store, weights)
     else:
         glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), weights))
-        blurred = method.passes(glow, settings, (width, height), store)
+    blurred = method.passes(BlurInput(glow, (width, height), store, weights), settings)
     stages = glare.stages(_glowing(glow, settings, weights), settings.glare, format)
     framebuffers = _with_alphas({"glow": glow, **stages, **blurred})
-    # The share of the scene from which the bloom is made.
+    # The share of the scene that is the source of the bloom.
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     bloom = framebuffers["bloom"]
     if settings.glare:
@@ -200,7 +195,7 @@ def apply(
 
 
 def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
-    """Return what the stages of glare read: published methods have not thresholded the glow."""
+    """Return the input of the stages of glare; published methods do not threshold the glow."""
     if not _METHODS[settings.method].published:
         return glow
     return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
@@ -269,11 +264,8 @@ def passes(
     colours = values[..., :3] if has_alpha else values
     colours = store.end(colours) if method.published else store(colours)
     size = size or (width, height)
-    if method.published:
-        weights = None if mask is None else as_mask(mask, size)
-        framebuffers = method.passes(colours, settings, size, store, weights)
-    else:
-        framebuffers = method.passes(colours, settings, size, store)
+    weights = as_mask(mask, size) if mask is not None and method.published else None
+    framebuffers = method.passes(BlurInput(colours, size, store, weights), settings)
     if not has_alpha:
         return framebuffers
     return _with_alphas(framebuffers)
@@ -330,7 +322,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     Returns
     -------
     float, or ndarray of float64, shape (3,)
-        Of `vkbloom.Convolution` one number for each channel, without a boundary's effect.
+        For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
 
     See Also
     --------

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .sampling import Array, sample
 from .threshold import brightest, luminance, masked
 from .upsampling import cubic, linear
@@ -26,13 +26,7 @@ _LUMINANCE = np.array([0.299, 0.587, 0.114])
 _LEAST_WEIGHT = 1e-4
 
 
-def passes(
-    glow: Array,
-    settings: GodotBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: GodotBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     Level i has the size floor(side / 2) >> i, at least 1. It is the image above it (for level 0
@@ -42,27 +36,27 @@ def passes(
     least 0. Strength and exposure follow, then the factor
     max(smoothstep(threshold, threshold + scale, max(c)), bloom) and the cap. The bloom is the
     weighted sum of the levels, enlarged by the cubic B-spline or bilinearly. Weights up to 0.0001
-    count as 0.
+    are replaced by 0.
     """
-    height, width, channels = glow.shape
+    height, width, channels = source.image.shape
     framebuffers: dict[str, Array] = {}
-    image, total = glow, np.zeros((size[1], size[0], channels))
+    image, total = source.image, np.zeros((source.size[1], source.size[0], channels))
     enlarge = cubic if settings.bicubic else linear
     for level, weight in enumerate(_weights(settings)):
         level_size = (max(1, width // 2 >> level), max(1, height // 2 >> level))
         samples = sample(image, level_size)
         if level == 0:
-            image = store(masked(_first(samples, settings), mask))
+            image = source.store(masked(_first(samples, settings), source.mask))
         else:
-            image = store(_later(samples, settings))
+            image = source.store(_later(samples, settings))
         framebuffers[f"down_{level}"] = image
-        total += weight * enlarge(image, size)
-    framebuffers["bloom"] = store.end(total)
+        total += weight * enlarge(image, source.size)
+    framebuffers["bloom"] = source.store.end(total)
     return framebuffers
 
 
 def gain(settings: GodotBloom) -> float:
-    """Return what a flat image of 1 becomes."""
+    """Return the bloom of a flat image of 1."""
     value, total = np.ones((1, 1, 1)), 0.0
     for level, weight in enumerate(_weights(settings)):
         value = _first(value, settings) if level == 0 else _later(value, settings)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput, Storage
 from .sampling import Array, read_rows, sample, weighted_mean
 from .threshold import firefly_weight, luminance, masked
 from .upsampling import combine, cubic, spline_taps
@@ -30,13 +30,7 @@ _RADIUS = 4
 _KERNEL = [math.comb(2 * _RADIUS, i) / 4**_RADIUS for i in range(2 * _RADIUS + 1)]
 
 
-def passes(
-    glow: Array,
-    settings: HdrpBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: HdrpBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     Level k has the size of the frame / 2^(k + 1), rounded, ties to even. A negative anamorphism a
@@ -51,7 +45,7 @@ def passes(
     pixel, all levels read the last sample. In up_k, no position is beyond the middle of the last
     two texels, and no tap of the cubic filter beyond 1 - 1 / size of the larger level.
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     count = min(max(math.floor(math.log2(max(width, height)) - 2), 1), 16)
     reduced_width = width * (1 + min(settings.anamorphism, 0) / 2)
     reduced_height = height * (1 - max(settings.anamorphism, 0) / 2)
@@ -59,17 +53,16 @@ def passes(
         (max(1, round(reduced_width / 2 ** (k + 1))), max(1, round(reduced_height / 2 ** (k + 1))))
         for k in range(count)
     ]
-    reduced = store(masked(_prefilter(glow, sizes[0]), mask))
-    downs = [_along_both(reduced, sizes[0], _blur_rows, store)]
+    reduced = source.store(masked(_prefilter(source.image, sizes[0]), source.mask))
+    downs = [_along_both(reduced, sizes[0], _blur_rows, source.store)]
     for level in sizes[1:]:
-        downs.append(_along_both(downs[-1], level, _shrink_rows, store))
+        downs.append(_along_both(downs[-1], level, _shrink_rows, source.store))
     share = 0.05 + (0.95 - 0.05) * settings.scatter
     is_cubic = settings.high_quality_filtering and width >= 800 and height >= 450
     rows = _cubic_rows if is_cubic else _linear_rows
     return combine(
         downs,
-        size,
-        store,
+        source,
         own=[1 - share] * count,
         coarse=[share] * count,
         upsample=lambda image, larger: _along_both(image, larger, rows),
@@ -78,7 +71,7 @@ def passes(
 
 
 def gain(settings: HdrpBloom) -> float:
-    """Return what a flat image of 1 becomes: 1, since no filter and no mix changes it."""
+    """Return the bloom of a flat image of 1: 1, since no filter and no mix changes it."""
     return 1.0
 
 

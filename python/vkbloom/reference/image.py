@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .sampling import Array
 
-__all__ = ["Storage", "as_float", "as_mask", "finite", "format_of", "storage"]
+__all__ = ["BlurInput", "Storage", "as_float", "as_mask", "finite", "format_of", "storage"]
 
 _FORMATS = {
     "uint8": "rgba8unorm",
@@ -123,6 +123,29 @@ class Storage:
         formats, so that this format does not change them.
         """
         return image if self.is_coarse else self(image)
+
+
+@dataclasses.dataclass(frozen=True)
+class BlurInput:
+    """What the passes of a method read.
+
+    Parameters
+    ----------
+    image : ndarray of float64, shape (H, W, C)
+        The content of the first bloom buffer. Methods that read a luminance accept 1, 3 or, with
+        alpha, 4 channels.
+    size : (int, int)
+        Width and height of the bloom.
+    store : Storage
+        The effect of storing values in a bloom buffer.
+    mask : ndarray of float64, shape (height, width, 1), optional
+        Multiplies the result of a published method's threshold. Other methods do not read it.
+    """
+
+    image: Array
+    size: tuple[int, int]
+    store: Storage
+    mask: Array | None = None
 
 
 def _as_rg11b10(image: Array) -> Array:

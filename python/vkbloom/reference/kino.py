@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .levels import halved
 from .sampling import Array, sample, weighted_mean
 from .threshold import brightest, firefly_weight, masked, soften
@@ -23,13 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["gain", "passes"]
 
 
-def passes(
-    glow: Array,
-    settings: KinoBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: KinoBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     With lg = log2(H) + radius - 8, there are N = clamp(trunc(lg), 1, 16) levels, and the step of
@@ -37,21 +31,21 @@ def passes(
     down_k the mean of four taps one texel away, up_k = down_k + tent(up_k+1), and the bloom
     tent(up_0).
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     count, step = _count_and_step(settings, height)
-    bright = store(masked(_prefilter(glow, settings), mask))
+    bright = source.store(masked(_prefilter(source.image, settings), source.mask))
     image, level, downs = bright, (width, height), []
     for k in range(count):
         level = halved(level)
-        image = store(_box(image, level, settings.anti_flicker and k == 0))
+        image = source.store(_box(image, level, settings.anti_flicker and k == 0))
         downs.append(image)
     up = partial(tent, x_step=step, y_step=step)
-    ups = combine(downs, size, store, upsample=up, last=up)
+    ups = combine(downs, source, upsample=up, last=up)
     return {"bright": bright, **ups}
 
 
 def gain(settings: KinoBloom, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: the result of the threshold, times the levels."""
+    """Return the bloom of a flat image of 1: the result of the threshold, times the levels."""
     bright = _threshold(np.ones((1, 1, 1)), settings)
     return float(bright[0, 0, 0]) * _count_and_step(settings, size[1])[0]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .levels import halved
 from .pyramid import downsample, groups
 from .sampling import Array, weighted_mean
@@ -23,13 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["gain", "passes"]
 
 
-def passes(
-    glow: Array,
-    settings: PygfxBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     down_0 has half the size of the frame and each next level half of the one before, by 13 taps.
@@ -37,25 +31,24 @@ def passes(
     only. up_k = down_k + tent(up_k+1), whose taps are `filter_radius` of the width apart along
     both axes; the bloom is up_0, bilinear. The levels are clamped to at least 0.
     """
-    height, width, _ = glow.shape
-    image, level, downs = glow, (width, height), []
+    height, width, _ = source.image.shape
+    image, level, downs = source.image, (width, height), []
     for k in range(_level_count(settings, level)):
         level = halved(level)
         shrink = _averaged if settings.karis_average and k == 0 else downsample
         image = np.maximum(shrink(image, level), 0)
-        image = store(masked(image, mask) if k == 0 else image)
+        image = source.store(masked(image, source.mask) if k == 0 else image)
         downs.append(image)
     return combine(
         downs,
-        size,
-        store,
+        source,
         upsample=lambda image, larger: _tent(image, larger, settings.filter_radius),
         last=linear,
     )
 
 
 def gain(settings: PygfxBloom, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: the number of levels."""
+    """Return the bloom of a flat image of 1: the number of levels."""
     return float(_level_count(settings, size))
 
 

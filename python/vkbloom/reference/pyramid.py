@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from .image import Storage
+from .image import BlurInput
 from .levels import level_sizes
 from .sampling import Array, sample, weighted_mean
 from .threshold import firefly_weight, luminance
@@ -30,9 +30,7 @@ _GROUPS = (
 )
 
 
-def passes(
-    glow: Array, settings: Pyramid, size: tuple[int, int], store: Storage
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
     """Return the framebuffers.
 
     The bloom is the sum of all levels, each enlarged through those above it by the tent, divided
@@ -45,32 +43,31 @@ def passes(
     ValueError
         Firefly filter of an image with another number of channels than 1, 3 and 4.
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     downs: list[Array] = []
-    image = glow
+    image = source.image
     scale = (settings.scale_x, settings.scale_y)
     for k, level in enumerate(level_sizes((width, height), settings.levels)):
-        image = store(downsample(image, level, settings.firefly_filter and k == 0, scale))
+        image = source.store(downsample(image, level, settings.firefly_filter and k == 0, scale))
         downs.append(image)
     count, weights = len(downs), settings.level_weights
     up = partial(tent, x_step=settings.radius * scale[0], y_step=settings.radius * scale[1])
     shares = [1.0] * count if weights is None else [float(w) for w in weights[:count]]
     return combine(
         downs,
-        size,
-        store,
+        source,
         own=shares,
         coarse=[1.0] * count,
         upsample=up,
         last=up,
         smallest=shares[-1],
         gain=1 / count if weights is None else 1.0,
-        end=store,
+        end=source.store,
     )
 
 
 def gain(settings: Pyramid, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: 1, since the weights of every filter sum to 1.
+    """Return the bloom of a flat image of 1: 1, since the weights of every filter sum to 1.
 
     With level weights, it is the sum of the weights of the existing levels.
     """

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .sampling import Array, sample
 
 if TYPE_CHECKING:
@@ -15,51 +15,47 @@ if TYPE_CHECKING:
 __all__ = ["gain", "passes"]
 
 
-def passes(
-    glow: Array,
-    settings: Separable,
-    size: tuple[int, int],
-    store: Storage,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: Separable) -> dict[str, Array]:
     """Return the framebuffers.
 
     One direction is w0 tap(0) + strength * sum over i >= 1 of w_i (tap(+i step) +
     tap(-i step)); the step is one texel times the scale. A loop is one vertical and one horizontal
-    pass at the size of the glow. The last horizontal pass is evaluated at every pixel of `size`.
+    pass at the size of the glow. The last horizontal pass is evaluated at every pixel of the
+    bloom's size.
     Each layer is such a blur of the glow with its own scale. It is multiplied by its own strength
     and added, and the sum is clamped after each layer.
 
     With ``settings.direct``, a loop is one pass that reads N x N taps, weighted by the products of
     the kernel with itself, and there is no "blur_vertical".
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     kernel = _kernel(settings)
     # With texel="x", the step along both axes is 1 / width in normalized coordinates.
     texel_y = height / width if settings.texel == "x" else 1.0
-    bloom = np.zeros((size[1], size[0], glow.shape[2]))
+    bloom = np.zeros((source.size[1], source.size[0], source.image.shape[2]))
     framebuffers: dict[str, Array] = {}
     for scale, strength in settings.layers:
         step = settings.blur_scale * scale
         x_taps = [(i * step, weight) for i, weight in kernel]
         y_taps = [(i * step * texel_y, weight) for i, weight in kernel]
-        blurred = glow
+        blurred = source.image
         for loop in range(settings.loops):
             is_last = loop == settings.loops - 1
-            target = size if is_last else (width, height)
+            target = source.size if is_last else (width, height)
             if settings.direct:
                 blurred = sample(blurred, target, x_taps=x_taps, y_taps=y_taps)
             else:
-                vertical = store(sample(blurred, (width, height), y_taps=y_taps))
+                vertical = source.store(sample(blurred, (width, height), y_taps=y_taps))
                 framebuffers["blur_vertical"] = vertical
                 blurred = sample(vertical, target, x_taps=x_taps)
             if not is_last:
-                blurred = store(blurred)
-        bloom = store.end(bloom + strength * blurred)
-    return {**framebuffers, "bloom": store(bloom)}
+                blurred = source.store(blurred)
+        bloom = source.store.end(bloom + strength * blurred)
+    return {**framebuffers, "bloom": source.store(bloom)}
 
 
 def gain(settings: Separable) -> float:
-    """Return what a flat image of 1 becomes: the sum over the layers of s * g^(2 loops).
+    """Return the bloom of a flat image of 1: the sum over the layers of s * g^(2 loops).
 
     g is the sum of the effective kernel: 1.3865 with the default weights, so that the result is
     1.922.

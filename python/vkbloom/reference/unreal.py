@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .sampling import Array, sample
 from .threshold import luminance, masked
 
@@ -26,13 +26,7 @@ _LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
 _NODES_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def passes(
-    glow: Array,
-    settings: UnrealBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: UnrealBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     down_0 and "bright" have half the size of the frame, rounded (with `node` floored), and each
@@ -41,27 +35,29 @@ def passes(
     up_0 is the sum of the levels, enlarged bilinearly and multiplied by their factors; the bloom is
     up_0, bilinear. In rgba8unorm buffers, up_0 is divided by the sum of the factors, 3.
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     half = _halved((width, height), settings)
-    image = store(masked(_prefilter(sample(glow, half), settings), mask))
+    image = source.store(masked(_prefilter(sample(source.image, half), settings), source.mask))
     framebuffers = {"bright": image}
     total = np.zeros_like(image)
     for k, factor in enumerate(_factors(settings.radius)):
         width, height = _halved((width, height), settings)
         ratio = image.shape[1] / width
         x_taps = [(i * ratio, weight) for i, weight in _kernel(k)]
-        horizontal = store(sample(image, (width, height), x_taps=x_taps))
-        image = store(sample(horizontal, (width, height), y_taps=_kernel(k)))
+        horizontal = source.store(sample(image, (width, height), x_taps=x_taps))
+        image = source.store(sample(horizontal, (width, height), y_taps=_kernel(k)))
         framebuffers[f"down_{k}"] = image
         total += factor * sample(image, half)
-    sum_of_factors = sum(_factors(settings.radius)) if store.high == 1 else 1.0
-    framebuffers["up_0"] = store(total / sum_of_factors)
-    framebuffers["bloom"] = store.end(sum_of_factors * sample(framebuffers["up_0"], size))
+    sum_of_factors = sum(_factors(settings.radius)) if source.store.high == 1 else 1.0
+    framebuffers["up_0"] = source.store(total / sum_of_factors)
+    framebuffers["bloom"] = source.store.end(
+        sum_of_factors * sample(framebuffers["up_0"], source.size)
+    )
     return framebuffers
 
 
 def gain(settings: UnrealBloom) -> float:
-    """Return what a flat image of 1 becomes: about 3, as the kernels sum to nearly 1."""
+    """Return the bloom of a flat image of 1: about 3, because each kernel sums to nearly 1."""
     value, total = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]), 0.0
     for k, factor in enumerate(_factors(settings.radius)):
         value *= sum(weight for _, weight in _kernel(k)) ** 2

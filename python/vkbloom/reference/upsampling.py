@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .sampling import Array, sample
 
 __all__ = [
@@ -92,8 +92,7 @@ def spline_taps(positions: Array) -> list[tuple[Array, Array]]:
 
 def combine(
     downs: Sequence[Array],
-    size: tuple[int, int],
-    store: Storage,
+    source: BlurInput,
     *,
     upsample: Filter,
     last: Filter,
@@ -114,10 +113,8 @@ def combine(
     ----------
     downs : sequence of ndarray
         The levels, largest first.
-    size : (int, int)
-        Width and height of the bloom.
-    store : Storage
-        The effect of storing values in a bloom buffer.
+    source : BlurInput
+        Its size and storage are read.
     upsample, last : callable
         The filters between levels and to the bloom.
     own, coarse : sequence of float, optional
@@ -125,13 +122,14 @@ def combine(
     smallest, gain : float, optional
         Factors of the smallest level and of the bloom.
     end : callable, optional
-        The effect of storing the bloom; by default ``store.end``.
+        The effect of storing the bloom; by default ``source.store.end``.
 
     Returns
     -------
     dict of str to ndarray
         "down_0" to "down_N-1", "up_N-2" to "up_0" and "bloom".
     """
+    size, store = source.size, source.store
     framebuffers = {f"down_{k}": down for k, down in enumerate(downs)}
     own = own or [1.0] * len(downs)
     coarse = coarse or [1.0] * len(downs)

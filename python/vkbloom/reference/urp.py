@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import Storage
+from .image import BlurInput
 from .levels import halved
 from .sampling import Array, sample
 from .threshold import masked, soften
@@ -27,13 +27,7 @@ __all__ = ["gain", "passes"]
 _WEIGHTS = (0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622)
 
 
-def passes(
-    glow: Array,
-    settings: UrpBloom,
-    size: tuple[int, int],
-    store: Storage,
-    mask: Array | None = None,
-) -> dict[str, Array]:
+def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
     down_0 has half the size of the frame: one bilinear tap, clamped, then the soft threshold. Each
@@ -41,19 +35,19 @@ def passes(
     then nine taps one pixel apart blur its height. up_k mixes the level with the smaller one, by
     the scatter; the bloom is up_0. Both are enlarged bilinearly.
     """
-    height, width, _ = glow.shape
+    height, width, _ = source.image.shape
     level = halved((width, height))
-    downs = [store(masked(_prefilter(sample(glow, level), settings), mask))]
+    downs = [source.store(masked(_prefilter(sample(source.image, level), settings), source.mask))]
     for _ in range(1, _level_count(settings, level)):
         level = halved(level)
-        horizontal = store(sample(downs[-1], level, x_taps=_taps(2.0)))
-        downs.append(store(sample(horizontal, level, y_taps=_taps(1.0))))
+        horizontal = source.store(sample(downs[-1], level, x_taps=_taps(2.0)))
+        downs.append(source.store(sample(horizontal, level, y_taps=_taps(1.0))))
     own, coarse = _shares(settings, len(downs))
-    return combine(downs, size, store, own=own, coarse=coarse, upsample=linear, last=linear)
+    return combine(downs, source, own=own, coarse=coarse, upsample=linear, last=linear)
 
 
 def gain(settings: UrpBloom, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: the threshold may change it, the mixes do not."""
+    """Return the bloom of a flat image of 1: the threshold may change it, the mixes do not."""
     count = _level_count(settings, halved(size))
     first = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0])
     kernel = _WEIGHTS[0] + 2 * sum(_WEIGHTS[1:])

@@ -1,0 +1,72 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// HDRP's vertical blur of an image of the target's size (FIRST) or of exactly twice its height, whose
+// samples are means of two texels. An invocation writes one word of some rows, and has each sample
+// once for all of them.
+#include "lib/block.glsl"
+
+UNIFORM_BLOCK(PYRAMID_BLOCK);
+#include "lib/storage.glsl"
+#include "lib/hdrp.glsl"
+#include "variants/pixels.glsl"
+
+const int COLUMNS = 4 / CHANNEL_BYTES, ROWS = HDRP_OUTPUTS;  // COLUMNS: of a word
+
+layout(local_size_x = ROW_INVOCATIONS) in;
+READ_IMAGE(1, source);
+WRITE_IMAGE(2);
+
+#define LOAD load_run
+#define LOAD_IMAGE source
+#define LOAD_NUMBER 1
+#define LOAD_CHANNELS 4
+#define LOAD_FROM 0
+#define LOAD_COUNT COLUMNS
+#include "variants/load.glsl"
+
+#define STORE_COUNT COLUMNS
+#include "variants/store.glsl"
+
+void take_sample(int x, int y, out vec4 taken[COLUMNS])
+{
+    uvec4 raw[COLUMNS], next[COLUMNS];
+    bool before = y < 0;
+    int row = min(y, target_shape.y - 1);
+
+    row = before ? (FIRST != 0 ? y & 1 : 0) : FIRST != 0 ? row : 2 * row;
+    load_run(x, min(row, read_shapes[0].y - 1), raw);
+    if (FIRST == 0)
+        load_run(x, before ? 0 : row + 1, next);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        taken[i] = FIRST != 0 ? value_of(raw[i]) : 0.5 * value_of(raw[i]) + 0.5 * value_of(next[i]);
+}
+
+void main()
+{
+    read_words();
+    ivec2 size = TARGET_SIZE();
+    ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
+    vec4 sums[ROWS][COLUMNS];
+
+    if (any(greaterThanEqual(first, size)))
+        return;
+    [[unroll]] for (int row = 0; row < ROWS; ++row)
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            sums[row][i] = vec4(0.0);
+    [[unroll]] for (int at = 0; at < ROWS + 2 * HDRP_RADIUS; ++at) {
+        vec4 taken[COLUMNS];
+        take_sample(first.x, first.y - HDRP_RADIUS + at, taken);
+        [[unroll]] for (int row = 0; row < ROWS; ++row)
+            if (row <= at && at <= row + 2 * HDRP_RADIUS)
+                [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+                    sums[row][i] += HDRP_WEIGHTS[at - row] * taken[i];
+    }
+    [[unroll]] for (int row = 0; row < ROWS; ++row) {
+        uvec4 pixels[COLUMNS];
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            pixels[i] = buffer_of(sums[row][i]);
+        if (first.y + row < size.y)
+            store(first.x, first.y + row, pixels);
+    }
+}

@@ -1,0 +1,26 @@
+"""OpenEXR files with several parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+
+def store_parts(path: Path, parts: Mapping[str, NDArray[Any]]) -> None:
+    """Write half floats of shape (H, W, C) as parts, by name."""
+    specs = []
+    for name, pixels in parts.items():
+        height, width, channels = pixels.shape
+        specs.append(oiio.ImageSpec(width, height, channels, "half"))
+        specs[-1].attribute("oiio:subimagename", name)
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer is not None
+    assert writer.open(str(path), specs)
+    for index, pixels in enumerate(parts.values()):
+        assert not index or writer.open(str(path), specs[index], "AppendSubimage")
+        assert writer.write_image(pixels)
+    assert writer.close()
