@@ -222,7 +222,7 @@ def test_values_that_are_not_finite(varied: Renderer) -> None:
     image[20, 30, 1] = np.nan
     image[21, 40, 0] = np.inf
     image[49, 69, 2] = -np.inf
-    # (Passes that read the image itself, in each form: presets of half the size and of other sizes.)
+    # (Also passes that read the image itself: into half of its size and into other sizes.)
     halving = (presets["filament"], presets["unity_hdrp"], BIT_EQUAL["kawase-near"])
     for settings in (*WHOLE.values(), *halving, BIT_EQUAL["bevy"]):
         frames = varied.apply(image, settings)
