@@ -239,6 +239,7 @@ bool vkb_add_kawase_up(const struct vkb_variant_choice *choice, const struct vkb
 
     *fits = pass->shader == VKB_SHADER_kawase_up_frag
          && is_enlarged(plain, pass, params->source_height, params->target_height)
+         && plain->images[pass->reads[0]].width <= plain->images[pass->targets[0]].width
          && vkb_has_format_of(plain, pass->reads[0], pass->targets[0])
          && vkb_fits_words(choice, pass);
     if (!*fits)

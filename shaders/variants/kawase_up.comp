@@ -23,11 +23,6 @@ WRITE_IMAGE(2);
 #define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
-#define AXIS_FILTER filter_row
-#define AXIS_IMAGE usamplerBuffer image
-#define AXIS_TEXEL(at) load_pixel(image, read_shapes[0], clamp(at, 0, read_shapes[0].x - 1), line)
-#include "lib/axis_filter.glsl"
-
 // Filtered rows around a distance from a pixel's row, the last of them texel + first + 2.
 struct Rows {
     int first;
@@ -38,14 +33,52 @@ int texels[COLUMNS];
 float parts[COLUMNS];
 Rows above_single, below_single, above_pairs, below_pairs, axial;
 
-void add_row(inout Rows rows, int texel, int kind, float tap_step)
+// As many texels of a row as a word has, and one more: they are in two words.
+void load_texels(int first, int line, out vec4 values[COLUMNS + 1])
+{
+    int last = read_shapes[0].x - 1, start = line * read_shapes[0].z;
+    int before = clamp(first, 0, last) / COLUMNS, after = clamp(first + COLUMNS, 0, last) / COLUMNS;
+    uvec4 word = texelFetch(smaller, start + before), next = texelFetch(smaller, start + after);
+    [[unroll]] for (int i = 0; i <= COLUMNS; ++i) {
+        int at = clamp(first + i, 0, last);
+        values[i] = value_of(pixel_of(at / COLUMNS == before ? word : next, at));
+    }
+}
+
+// A linear tap of each column. From one column to the next it moves on by one texel at most.
+void tap_row(float offset, int line, out vec4 taps[COLUMNS])
+{
+    Pair pairs[COLUMNS];
+    vec4 values[COLUMNS + 1];
+
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        pairs[i] = linear_pair(Axis(texels[i], parts[i], UPSAMPLE_LINEAR, 0.0, 0, 1.0), offset, 1.0);
+    load_texels(pairs[0].texel, line, values);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        vec4 left = values[0], right = values[1];
+        [[unroll]] for (int at = 1; at < COLUMNS; ++at)
+            if (at <= i) {
+                bool here = pairs[i].texel == pairs[0].texel + at;
+                left = here ? values[at] : left;
+                right = here ? values[at + 1] : right;
+            }
+        taps[i] = pairs[i].weights.x * left + pairs[i].weights.y * right;
+    }
+}
+
+// Adds a row of single taps, or of two at this distance before and after the position.
+void add_row(inout Rows rows, int texel, bool pairs, float distance)
 {
     int last = read_shapes[0].y - 1, line = clamp(texel + rows.first + 2, 0, last);
+    vec4 sums[COLUMNS], second[COLUMNS];
+
+    tap_row(pairs ? -distance : 0.0, line, sums);
+    if (pairs)
+        tap_row(distance, line, second);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        Axis axis = Axis(texels[i], parts[i], kind, tap_step, read_shapes[0].x, 1.0);
         [[unroll]] for (int kept = 1; kept < KEPT; ++kept)
             rows.kept[kept - 1][i] = rows.kept[kept][i];
-        rows.kept[KEPT - 1][i] = filter_row(smaller, axis, line);
+        rows.kept[KEPT - 1][i] = pairs ? sums[i] + second[i] : sums[i];
     }
 }
 
@@ -90,11 +123,11 @@ void main()
     for (int y = first.y; y < end;) {
         do {
             ++at;
-            add_row(above_single, at, UPSAMPLE_LINEAR, 0.0);
-            add_row(below_single, at, UPSAMPLE_LINEAR, 0.0);
-            add_row(above_pairs, at, UPSAMPLE_PAIR, near);
-            add_row(below_pairs, at, UPSAMPLE_PAIR, near);
-            add_row(axial, at, UPSAMPLE_PAIR, far);
+            add_row(above_single, at, false, 0.0);
+            add_row(below_single, at, false, 0.0);
+            add_row(above_pairs, at, true, near);
+            add_row(below_pairs, at, true, near);
+            add_row(axial, at, true, far);
         } while (at < texel);
         // As in upsample.glsl.
         do {

@@ -161,10 +161,9 @@ uvec4 finished(uvec4 own, vec4 value)
 
 #ifdef WORDS
 
-// A pixel anywhere in an image of this shape (see Words).
-uvec4 raw_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
+// The pixel at this place of a row, from its word.
+uvec4 pixel_of(uvec4 word, int at)
 {
-    uvec4 word = texelFetch(image, row * shape.z + at * CHANNEL_BYTES / 4);
 #if CHANNEL_BYTES == 1
     uvec2 half_word = (at & 2) == 0 ? word.xy : word.zw;
     return uvec4((at & 1) == 0 ? half_word.x : half_word.y, 0, 0, 0);
@@ -173,6 +172,12 @@ uvec4 raw_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
 #else
     return word;
 #endif
+}
+
+// A pixel anywhere in an image of this shape (see Words).
+uvec4 raw_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
+{
+    return pixel_of(texelFetch(image, row * shape.z + at * CHANNEL_BYTES / 4), at);
 }
 
 vec4 load_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
