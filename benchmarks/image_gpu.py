@@ -34,6 +34,7 @@ __all__ = ["run"]
 SIZE: Final = (3840, 2160)
 SMALLER: Final = (1920, 1080)
 ROUNDS: Final = 25
+WARM_UP: Final = 3
 FUSED: Final = "a CUDA kernel of our own"
 UPLOAD: Final = "bare upload from pinned memory"
 READBACK: Final = "bare readback into pinned memory"
@@ -145,9 +146,14 @@ def _in_hands(
 
         return once
 
+    # Made before the calls, so that only these are timed.
+    strengths = [
+        SETTINGS.replace(blur_strength=1.0 + 0.01 * turn)
+        for turn in range(plan.times(ROUNDS) + WARM_UP)
+    ]
+
     def strength(source: Any, turn: int) -> vkbloom.Frames:
-        settings = SETTINGS.replace(blur_strength=1.0 + 0.01 * turn)
-        return ours.apply(source, settings, attachments=("final",))
+        return ours.apply(source, strengths[turn], attachments=("final",))
 
     def frame(_: int) -> vkbloom.Frames:
         return ours.render(
@@ -163,12 +169,12 @@ def _in_hands(
     times = alternate_seconds(
         calls | {name: call for name, (call, _, _) in theirs.items()},
         plan.times(ROUNDS),
-        warm_up=3,
+        warm_up=WARM_UP,
     )
     times |= alternate_seconds(
         {NEW: wall(lambda turn: _bloom(ours, images[turn % COUNT]))},
         plan.times(ROUNDS),
-        warm_up=3,
+        warm_up=WARM_UP,
     )
     size = f"{width} x {height}"
     section.times[f"in Python's hands, {size}"] = times

@@ -149,9 +149,11 @@
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, shares, 2)
 
+// A pass of dual Kawase. The threshold is for a first level that reads the image itself.
 #define KAWASE_BLOCK(B, READS, INPUT, VEC4S) \
     READS(B, offset) \
-    SAMPLING_ROWS(B, INPUT)
+    SAMPLING_ROWS(B, INPUT) \
+    THRESHOLD_ROWS(B, READS)
 
 // An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
 // weight of each for each channel. The threshold is for the first iteration.
@@ -350,10 +352,13 @@
 #define PIXEL_INVOCATIONS 8
 
 // Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line and of a fused bloom.
-// A line up to LINE_SHORT_RADIUS is compiled for its radius.
+// A line up to LINE_SHORT_RADIUS is compiled for its radius. On a CPU, for a target of at most
+// ROLLED_PIXELS that takes longer than the pass, unless the loop over its pixels stays one.
 #define LINE_RADIUS         64
 #define LINE_SHORT_RADIUS   8
 #define LINE_OUTPUTS        8
+#define ROLLED_PIXELS       0x40000
+#define ROLLED_OUTPUTS      32
 #define LINE_VEC4S          34
 #define STRIP_RADIUS        4
 #define STRIP_COLUMNS       240
@@ -372,6 +377,7 @@
 #define TEXEL_ROWS                    16
 #define UPSAMPLE_COLUMNS(CHANNEL)     (16 / (CHANNEL))
 #define UPSAMPLE_ROWS                 64
+#define GRID_COLUMNS                  4
 #define SHRINK_ROWS                   32
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
@@ -404,13 +410,13 @@
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
-// to unroll its loops. With FROM_IMAGE, a downsampling to half the size reads the image itself and
-// applies the threshold. STORED is the format of the target (STORED_*). FIRST marks an engine's
-// first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
-// makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
-// GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are
-// the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of GROUP_WIDTH
-// lines.
+// to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FROM_IMAGE, a
+// downsampling to half the size reads the image itself and applies the threshold. STORED is the
+// format of the target (STORED_*). FIRST marks an engine's first level. LEVELS is the number of
+// levels that a pass adds up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are
+// of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations.
+// Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup
+// has GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -447,7 +453,8 @@
     CONSTANT(32, RADIX_3, radix_3) \
     CONSTANT(33, RADIX_4, radix_4) \
     CONSTANT(34, GROUP_WIDTH, group_width) \
-    CONSTANT(35, GROUP_HEIGHT, group_height)
+    CONSTANT(35, GROUP_HEIGHT, group_height) \
+    CONSTANT(36, ROLLED, rolled)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -530,6 +537,7 @@
     NAME(GROUPS_URP, 7, urp) \
     NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(GROUPS_BEVY, 9, bevy) \
+    NAME(GROUPS_KAWASE, 10, kawase) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

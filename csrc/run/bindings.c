@@ -88,8 +88,7 @@ bool vkb_bindings_create(const struct vkb_device *device, struct vkb_bindings *b
                          struct vkb_error *error)
 {
     *bindings = (struct vkb_bindings){0};
-    bool done = create_sampler(device, VK_FILTER_LINEAR, &bindings->filter, error)
-             && create_sampler(device, VK_FILTER_NEAREST, &bindings->nearest, error);
+    bool done = true;
 
     for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
         for (uint32_t images = 0; done && images <= binding_kinds[kind].most_reads; ++images)
@@ -113,12 +112,18 @@ void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *
     *bindings = (struct vkb_bindings){0};
 }
 
-VkSampler vkb_bindings_sampler(const struct vkb_device *device, const struct vkb_bindings *bindings,
-                               enum vkb_format format)
+bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
+                          enum vkb_format format, VkSampler *sampler, struct vkb_error *error)
 {
-    return vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT)
-             ? bindings->filter
-             : bindings->nearest;
+    const bool filters =
+        vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
+    VkSampler *kept = filters ? &bindings->filter : &bindings->nearest;
+
+    if (!*kept
+        && !create_sampler(device, filters ? VK_FILTER_LINEAR : VK_FILTER_NEAREST, kept, error))
+        return false;
+    *sampler = *kept;
+    return true;
 }
 
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)

@@ -21,7 +21,7 @@ struct vkb_words {
 };
 
 struct vkb_bindings {
-    VkSampler filter, nearest;
+    VkSampler filter, nearest;  // each created at its first use
     // By the number of images that a pass reads.
     VkDescriptorSetLayout set_layouts[VKB_BINDING_KINDS][VKB_MAX_READS + 1];
     VkPipelineLayout layouts[VKB_BINDING_KINDS][VKB_MAX_READS + 1];
@@ -34,8 +34,8 @@ void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *
 
 // The sampler for images of the format. If the device cannot filter the format, shaders only fetch
 // texels from it.
-VkSampler vkb_bindings_sampler(const struct vkb_device *device, const struct vkb_bindings *bindings,
-                               enum vkb_format format);
+bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
+                          enum vkb_format format, VkSampler *sampler, struct vkb_error *error);
 
 // The number of images that the pass reads through descriptors, with the scene's cubemap or
 // textures.

@@ -94,11 +94,12 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
 
 static VkImageUsageFlags image_usage(enum vkb_format format)
 {
+    // No pass reads depth.
     return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
-         | VK_IMAGE_USAGE_SAMPLED_BIT
          | (format == VKB_FORMAT_DEPTH32_FLOAT
                 ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
-                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_STORAGE_BIT);
+                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
+                      | VK_IMAGE_USAGE_STORAGE_BIT);
 }
 
 bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,

@@ -30,11 +30,10 @@ struct pipeline_key {
     uint32_t textured;
     uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
-    uint32_t zero;  // makes the size a multiple of a pointer's
     struct vkb_constants constants;
 };
 _Static_assert(sizeof(struct pipeline_key)
-                   == sizeof(VkRenderPass) + (8 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                   == sizeof(VkRenderPass) + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {

@@ -18,8 +18,9 @@ static VkDeviceSize write_params(struct vkb_run *run, const struct vkb_pass_row 
 
 // The image that the pass reads at binding index + 1. `surface` has the textures, if the pass reads
 // textures.
-static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct vkb_pass_row *pass,
-                                        const struct vkb_surface *surface, uint32_t index)
+static bool read_image(struct vkb_run *run, const struct vkb_pass_row *pass,
+                       const struct vkb_surface *surface, uint32_t index,
+                       VkDescriptorImageInfo *info, struct vkb_error *error)
 {
     const struct vkb_scene *scene = &run->frame->scene;
     const struct vkb_texture *texture = NULL;
@@ -33,13 +34,14 @@ static VkDescriptorImageInfo read_image(const struct vkb_run *run, const struct 
     } else {
         image = &run->images[pass->reads[index]]->image;
     }
-    return (VkDescriptorImageInfo){
-        .sampler = texture ? texture->sampler
-                           : vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings,
-                                                  image->format),
+    *info = (VkDescriptorImageInfo){
+        .sampler = texture ? texture->sampler : VK_NULL_HANDLE,
         .imageView = image->view,
         .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
     };
+    return texture || pass->reading != VKB_READING_SAMPLED
+        || vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
+                                &info->sampler, error);
 }
 
 // Rows of a dispatch's target that one storage buffer descriptor covers, and their place.
@@ -59,8 +61,8 @@ struct binding {
 };
 
 // Fills the set with the parameters, the images read and the target of a dispatch.
-static void write_descriptors(const struct vkb_run *run, const struct binding *binding,
-                              VkDescriptorSet set)
+static bool write_descriptors(struct vkb_run *run, const struct binding *binding,
+                              VkDescriptorSet set, struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = binding->pass;
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
@@ -84,10 +86,14 @@ static void write_descriptors(const struct vkb_run *run, const struct binding *b
             .descriptorType = types.read,
             .pImageInfo = &images[i],
         };
-        if (pass->reading == VKB_READING_WORDS)
-            writes[write_count].pTexelBufferView = &run->images[pass->reads[i]]->image.words;
-        else
-            images[i] = read_image(run, pass, binding->surface, i);
+        if (pass->reading == VKB_READING_WORDS) {
+            struct vkb_image *image = &run->images[pass->reads[i]]->image;
+            if (!vkb_image_words(run->device, image, error))
+                return false;
+            writes[write_count].pTexelBufferView = &image->words;
+        } else if (!read_image(run, pass, binding->surface, i, &images[i], error)) {
+            return false;
+        }
         ++write_count;
     }
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
@@ -109,6 +115,7 @@ static void write_descriptors(const struct vkb_run *run, const struct binding *b
         writes[i].descriptorCount = 1;
     }
     run->device->vk.vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
+    return true;
 }
 
 static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
@@ -128,9 +135,9 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
                            .descriptorSetCount = 1,
                            .pSetLayouts = &layout,
                        },
-                       &set)))
+                       &set))
+        || !write_descriptors(run, binding, set, error))
         return false;
-    write_descriptors(run, binding, set);
     vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
                                 vkb_bindings_layout(bindings, pass), 0, 1, &set, 0, NULL);
     return true;

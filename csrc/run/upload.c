@@ -13,7 +13,7 @@ enum {
     // submission, which takes about 10 us; the transfer of 1 MiB takes 20 us.
     BAND_SIZE = 1 << 20,
     // In how many bands a large image is copied: the last one is what is not hidden.
-    BANDS = 8,
+    BANDS = 16,
 };
 
 void vkb_upload_destroy(const struct vkb_device *device, struct vkb_upload *upload)

@@ -11,10 +11,13 @@ static const enum vkb_shader line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line
 static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(strip);
 
 // The row of a line blur. `origin` is the position of the target's first pixel in the source.
-static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct vkb_pass_row *blur,
+static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
+                                    const struct vkb_pass_row *blur,
                                     const struct vkb_texel_kernel *kernel, uint32_t target,
                                     int origin)
 {
+    const struct vkb_graph *graph = choice->graph;
+    const struct vkb_image_row *image = &graph->images[target];
     const enum vkb_mode direction = vkb_blur_direction(blur);
     const bool vertical = direction == DIRECTION_VERTICAL;
     struct vkb_pass_row row;
@@ -29,10 +32,18 @@ static struct vkb_pass_row line_row(const struct vkb_graph *graph, const struct 
     row.targets[0] = target;
     row.constants.direction = direction;
     row.constants.radius = kernel->radius <= LINE_SHORT_RADIUS ? kernel->radius : 0;
+    row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.radius > 0
+                        && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
+    if (row.constants.rolled) {
+        const uint32_t across = vertical ? image->width : image->height;
+        const uint32_t along = vertical ? image->height : image->width;
+        row.groups_width = (across + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
+        row.groups_height = (along + ROLLED_OUTPUTS - 1) / ROLLED_OUTPUTS;
+    }
     row.block = VKB_BLOCK_line;
     row.params.line.radius = kernel->radius;
     row.params.line.origin = origin;
-    row.params.line.limit = vkb_formats[graph->images[target].format].limit;
+    row.params.line.limit = vkb_formats[image->format].limit;
     for (int tap = 0; tap <= 2 * kernel->radius; ++tap)
         row.params.line.kernel[tap / 4][tap % 4] = kernel->weights[abs(tap - kernel->radius)];
     return row;
@@ -50,7 +61,7 @@ bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass
          && vkb_blur_kernel(pass, LINE_RADIUS, &kernel);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = line_row(choice->graph, pass, &kernel, pass->targets[0], 0);
+    struct vkb_pass_row row = line_row(choice, pass, &kernel, pass->targets[0], 0);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -84,7 +95,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
     if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, &lines, error))
         return false;
-    struct vkb_pass_row line = line_row(choice->graph, pass, &kernel, lines, -1);
+    struct vkb_pass_row line = line_row(choice, pass, &kernel, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, VKB_SHADER_enlarge_frag, pass->targets[0]);
     row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
@@ -156,14 +167,14 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-// The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of a word, so
-// that the invocations of a workgroup share a row as evenly as possible.
+// The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of two words of
+// any format, so that the invocations of a workgroup share a row as evenly as possible.
 static uint32_t strip_columns(uint32_t width)
 {
     const uint32_t most = ROW_INVOCATIONS * STRIP_COLUMNS;
     const uint32_t invocations = ROW_INVOCATIONS * ((width + most - 1) / most);
 
-    return ((width + invocations - 1) / invocations + 3) / 4 * 4;
+    return ((width + invocations - 1) / invocations + 7) / 8 * 8;
 }
 
 // Adds the composite, and after it the fused pass in strips, which may replace it.

@@ -293,6 +293,21 @@ static bool create_view(const struct vkb_device *device, struct vkb_image *image
                          NULL, &image->view));
 }
 
+bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
+                     struct vkb_error *error)
+{
+    return image->words
+        || VK(error,
+              device->vk.vkCreateBufferView(device->handle,
+                                            &(VkBufferViewCreateInfo){
+                                                .sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                                .buffer = image->buffer,
+                                                .format = VKB_WORD_FORMAT,
+                                                .range = image->row_pitch * image->height,
+                                            },
+                                            NULL, &image->words));
+}
+
 static size_t round_up(size_t size, size_t step)
 {
     return (size + step - 1) / step * step;
@@ -348,16 +363,7 @@ static bool map_image(const struct vkb_device *device, struct vkb_image *image,
                                              &image->mapped)))
         return false;
     vkb_advise_large(image->mapped, image->row_pitch * image->height);
-    return !vkb_image_fits_words(device, image->format, image->width, image->height)
-        || VK(error,
-              device->vk.vkCreateBufferView(device->handle,
-                                            &(VkBufferViewCreateInfo){
-                                                .sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
-                                                .buffer = image->buffer,
-                                                .format = VKB_WORD_FORMAT,
-                                                .range = image->row_pitch * image->height,
-                                            },
-                                            NULL, &image->words));
+    return true;
 }
 
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,

@@ -12,8 +12,8 @@ enum vkb_memory_kind {
     VKB_MEMORY_SHARED,    // mapped and coherent; for images, on devices whose memory is the host's
 };
 
-// From so much on, memory is in the system's large pages: fewer have to be given, zeroed, pinned
-// and looked up.
+// Allocations of at least this size use the system's large pages, so that fewer pages are mapped,
+// zeroed, pinned and looked up.
 #define VKB_LARGE_BYTES ((size_t)4 << 20)
 
 struct vkb_buffer {
@@ -33,9 +33,9 @@ struct vkb_image {
     enum vkb_access access;  // the last access recorded
     void *mapped;            // its pixels, row by row; NULL: not host-visible
     size_t row_pitch;        // of the mapped pixels, in bytes
-    // The mapped pixels as a buffer, and as words if they are few enough for a view.
+    // The mapped pixels as a buffer, and as words.
     VkBuffer buffer;
-    VkBufferView words;
+    VkBufferView words;  // created at its first use
 };
 
 // Six layers make a cubemap. A mapped image has one layer and one level, and its memory is also a
@@ -47,7 +47,7 @@ struct vkb_image_spec {
     bool mapped;
 };
 
-// Asks the system for large pages for memory that nobody has written to yet.
+// Advises the system to use large pages for memory that has not been written yet.
 void vkb_advise_large(void *memory, size_t size);
 
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.
@@ -76,6 +76,11 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
+
+// Creates the view of a mapped image's words if there is none. The image must be small enough (see
+// vkb_image_fits_words).
+bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
+                     struct vkb_error *error);
 
 // An upper bound of the bytes from a row of a mapped image to the next.
 size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width);

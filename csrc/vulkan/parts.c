@@ -42,8 +42,8 @@ enum {
     // A thread takes some 10 us to wake up, in which a core copies a hundred kilobytes.
     LEAST_SIZE = 1 << 20,
     // Of the rows that a thread takes at once.
-    CHUNK_SIZE = 256 << 10,
-    MAX_CHUNKS = 256,
+    CHUNK_SIZE = 128 << 10,
+    MAX_CHUNKS = 1024,
 };
 
 struct work {

@@ -74,7 +74,7 @@ def _arrays_for(
             continue
         array = _check_out(out[name], name, shape, dtype)
         for other, taken in given.items():
-            # For contiguous arrays the bounds are sufficient.
+            # The arrays are contiguous, so it is sufficient to compare their bounds.
             if np.may_share_memory(array, taken):
                 raise ValueError(f"out: {other} and {name} must not share memory")
         given[name] = array
@@ -97,7 +97,7 @@ def _paired(
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
         work = requests.Work(image_source(image), one)
-        # The iterable may overwrite the array when it makes the next image.
+        # The iterable may overwrite the array when it yields the next image.
         del image
         yield work
         del work
@@ -229,32 +229,33 @@ class Renderer:
         self._core.close()
 
     def capture(self, path: str | os.PathLike[str]) -> contextlib.AbstractContextManager[None]:
-        """Capture what the device does meanwhile as one frame of RenderDoc.
+        """Capture the work of the device inside the context as one frame of RenderDoc.
 
-        A program without a window has no frames of which RenderDoc could tell where they end.
+        Without a window, RenderDoc cannot detect where frames begin and end.
 
         Parameters
         ----------
         path : str or path-like
-            The file to write, ``name.rdc``; one that exists is replaced.
+            The file to write, ``name.rdc``. An existing file is replaced.
 
         Returns
         -------
         context manager
-            The file is there when it ends; where it ends by an exception, there is none.
+            The file is written when the context ends. If it ends with an exception, no file is
+            written.
 
         Raises
         ------
         Error
-            RenderDoc is not loaded; says how to load it. Or it captured nothing.
+            RenderDoc is not loaded, or it captured nothing. The message says how to load it.
         ValueError
             The renderer is closed.
 
         Notes
         -----
-        Passes have their names as labels, images and buffers as objects, as in `plan`. The names
-        are also in messages of the validation layer. RenderDoc hides VK_EXT_external_memory_host,
-        so that results take the way through staging memory.
+        The names of `plan` are the labels of passes and the names of images and buffers. Messages
+        of the validation layer have them, too. RenderDoc hides VK_EXT_external_memory_host, so
+        results are copied through staging memory.
 
         See Also
         --------
@@ -323,8 +324,8 @@ class Renderer:
         time : float
             Time of the animation in turns, any finite number. 0 and 1 give the same frame.
         attachments : "all" or sequence of str
-            Names of the requested framebuffers. Others are rendered only if a requested one needs
-            them, and are not read back.
+            Names of the requested framebuffers. Other framebuffers are rendered only if a requested
+            one depends on them. They are not read back.
         out : mapping of str to ndarray, optional
             Arrays to fill, by name. Arrays for the other framebuffers are allocated.
 
@@ -338,8 +339,8 @@ class Renderer:
             Deferred, at the frame's size except for the blur: ``albedo``, ``normal``, ``position``
             (both in view space), ``brightness`` (all (H, W, 4) float16), ``depth``,
             ``blur_vertical``, ``bloom``, ``scene`` ((H, W, 4) float16, light plus brightness) and
-            ``final`` ((H, W, 4) uint8). A normal of 0 marks the sky or the empty background: there
-            the albedo is the colour.
+            ``final`` ((H, W, 4) uint8). Pixels of the sky or of the empty background have a normal
+            of 0, and their albedo is the colour.
 
             With ``direct=True`` there is no ``blur_vertical``. With ``bloom=False`` there are no
             bloom buffers, and the glow mesh is left out.
@@ -351,7 +352,7 @@ class Renderer:
         TypeError
             An argument has the wrong type.
         OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. After any but a lost device the renderer can be used again.
+            The device failed. The renderer can be used again unless the device is lost.
 
         See Also
         --------
@@ -361,8 +362,8 @@ class Renderer:
 
         Notes
         -----
-        A pass runs only if its inputs, its settings or its size have changed since it ran last. The
-        ``timings`` of the result name the passes that ran.
+        A pass runs only if its inputs, its settings or its size have changed since its last run.
+        The ``timings`` of the result name the passes that ran.
 
         Examples
         --------
@@ -387,7 +388,7 @@ class Renderer:
         attachments: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, NDArray[Any]] | None = None,
     ) -> Frames:
-        """Give an image bloom.
+        """Add bloom to an image.
 
         Parameters
         ----------
@@ -428,7 +429,7 @@ class Renderer:
         TypeError
             The image has another dtype, or an argument another type.
         OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. After any but a lost device the renderer can be used again.
+            The device failed. The renderer can be used again unless the device is lost.
 
         See Also
         --------
@@ -441,12 +442,12 @@ class Renderer:
         An image with the same bytes as before is not uploaded again. Passes run only if their
         inputs or settings have changed. The same is true for mask and emission.
 
-        The composite "mix" subtracts from the scene s only the part from which the bloom was made.
+        The composite "mix" subtracts only the part of the scene s that is the source of the bloom.
         With a mask m the result is s + i (b - m s), with an emission s + i b.
 
         Examples
         --------
-        Two lamps, of which one may glow.
+        There are two lamps, and the mask selects one of them:
 
         >>> image = np.zeros((32, 64, 3), np.float32)
         >>> image[16, 16] = image[16, 48] = 10
@@ -468,7 +469,7 @@ class Renderer:
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
     ) -> Iterator[Frames]:
-        """Give an image bloom with many settings.
+        """Add bloom to an image with many settings.
 
         Parameters
         ----------
@@ -493,7 +494,7 @@ class Renderer:
         -----
         The device works on the next settings while the caller uses a frame. So after the first
         frame, settings are taken from the iterable before earlier frames are yielded. An error in
-        one of them is raised after the frames before it.
+        settings is raised after the frames of all earlier settings.
 
         Examples
         --------
@@ -513,7 +514,7 @@ class Renderer:
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
     ) -> Iterator[Frames]:
-        """Give many images bloom.
+        """Add bloom to many images.
 
         Parameters
         ----------
@@ -533,8 +534,8 @@ class Renderer:
         Raises
         ------
         ValueError
-            At the call: the lengths of both sequences differ, or an argument is out of range. In
-            the iteration: `apply` would refuse the image, or it has no settings.
+            Raised by the call: the lengths of both sequences differ, or an argument is out of
+            range. Raised by the iteration: an image is not valid for `apply`, or has no settings.
         TypeError
             `images` is not iterable, or an argument has another type.
 
@@ -546,8 +547,9 @@ class Renderer:
         Notes
         -----
         The device works on the next images while the caller uses a frame. So after the first frame,
-        up to two images more than the yielded frames are taken. An error of an image or of the
-        iterable is raised after the frames before it, and ends the iteration.
+        the number of images taken is up to two larger than the number of yielded frames. An error
+        of an image or of the iterable is raised after the frames of all earlier images, and ends
+        the iteration.
 
         Examples
         --------
@@ -600,7 +602,7 @@ class Renderer:
         Returns
         -------
         Image
-            This renderer accepts it in place of an image. Calls with it do not compare bytes.
+            This renderer accepts it in place of an array. Calls do not compare its bytes.
 
         Raises
         ------
@@ -610,7 +612,7 @@ class Renderer:
         TypeError
             The image has another dtype.
         OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. After any but a lost device the renderer can be used again.
+            The device failed. The renderer can be used again unless the device is lost.
 
         See Also
         --------
@@ -628,7 +630,7 @@ class Renderer:
         True
         """
         if isinstance(image, Image):
-            raise TypeError("image: it was uploaded already")
+            raise TypeError("image: the image was uploaded already; pass it to apply")
         shape, dtype = image_kind(image)
         height, width, channels = shape
         source = self._core.upload(image_source(image, mask, emission), None, False)
@@ -671,7 +673,7 @@ class Renderer:
 
         Notes
         -----
-        As of `apply_many`.
+        As for `apply_many`.
 
         Examples
         --------
@@ -695,7 +697,7 @@ class Renderer:
         shading: Shading = "forward",
         attachments: Literal["all"] | str | Sequence[str] = "all",
     ) -> Plan:
-        """Return what a call would do, without rendering.
+        """Return the framebuffers and the passes of a call, without rendering.
 
         Parameters
         ----------
@@ -728,7 +730,7 @@ class Renderer:
 
         See Also
         --------
-        render, apply : Do what was planned.
+        render, apply : Run the plan.
 
         Notes
         -----
@@ -794,7 +796,7 @@ class Renderer:
         reduce: Mapping[str, Callable[[Frames], Any]] | None = None,
         progress: bool | None = None,
     ) -> xarray.Dataset:
-        """Render every combination of some values.
+        """Render every combination of values of some settings.
 
         Parameters
         ----------
@@ -805,9 +807,9 @@ class Renderer:
             The settings that the axes change. Default: ``Separable()``.
         axes : mapping of str to sequence
             Values by settings field, or by "time" for a scene. The axis "preset" has names of
-            `vkbloom.presets`, the axis "settings" a list of Settings of any methods. These two axes
-            exclude each other and the argument `settings`. Other axes change each of their
-            settings.
+            `vkbloom.presets`, the axis "settings" a list of Settings of any methods. Only one of
+            these two axes and the argument `settings` can be given. All other axes change the
+            settings of these axes, too.
         mask, emission : ndarray, optional
             Of all images, as for `apply`.
         size : (int, int), optional
@@ -816,7 +818,8 @@ class Renderer:
             Of a scene, as for `render`.
         attachments : "all" or sequence of str
             The framebuffers to keep. Each must have the same shape at all points. Its dtype must be
-            uint8 at all points or a float at all points; floats get the largest of their dtypes.
+            uint8 at all points, or a float type at all points. Floats are stored in the largest of
+            their dtypes.
         reduce : mapping of str to callable, optional
             Figures to keep, by name. Each callable gets the `Frames` of a point and returns a
             number or a small array. `vkbloom.reductions` has several. With ``attachments=()`` only
@@ -856,8 +859,8 @@ class Renderer:
 
         Notes
         -----
-        Points are rendered in the order that runs the fewest passes, whatever the order of the
-        axes. For grids that are larger than the memory see `vkbloom.grid_to_zarr`.
+        Points are rendered in the order that runs the fewest passes; the order of the axes does not
+        matter. For grids that are larger than the memory, use `vkbloom.grid_to_zarr`.
 
         Examples
         --------
@@ -903,7 +906,10 @@ class Renderer:
     def _plan_of(
         self, source: _core.Source, settings: Settings, names: tuple[str, ...] | None
     ) -> _core.Plan:
-        """Return a plan: the last one, if it is the same. In small images it takes most time."""
+        """Return the last plan if it fits, otherwise a new one.
+
+        For small images, making a plan takes most of the time of a call.
+        """
         if (planned := self._planned) is not None:
             last, last_names, plan = planned
             if last is settings and last_names == names and plan.is_of_image(source):
@@ -943,7 +949,7 @@ class Renderer:
         if count != self._saved_pipelines:
             from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
-            # Errors are ignored: without the cache only the next start is slower. A ValueError
+            # Errors are ignored, since the cache only makes the next start faster. A ValueError
             # means that another thread has closed the renderer.
             with contextlib.suppress(_core.Error, ValueError):
                 pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())

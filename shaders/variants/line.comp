@@ -54,7 +54,39 @@ void add_long(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
     }
 }
 
-void main()
+void write(ivec2 pixel, vec4 sum)
+{
+    if (all(lessThan(pixel, imageSize(target))))
+        imageStore(target, pixel, stored(sum));
+}
+
+// The same as with add_short, where a compiler takes longer than the pass: it has one load and one
+// store to translate. sums[tap] is of the pixel that gets this tap of the texel. The number of texels
+// is no constant, so that the loop stays one. Workgroups lie across the lines.
+void blur_rolled()
+{
+    ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, ROLLED_OUTPUTS);
+    ivec2 first = DIRECTION == DIRECTION_VERTICAL ? place : place.yx;
+    float weights[2 * RADIUS + 1];
+    vec4 sums[2 * RADIUS + 1];
+
+    [[unroll]] for (int tap = 0; tap < 2 * RADIUS + 1; ++tap) {
+        weights[tap] = params.kernel[tap >> 2][tap & 3];
+        sums[tap] = vec4(0.0);
+    }
+    if (any(greaterThanEqual(first, imageSize(target))))
+        return;
+    for (int number = 0; number < ROLLED_OUTPUTS + 2 * params.radius; ++number) {
+        vec4 texel = load(first, number - RADIUS);
+        [[unroll]] for (int j = 0; j < 2 * RADIUS; ++j)
+            sums[2 * RADIUS - j] = sums[2 * RADIUS - j - 1] + weights[2 * RADIUS - j] * texel;
+        sums[0] = weights[0] * texel;
+        if (number >= 2 * RADIUS)
+            write(first + (number - 2 * RADIUS) * along(), sums[2 * RADIUS]);
+    }
+}
+
+void blur_unrolled()
 {
     ivec2 first = ivec2(gl_GlobalInvocationID.xy) * (along() * (LINE_OUTPUTS - 1) + 1);
     vec4 sums[LINE_OUTPUTS];
@@ -67,9 +99,14 @@ void main()
         add_short(first, sums);
     else
         add_long(first, sums);
-    [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i) {
-        ivec2 pixel = first + i * along();
-        if (all(lessThan(pixel, imageSize(target))))
-            imageStore(target, pixel, stored(sums[i]));
-    }
+    [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
+        write(first + i * along(), sums[i]);
+}
+
+void main()
+{
+    if (ROLLED != 0)
+        blur_rolled();
+    else
+        blur_unrolled();
 }

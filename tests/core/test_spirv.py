@@ -54,9 +54,9 @@ def test_no_operation_on_floats_may_be_contracted() -> None:
 
 def test_loops_over_arrays_are_unrolled() -> None:
     # Mesa 25 unrolls only what it is told to. An array indexed by the counter of another loop is
-    # in memory, which makes a pass take up to five times as long. The loop over rows, columns or
-    # chunks of an invocation is the only one that is not unrolled.
-    rows = re.compile(r"for \(int (y|chunk) = |^    for \(int x = first\.x - STRIP_RADIUS;")
+    # in memory, which makes a pass take up to five times as long. The loop over rows, columns,
+    # chunks or texels of an invocation is the only one that is not unrolled.
+    rows = re.compile(r"for \(int (y|chunk|number) = |^    for \(int x = first\.x - STRIP_RADIUS;")
     checked = 0
     for shader in sorted((Path(__file__).parents[2] / "shaders" / "variants").iterdir()):
         lines = shader.read_text().splitlines()

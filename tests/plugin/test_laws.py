@@ -121,7 +121,7 @@ def test_the_picture_with_its_bloom(renderer: Renderer) -> None:
     testing.assert_gain(picture, 1 + 0.5 * reference.gain(settings), SMALL)
     mixed = Separable(composite="mix", intensity=0.5, blur_strength=0.1)
     message = fails(testing.assert_additive, bloom_of(renderer, mixed, "final"), probe=SMALL)
-    assert "light is added and none is taken" in message
+    assert "light is added, and none is removed" in message
 
 
 def off_by(*amounts: float) -> Bloom:
@@ -234,7 +234,7 @@ class TestBrokenLaws:
 
     def test_fireflies(self) -> None:
         message = fails(testing.assert_bounded_fireflies, BOX, 2.0, SMALL)
-        assert "lifts others by 2 at most" in message
+        assert "brightens others by 2 at most" in message
         clamped = in_floats(lambda image: BOX(np.minimum(image, 9.0)))
         testing.assert_bounded_fireflies(clamped, 1.0, SMALL, brightness=(1, 1e4, math.inf))
         fails(testing.assert_bounded_fireflies, clamped, 0.9, SMALL)
@@ -273,7 +273,7 @@ class TestBrokenLaws:
 
     @pytest.mark.parametrize("assertion", [testing.assert_separable, testing.assert_centroid_kept])
     def test_black(self, assertion: Callable[..., None]) -> None:
-        with pytest.raises(AssertionError, match="a lit pixel gives light"):
+        with pytest.raises(AssertionError, match="the bloom of a lit pixel is not black"):
             assertion(np.zeros_like)
 
     @pytest.mark.parametrize("assertion", [testing.assert_centroid_kept, testing.assert_spread])

@@ -435,7 +435,7 @@ def test_unnamed(frame_regression):
         # In any order of the tests.
         for name, adapters in (
             ("other", f"Mesa 25, {cpu_vendor()}; now: My engine, {cpu_vendor()}"),
-            ("unnamed", "arrays that name no adapter, *; now: arrays that name no adapter, *"),
+            ("unnamed", "arrays without an adapter, *; now: arrays without an adapter, *"),
         ):
             result.stdout.fnmatch_lines(
                 [

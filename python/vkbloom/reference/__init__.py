@@ -1,6 +1,6 @@
 """The bloom methods in NumPy and float64, written only from the formulas.
 
-It is slow, simple and independent of the device code. Tests compare pictures with it.
+It is slow, simple and independent of the device code. Tests compare rendered images with it.
 
 `apply` returns all framebuffers of an image, `passes` and `blur` only those of the blur,
 `composite` the final image, `gain` the bloom of a flat image of 1, and `shade` the light of the

@@ -50,7 +50,7 @@ def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
 
 
 def gain(settings: BevyBloom) -> float:
-    """Return what a flat image of 1 becomes.
+    """Return the bloom of a flat image of 1.
 
     The groups' weights darken it to 0.5 / (1 + 0.5 / 4) + 4 * 0.125 / (1 + 0.125 / 4) = 0.929.
     """

@@ -54,7 +54,7 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
 
 
 def gain(settings: BlenderGlare) -> float:
-    """Return what a flat image of 1 becomes: the threshold may change it, the levels do not."""
+    """Return the bloom of a flat image of 1: the threshold may change it, the levels do not."""
     return float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
 
 

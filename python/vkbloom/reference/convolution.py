@@ -39,7 +39,7 @@ def passes(source: BlurInput, settings: ConvolutionSettings) -> dict[str, Array]
 
 
 def gain(settings: ConvolutionSettings, size: tuple[int, int]) -> Array:
-    """Return what a flat image of 1 becomes far from a boundary of zeros: the kernel's sums."""
+    """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums."""
     one = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
     sums: Array = one * settings.kernel(size).sum(axis=(0, 1))
     return sums

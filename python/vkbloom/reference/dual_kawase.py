@@ -34,7 +34,7 @@ def passes(source: BlurInput, settings: DualKawase) -> dict[str, Array]:
 
 
 def gain(settings: DualKawase) -> float:
-    """Return what a flat image of 1 becomes: 1, since the weights of both filters sum to 1."""
+    """Return the bloom of a flat image of 1: 1, since the weights of both filters sum to 1."""
     return 1.0
 
 

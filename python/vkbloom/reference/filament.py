@@ -59,7 +59,7 @@ def passes(source: BlurInput, settings: FilamentBloom) -> dict[str, Array]:
 
 
 def gain(settings: FilamentBloom) -> float:
-    """Return what a flat image of 1 becomes: what passes the threshold."""
+    """Return the bloom of a flat image of 1: what passes the threshold."""
     if settings.threshold is None:
         return 1.0
     kept = max(0.0, 1.0 - settings.threshold)

@@ -112,8 +112,8 @@ def apply(
     colours (such as a clamp against overflow) do not apply to alpha.
 
     Every store to a bloom buffer clamps: to 0..1 in "rgba8unorm", to +-65504 in "rgba16float". Only
-    "rg11b10ufloat" also rounds to the steps of the format. Published methods store only their
-    levels in that format: their "glow" and "bloom" are not rounded.
+    "rg11b10ufloat" also rounds to the steps of the format. Published methods use this format only
+    for their levels, so their "glow" and "bloom" are not rounded.
 
     Parameters
     ----------
@@ -131,10 +131,9 @@ def apply(
     -------
     dict of str to ndarray of float64
         In the order of the data flow: "glow", those of the stages of glare, those of `passes`, then
-        "final". The values are
-        in real units: 0..1 for unorm formats. Bloom buffers have 4 channels. Their alpha is 1,
-        except with ``settings.alpha`` "blur". "final" has the image's channels. With
-        ``settings.bloom`` off there is only "final".
+        "final". The values are in real units: 0..1 for unorm formats. Bloom buffers have 4
+        channels. Their alpha is 1, except with ``settings.alpha`` "blur". "final" has the image's
+        channels. With ``settings.bloom`` off there is only "final".
 
     Raises
     ------
@@ -147,7 +146,8 @@ def apply(
     See Also
     --------
     passes : Only the blur.
-    composite : Only the last step. vkbloom.Renderer.apply : The same on a device.
+    composite : Only the last step.
+    vkbloom.Renderer.apply : The same on a device.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def apply(
     blurred = method.passes(BlurInput(glow, (width, height), store, weights), settings)
     stages = glare.stages(_glowing(glow, settings, weights), settings.glare, format)
     framebuffers = _with_alphas({"glow": glow, **stages, **blurred})
-    # The share of the scene from which the bloom is made.
+    # The share of the scene that is the source of the bloom.
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     bloom = framebuffers["bloom"]
     if settings.glare:
@@ -195,7 +195,7 @@ def apply(
 
 
 def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
-    """Return what the stages of glare read: published methods have not thresholded the glow."""
+    """Return the input of the stages of glare; published methods do not threshold the glow."""
     if not _METHODS[settings.method].published:
         return glow
     return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
@@ -322,7 +322,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     Returns
     -------
     float, or ndarray of float64, shape (3,)
-        Of `vkbloom.Convolution` one number for each channel, without a boundary's effect.
+        For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
 
     See Also
     --------

@@ -1,4 +1,4 @@
-"""The stages of glare: light beside the bloom, from what glows."""
+"""The stages of glare: light that is added to the bloom, computed from the glow."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]
     Parameters
     ----------
     source : ndarray of float64, shape (H, W, C)
-        What glows, at the size of the bloom buffers, with threshold and mask.
+        The thresholded and masked image, at the size of the bloom buffers.
     glare : sequence of vkbloom.Glare
     format : str
         Of the bloom buffers.
@@ -35,7 +35,7 @@ def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]
     Returns
     -------
     dict of str to ndarray of float64
-        By the stage's name, with a number where there are several of its kind.
+        By the stage's name, with a number if there are several stages of the same class.
     """
     store = storage(stage_format(format))
     counts = Counter(stage.stage for stage in glare)
@@ -71,7 +71,7 @@ def light(bloom: Array, intensity: float, images: Sequence[Array], glare: Sequen
 
 
 def _lights(glare: Sequence[Any]) -> list[Any]:
-    """Return the stages that have light of their own."""
+    """Return the stages that add light: all but dirt."""
     return [stage for stage in glare if stage.stage != "dirt"]
 
 
@@ -94,7 +94,7 @@ def _above(image: Array, threshold: float) -> Array:
 
 
 def _moved(image: Array, x: float, y: float) -> Array:
-    """Return the image at places (x, y) texels further, bilinearly, with 0 outside of it."""
+    """Return the image shifted by (x, y) texels, bilinearly, with 0 outside of the image."""
     height, width, _ = image.shape
     left, top = int(np.floor(x)), int(np.floor(y))
     total = np.zeros_like(image)
@@ -137,7 +137,7 @@ def _streaks(image: Array, stage: Any, store: Storage) -> Array:
 
 
 def _colours(tap: int, less: float, channels: int) -> Array:
-    """Return the factors of the channels at a tap: red, blue and green in turn keep theirs."""
+    """Return the factors of the channels at a tap: in turn, red, blue or green is kept."""
     factors = np.ones(channels)
     if tap > 0:
         factors[:3] = less
@@ -146,14 +146,14 @@ def _colours(tap: int, less: float, channels: int) -> Array:
 
 
 def _places(image: Array) -> tuple[Array, Array]:
-    """Return the places of the pixels along x and y less the centre's, as shares of the sides."""
+    """Return the pixels' offsets from the centre along x and y, as shares of the sides."""
     height, width, _ = image.shape
     x, y = ((np.arange(side) + 0.5) / side - 0.5 for side in (width, height))
     return np.meshgrid(x, y)
 
 
 def _read(image: Array, x: Array, y: Array) -> Array:
-    """Return the image at places, bilinearly, with 0 outside of it."""
+    """Return the image at positions, bilinearly, with 0 outside of the image."""
     height, width, _ = image.shape
     total = np.zeros_like(image)
     column, row = (x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5
@@ -169,7 +169,7 @@ def _read(image: Array, x: Array, y: Array) -> Array:
 
 
 def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
-    """Return what a ghost or the halo sees at places: red and blue apart, above the threshold."""
+    """Return the input of a ghost or halo: red and blue are shifted, the threshold subtracted."""
     length = np.hypot(x, y)
     moved = stage.aberration / np.where(length > 0, length, np.inf)
     light = _read(image, x, y)
@@ -181,7 +181,7 @@ def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
 
 
 def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
-    """Return the sum of the pictures read at 1/2 + s (p - 1/2)."""
+    """Return the sum of the ghosts: the image read at 1/2 + s (p - 1/2)."""
     x, y = _places(image)
     total = np.zeros_like(image)
     for scale, tint in stage.ghosts:
@@ -195,7 +195,7 @@ def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
 
 
 def _halo(image: Array, stage: Any, store: Storage) -> Array:
-    """Return what lies `radius` further towards the centre, weighted by a ring of that radius."""
+    """Return the image shifted by `radius` to the centre, weighted by a ring of that radius."""
     height, width, _ = image.shape
     x, y = _places(image)
     across, down = x * width / height, y

@@ -36,7 +36,7 @@ def passes(source: BlurInput, settings: GodotBloom) -> dict[str, Array]:
     least 0. Strength and exposure follow, then the factor
     max(smoothstep(threshold, threshold + scale, max(c)), bloom) and the cap. The bloom is the
     weighted sum of the levels, enlarged by the cubic B-spline or bilinearly. Weights up to 0.0001
-    count as 0.
+    are replaced by 0.
     """
     height, width, channels = source.image.shape
     framebuffers: dict[str, Array] = {}
@@ -56,7 +56,7 @@ def passes(source: BlurInput, settings: GodotBloom) -> dict[str, Array]:
 
 
 def gain(settings: GodotBloom) -> float:
-    """Return what a flat image of 1 becomes."""
+    """Return the bloom of a flat image of 1."""
     value, total = np.ones((1, 1, 1)), 0.0
     for level, weight in enumerate(_weights(settings)):
         value = _first(value, settings) if level == 0 else _later(value, settings)

@@ -45,7 +45,7 @@ def passes(source: BlurInput, settings: KinoBloom) -> dict[str, Array]:
 
 
 def gain(settings: KinoBloom, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: the result of the threshold, times the levels."""
+    """Return the bloom of a flat image of 1: the result of the threshold, times the levels."""
     bright = _threshold(np.ones((1, 1, 1)), settings)
     return float(bright[0, 0, 0]) * _count_and_step(settings, size[1])[0]
 

@@ -48,7 +48,7 @@ def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
 
 
 def gain(settings: PygfxBloom, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: the number of levels."""
+    """Return the bloom of a flat image of 1: the number of levels."""
     return float(_level_count(settings, size))
 
 

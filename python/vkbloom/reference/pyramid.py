@@ -67,7 +67,7 @@ def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
 
 
 def gain(settings: Pyramid, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: 1, since the weights of every filter sum to 1.
+    """Return the bloom of a flat image of 1: 1, since the weights of every filter sum to 1.
 
     With level weights, it is the sum of the weights of the existing levels.
     """

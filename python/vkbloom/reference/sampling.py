@@ -33,8 +33,8 @@ def sample(
     """Sample an image with taps around the pixel centres of another one, and add them.
 
     The pixel (i, j) of the result has its centre at ((i + 0.5) / width, (j + 0.5) / height) in
-    normalized coordinates. In texels of the image that is read, with texel n at n and w texels in a
-    row, this is (i + 0.5) / width * w - 0.5. Between texels the value is the linear interpolation
+    normalized coordinates. In an image with w texels in a row, whose texel n is at position n, this
+    is (i + 0.5) / width * w - 0.5 texels. Between texels the value is the linear interpolation
     of the two nearest texels along each axis (the Vulkan specification, chapter "Image Operations",
     section "Texel Filtering", of linear filters). Outside of the image it is the value at the edge.
 

@@ -55,7 +55,7 @@ def passes(source: BlurInput, settings: Separable) -> dict[str, Array]:
 
 
 def gain(settings: Separable) -> float:
-    """Return what a flat image of 1 becomes: the sum over the layers of s * g^(2 loops).
+    """Return the bloom of a flat image of 1: the sum over the layers of s * g^(2 loops).
 
     g is the sum of the effective kernel: 1.3865 with the default weights, so that the result is
     1.922.

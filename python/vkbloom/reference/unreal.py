@@ -57,7 +57,7 @@ def passes(source: BlurInput, settings: UnrealBloom) -> dict[str, Array]:
 
 
 def gain(settings: UnrealBloom) -> float:
-    """Return what a flat image of 1 becomes: about 3, as the kernels sum to nearly 1."""
+    """Return the bloom of a flat image of 1: about 3, because each kernel sums to nearly 1."""
     value, total = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]), 0.0
     for k, factor in enumerate(_factors(settings.radius)):
         value *= sum(weight for _, weight in _kernel(k)) ** 2

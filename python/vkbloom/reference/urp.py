@@ -47,7 +47,7 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
 
 
 def gain(settings: UrpBloom, size: tuple[int, int]) -> float:
-    """Return what a flat image of 1 becomes: the threshold may change it, the mixes do not."""
+    """Return the bloom of a flat image of 1: the threshold may change it, the mixes do not."""
     count = _level_count(settings, halved(size))
     first = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0])
     kernel = _WEIGHTS[0] + 2 * sum(_WEIGHTS[1:])

@@ -28,7 +28,7 @@ class Verdict:
     reasons : tuple of str
         One reason for each failed check.
     warning : str or None
-        A text if the framebuffer passed but differs by more than `Tolerances.warn`.
+        Text of a warning if the framebuffer passed but differs by more than `Tolerances.warn`.
     comparison : Comparison or None
         The figures; None if shapes or dtypes differ, or one image is missing.
     atol, rtol : float
@@ -71,8 +71,8 @@ def judge(
     Returns
     -------
     tuple of Verdict
-        In the order of `actual`; a framebuffer that only the reference has follows its predecessor
-        there.
+        In the order of `actual`. A framebuffer that only the reference has comes after the
+        framebuffer that precedes it in the reference.
     """
     return tuple(
         _of_missing(name, is_expected=name in expected)

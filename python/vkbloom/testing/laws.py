@@ -33,9 +33,9 @@ _DEFAULT = Probe()
 def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     """Assert that the bloom of a mixture of two images is the mixture of their blooms.
 
-    The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise; additivity and
-    homogeneity together, that is, linearity (Oppenheim and Willsky, "Signals and Systems", chapter
-    1). A method with a threshold, a clamp or a firefly filter is not linear.
+    The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise. This is linearity:
+    additivity and homogeneity (Oppenheim and Willsky, "Signals and Systems", chapter 1). A method
+    with a threshold, a clamp or a firefly filter is not linear.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     AssertionError: assert_superposition: ...
     """
     __tracebackhide__ = True
-    # Otherwise halves and quarters of the values would be rounded in the test images.
+    # Otherwise the dtype would round halves and quarters of the values in the test images.
     a, b = (_divisible_by_four(probe, probe.noise(index, probe.value)) for index in (0, 1))
     whole, whole_error = probe.apply(bloom, a / 2 + b / 4)
     of_a, error_a = probe.apply(bloom, a)
@@ -90,24 +90,24 @@ def assert_additive(
     intensity: float = 1.0,
     probe: Probe = _DEFAULT,
 ) -> None:
-    """Assert that a picture with bloom is the picture plus the bloom.
+    """Assert that an image with bloom is the image plus the bloom.
 
-    The law: F(a) = a + intensity * G(a), for an image of noise, where F is the picture with bloom
+    The law: F(a) = a + intensity * G(a), for an image of noise, where F is the image with bloom
     and G the bloom alone. This is additive blending, as glare in a camera or an eye adds light
     (Spencer et al., "Physically-Based Glare Effects for Digital Images", SIGGRAPH 1995). Without G
-    the law is F(a) >= a: light is added and none is removed. A mix removes light from bright
-    pixels and fails.
+    the law is F(a) >= a: light is added and none is removed. The composite "mix" removes light from
+    bright pixels, so it does not obey this law.
 
     Parameters
     ----------
     bloom : callable
-        Maps an image to the picture with bloom.
+        Maps an image to the image with bloom.
     glow : callable, optional
         Maps an image to the bloom alone.
     intensity : float
-        Factor of the bloom in the picture, 0 or more.
+        Factor of the bloom, 0 or more.
     probe : Probe
-        With integers, `value` must be low enough that picture plus bloom is not clamped.
+        With integers, `value` must be low enough that image plus bloom is not clamped.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def assert_additive(
     if glow is None:
         compare_with_law(
             "assert_additive",
-            "F(a) >= a: light is added and none is taken",
+            "F(a) >= a: light is added, and none is removed",
             picture,
             np.maximum(picture, image),
             error,
@@ -155,8 +155,8 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
     """Assert the gain of flat images.
 
     The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, half and a
-    quarter of it. The gain is the sum of the kernel's weights; it is the same at the border if the
-    image is continued by its edge. A gain of 1 keeps the energy.
+    quarter of it. The gain is the sum of the kernel's weights. At the border it is the same if the
+    method clamps to the edge. A gain of 1 keeps the energy.
 
     Parameters
     ----------
@@ -210,8 +210,8 @@ def assert_symmetric(
 ) -> None:
     """Assert that the bloom of a mirrored image is the mirrored bloom.
 
-    The law: B(M a) = M B(a), for an image of noise and each reflection M. It fails for a kernel
-    that is not symmetric, and for a shift by a part of a pixel, such as a missing half-texel.
+    The law: B(M a) = M B(a), for an image of noise and each reflection M. A kernel that is not
+    symmetric does not obey it, nor does a shift by a part of a pixel, such as a missing half texel.
 
     Parameters
     ----------
@@ -257,12 +257,12 @@ def assert_symmetric(
 
 
 def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
-    """Assert that an edge gets no dark or bright line beside it.
+    """Assert that the bloom of an edge has no dark or bright line beside the edge.
 
-    The law: across a step from black to `probe.value`, along x and along y, values never fall, and
-    they stay between those of the black and of the flat bright image. It holds if no weight of the
-    kernel is negative (Mitchell and Netravali, "Reconstruction Filters in Computer Graphics",
-    SIGGRAPH 1988, on ringing).
+    The law: across a step from black to `probe.value`, along x and along y, values do not decrease.
+    They stay between the values of the black image and of the flat bright image. The law holds if
+    no weight of the kernel is negative (Mitchell and Netravali, "Reconstruction Filters in Computer
+    Graphics", SIGGRAPH 1988, on ringing).
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
             border=border,
         )
         inside = result[inner]
-        # The running maximum, below which no later value may lie.
+        # The running maximum. No later value may be lower.
         compare_with_law(
             "assert_no_ringing",
             f"along {across}, values only rise across a step from black to bright",
@@ -331,24 +331,25 @@ def assert_bounded_fireflies(
 ) -> None:
     """Assert that one very bright pixel brightens other pixels by a limited amount.
 
-    The law: with a pixel of brightness L on a dark image, no other pixel rises by more than
-    `limit`, for each L and each position of the pixel. A linear bloom has no such limit, because
-    it spreads a share of L; in an animation the pixel flickers. An average weighted by
-    1 / (1 + luminance) (Karis, "Tone Mapping", 2013) or a clamp sets a limit.
+    The law: with a pixel of brightness L on a dark image, no other pixel becomes brighter by more
+    than `limit`, for each L and each position of the pixel. A linear bloom has no such limit,
+    because it spreads a share of L. In an animation, such a pixel flickers. Methods limit the
+    effect by a clamp, or by an average weighted by 1 / (1 + luminance) (Karis, "Tone Mapping",
+    2013).
 
     Parameters
     ----------
     bloom : callable
         Takes an image and returns one of the same height and width.
     limit : float
-        The largest allowed rise of another pixel, in real units.
+        The largest allowed increase of another pixel, in real units.
     probe : Probe
         A probe of floats; `value` is not used.
     brightness : sequence of float
-        The values of L. Infinity is allowed: values that are not finite must not spread.
+        The values of L. Infinity is allowed: it must not spread either.
     period : int
-        The pixel is tried at period x period positions, because the result of a chain of halved
-        images depends on the position: 2 for one halving, 4 for two.
+        The law is tested at period x period positions of the pixel, because the result of a chain
+        of halved images depends on the position. Use 2 for one halving and 4 for two.
 
     Raises
     ------
@@ -381,8 +382,8 @@ def assert_bounded_fireflies(
             result, error = probe.apply(bloom, image, exempt=place)
             compare_with_law(
                 "assert_bounded_fireflies",
-                f"a pixel of {light:g} at x {place[0]}, y {place[1]} lifts others by {limit:g} at "
-                "most",
+                f"a pixel of {light:g} at x {place[0]}, y {place[1]} brightens others by "
+                f"{limit:g} at most",
                 result,
                 np.minimum(result, dark + limit),
                 error + dark_error,
@@ -399,7 +400,7 @@ def compare_with_law(
     border: int = 0,
     note: str = "",
 ) -> None:
-    """Raise AssertionError with figure, position and law unless all values are as expected.
+    """Raise AssertionError with the deviation, its position and the law if a value is wrong.
 
     Parameters
     ----------

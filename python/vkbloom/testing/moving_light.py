@@ -1,4 +1,4 @@
-"""How steady the bloom of a light is that moves by parts of a pixel."""
+"""Measures the bloom of a light that moves by fractions of a pixel."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Sequence = Callable[[list[NDArray[Any]]], Iterable[NDArray[Any]]]
 PATHS: Final = ("x", "y", "xy")
 # Side of the light in pixels.
 _LIGHT: Final = 0.5
-# Where there is less than this share of the brightest bloom's light, it has no place or radius.
+# A bloom with less than this share of the light of the brightest bloom has no centroid or radius.
 _DIM: Final = 1e-3
 
 
@@ -32,8 +32,8 @@ _DIM: Final = 1e-3
 class Stability:
     """Figures of the bloom of a light that moves along x, along y and along both.
 
-    There are 3 paths of N positions each. All figures are of the first channel, less the bloom of
-    a black image.
+    There are 3 paths of N positions each. All figures are computed from the first channel, after
+    the bloom of a black image is subtracted.
 
     Parameters
     ----------
@@ -42,17 +42,17 @@ class Stability:
     energy : ndarray of float64, shape (3, N)
         Sum of the bloom.
     shift : ndarray of float64, shape (3, N, 2)
-        Centroid of the bloom less that of the image that was given, in pixels; NaN where there is
-        no light.
+        Centroid of the bloom minus the centroid of the input image, in pixels; NaN without light.
     peak : ndarray of float64, shape (3, N)
         The largest value of the bloom.
     radius : ndarray of float64, shape (3, N)
-        Root mean square distance of the bloom's light from its centroid in pixels, with the
-        variance of the light in place of that of the given image, which changes with the light's
-        place in its pixel. NaN where there is no light, or if the variance is negative.
+        Root mean square distance of the bloom's light from its centroid, in pixels. The variance of
+        the input image changes with the position of the light inside its pixel. Therefore it is
+        replaced by the variance of the square light. NaN without light, or if the variance of the
+        bloom is negative.
     at_border : float
         The largest share of the light in the outermost pixels. If it is not small, the image cuts
-        off light, and the other figures are of what is left.
+        off light, and the other figures apply only to the light inside the image.
 
     See Also
     --------
@@ -77,7 +77,7 @@ class Stability:
 
     @property
     def ripple(self) -> float:
-        """Largest less smallest energy, as a share of the mean; NaN without light."""
+        """(largest - smallest energy) / mean energy; NaN without light."""
         return _variation(self.energy)
 
     @property
@@ -87,12 +87,12 @@ class Stability:
 
     @property
     def flicker(self) -> float:
-        """Largest less smallest peak, as a share of the mean; NaN without light."""
+        """(largest - smallest peak) / mean peak; NaN without light."""
         return _variation(self.peak)
 
     @property
     def growth(self) -> float:
-        """Largest less smallest radius, as a share of the mean."""
+        """(largest - smallest radius) / mean radius."""
         return _variation(self.radius)
 
     def __str__(self) -> str:
@@ -119,13 +119,13 @@ def stability(
     settle: int = 0,
     probe: Probe | None = None,
 ) -> Stability:
-    """Measure how steady the bloom of a small moving light is.
+    """Measure how much the bloom of a small moving light changes.
 
-    The light is a square of half a pixel, area-sampled: a pixel has the share of the light that
-    falls on it, so that all images have the same energy. It moves over one texel of the coarsest
-    level along x, along y and along both. Of a convolution the energy and the radius stay the
-    same, the centroid is that of the image, and the peak changes only by how the light falls on
-    the pixels.
+    The light is a square of half a pixel. It is area-sampled: each pixel gets the share of the
+    light that it covers, so all images have the same energy. The light moves over one texel of the
+    coarsest level along x, along y and along both. If the bloom is a convolution, its energy and
+    its radius are constant, and its centroid is that of the image. The peak then changes only
+    because the light is distributed over the pixels in different shares.
 
     Parameters
     ----------
@@ -133,19 +133,19 @@ def stability(
         Takes an image and returns the bloom alone, of the same height and width. With `temporal`:
         takes a list of images, in their order, and returns an iterable of as many blooms.
     texel : int
-        Length of each path in pixels, at least 1: the size of a texel of the coarsest level, 2^N
-        of a chain of N halvings.
+        Length of each path in pixels, at least 1: the size of a texel of the coarsest level. For a
+        chain of N halvings this is 2^N.
     steps : float
         Positions for each pixel of a path, above 0.
     temporal : bool
         Whether `bloom` takes the images of a path as a sequence, as methods with a history do.
     settle : int
-        With `temporal`: how many images with the light at its first position come before each
-        path. They are not measured.
+        With `temporal`: number of images before each path with the light at its first position.
+        They are not measured.
     probe : Probe, optional
-        The kind of image; its `value` is the light's sum over all pixels. With a threshold it has
-        to be large: a quarter of the light, or less, may fall on one pixel. Default: 16 texels
-        wide and high, at least 64 pixels.
+        The kind of image; its `value` is the light's sum over all pixels. For a method with a
+        threshold, it must be large, because a pixel may get only a quarter of the light or less.
+        Default: 16 texels wide and high, at least 64 pixels.
 
     Returns
     -------
@@ -231,7 +231,8 @@ def assert_stable(
     bloom : callable
         As for `stability`.
     ripple, flicker, growth : float
-        Allowed change of energy, peak and radius: largest less smallest, as a share of the mean.
+        Allowed difference of the largest and the smallest energy, peak and radius, relative to
+        the mean.
     jitter : float
         Allowed distance of the centroids in pixels.
     texel, steps, temporal, settle, probe
@@ -248,7 +249,7 @@ def assert_stable(
     See Also
     --------
     stability : Returns the figures.
-    assert_bounded_fireflies : What a single bright pixel may do.
+    assert_bounded_fireflies : The law of a single bright pixel.
 
     Examples
     --------
@@ -267,8 +268,9 @@ def assert_stable(
     if not found.energy.max() > 0:
         fail(
             "assert_stable",
-            "a light gives light",
-            f"the largest sum of the bloom is {found.energy.max():.3g}: none is allowed",
+            "the bloom of a light is not black",
+            f"the largest sum of the bloom is {found.energy.max():.3g}: only sums above 0 are "
+            "allowed",
         )
     check_inside(found.at_border, probe.size)
     told = {
@@ -324,7 +326,7 @@ def _wide(texel: int) -> Probe:
 
 
 def _light(probe: Probe, place: NDArray[np.float64]) -> NDArray[Any]:
-    """Return the image of the light, as the bloom gets it."""
+    """Return the image of the light in the probe's dtype."""
     share = area_sampled(probe.size, (place[0], place[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
     return probe.given(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
 
@@ -375,7 +377,7 @@ def _figures(bloom: Image, probe: Probe, given: NDArray[Any]) -> tuple[float, ..
     image = probe.values(given, given)[0][:, :, 0]
     energy, place, variance = _moments(bloom)
     _, from_place, from_variance = _moments(image)
-    # The variance of the light itself, in place of what sampling it made of that.
+    # Replace the variance of the sampled light by that of the square.
     left = variance - from_variance + _LIGHT**2 / 6
     return (
         energy,
@@ -403,7 +405,7 @@ def _moments(plane: Image) -> tuple[float, tuple[float, float], float]:
 
 
 def _variation(values: NDArray[np.float64]) -> float:
-    """Return largest less smallest, as a share of the mean; NaN if the mean is not above 0."""
+    """Return (largest - smallest) / mean; NaN if the mean is not above 0."""
     known = values[np.isfinite(values)]
     if not (known.size and known.mean() > 0):
         return math.nan
@@ -416,7 +418,7 @@ def _largest(values: NDArray[np.float64]) -> float:
 
 
 def _extremes(found: Stability, values: NDArray[np.float64]) -> str:
-    """Say where the smallest and the largest value are."""
+    """Return a text with the positions of the smallest and the largest value."""
     parts = []
     for index in (np.nanargmin(values), np.nanargmax(values)):
         place = np.unravel_index(int(index), values.shape)

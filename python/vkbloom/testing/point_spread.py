@@ -105,7 +105,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
 
     See Also
     --------
-    point_spread : The image that this law is about.
+    point_spread : Returns the point spread.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column",
         spread,
         product,
-        # Four values enter, none larger than the divisor.
+        # The law has four values. None is larger than the divisor.
         4 * error,
         note=f"; the second singular value is {100 * max(shares):.3g} % of the first",
     )
@@ -145,8 +145,8 @@ def assert_centroid_kept(
     """Assert that the light of a pixel is centred on that pixel.
 
     The law: the centroid of the point spread, sum of h(x, y) (x, y) / sum of h, is the lit pixel.
-    A chain of halved images keeps the centroid only on average over all positions; use a larger
-    `within` for it.
+    A chain of halved images keeps the centroid only on average over all positions. Use a larger
+    `within` for such a method.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def assert_spread(
             profile = spread[:, :, channel].sum(axis=axis)
             distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
             found = _deviation(profile)
-            # The error of the variance; it is 2 sigma times that of the standard deviation.
+            # The error of the variance is 2 sigma times the error of the standard deviation.
             variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
             allowed = rtol * pair[axis] + variance_error / max(2 * found, 1e-6)
             if not abs(found - pair[axis]) <= allowed:
@@ -385,7 +385,7 @@ def response(
     """
     __tracebackhide__ = True
     if not len(values):
-        raise ValueError("values: there are none; give at least one")
+        raise ValueError("values: the sequence is empty; give at least one value")
     rows = []
     for value in values:
         one = functools.partial(bloom, **{parameter: value})
@@ -433,14 +433,14 @@ def _measured(bloom: Bloom, probe: Probe, at: tuple[int, int] | None) -> tuple[I
 
 
 def _check_lit(assertion: str, spread: Image, error: float) -> None:
-    """Fail if there is no light to measure."""
+    """Raise AssertionError if the point spread is black."""
     __tracebackhide__ = True
     for channel in range(spread.shape[2]):
         largest = float(np.abs(spread[:, :, channel]).max())
         if largest <= error or not spread[:, :, channel].sum() > 0:
             fail(
                 assertion,
-                "a lit pixel gives light",
+                "the bloom of a lit pixel is not black",
                 f"the largest value in channel {channel} is {largest:.3g}; more than {error:.3g} "
                 "is needed",
             )

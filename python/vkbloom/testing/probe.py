@@ -39,8 +39,8 @@ class Probe:
     Parameters
     ----------
     size : (int, int)
-        Width and height in pixels. Laws of the complete point spread need an image whose border no
-        light reaches.
+        Width and height in pixels. For laws of the complete point spread, no light may reach the
+        border of the image.
     channels : int or None
         1 to 4; None: images of shape (H, W). A fourth channel is alpha: it is 1 in all test images
         and ignored in results.
@@ -207,7 +207,7 @@ class Probe:
         return self.values(bloom(given), given, exempt=exempt)
 
     def given(self, image: Image) -> NDArray[Any]:
-        """Return what a bloom gets for an image: in the probe's dtype and number of channels.
+        """Return an image in the probe's dtype and number of channels, as input of a bloom.
 
         Parameters
         ----------
@@ -239,7 +239,7 @@ class Probe:
     def values(
         self, result: object, given: NDArray[Any], *, exempt: tuple[int, int] | None = None
     ) -> tuple[Image, float]:
-        """Check what a bloom returned for an image of `given`.
+        """Check the result of a bloom for the input `given`.
 
         Parameters
         ----------

@@ -52,7 +52,7 @@ class Origin:
     version : str
         Version of vkbloom.
     driver_sha256 : str or None
-        Hash of a driver that draws the same bits on every machine; None for other drivers.
+        Hash of a driver whose results are bit-equal on every machine; None for other drivers.
     """
 
     adapter: str | None
@@ -63,10 +63,10 @@ class Origin:
 
     @property
     def summary(self) -> str:
-        """All fields but the version on one line, and of the hash its start."""
+        """All fields except the version on one line; the hash is shortened."""
         sha256 = f"SHA-256 {self.driver_sha256[:12]}" if self.driver_sha256 else None
         made_by = [text for text in (self.adapter, self.driver, sha256) if text]
-        return ", ".join([*(made_by or ["arrays that name no adapter"]), self.cpu_vendor])
+        return ", ".join([*(made_by or ["arrays without an adapter"]), self.cpu_vendor])
 
     @property
     def machine(self) -> tuple[str | None, ...]:
@@ -226,7 +226,7 @@ class ReferenceFolder:
         pixels = image.reshape(_with_channels(image.shape))
         is_grey = pixels.shape[2] < 3
         if is_grey:
-            # How a picture holds grey: three times, with alpha behind it.
+            # Channels of a grey image in a `Picture`: grey three times, then alpha.
             pixels = pixels[:, :, [0, 0, 0, *range(1, pixels.shape[2])]]
         picture = Picture.of_values(np.ascontiguousarray(pixels), numbers)
         image_writing.save(
@@ -247,7 +247,7 @@ class ReferenceFolder:
         }
         written = self._image(entry, self.file(name))
         if not np.array_equal(written, image, equal_nan=image.dtype.kind == "f"):
-            raise OSError(f"{file}: reading it back gives other values than were written")
+            raise OSError(f"{file}: the values read back differ from the values written")
         return entry
 
     def _write_list(self, name: str, references: Sequence[Mapping[str, Any]]) -> None:
@@ -256,7 +256,7 @@ class ReferenceFolder:
 
 
 def check_name(name: str) -> None:
-    """Raise TypeError or ValueError unless a reference can have the name."""
+    """Raise TypeError or ValueError if the name is not allowed for a reference."""
     if not isinstance(name, str):
         raise TypeError(f"name: {name!r} is not a str")
     if not NAME.fullmatch(name):

@@ -157,9 +157,9 @@ class FrameRegression:
         allow_nan : bool, default False
             Whether NaN and infinity pass if the reference has the same.
         exact : bool, default False
-            Whether every value must be the reference's, by a driver of the same hash, which draws
-            the same bits on every CPU. `Frames` of the package ``vkbloom-lavapipe`` have a hash.
-            Excludes all tolerances.
+            Whether every value must be equal to the reference's. The reference must have been made
+            by a driver with the same hash, whose results are bit-equal on every CPU. `Frames` of
+            the package ``vkbloom-lavapipe`` have a hash. Excludes all tolerances.
         info : mapping of str to str, optional
             "adapter", "driver" and "driver_sha256" that made the images, stored with a new
             reference. `Frames` have their own.
@@ -167,7 +167,8 @@ class FrameRegression:
         Raises
         ------
         AssertionError
-            The frames differ, or there is no reference; the message says where and what to do.
+            The frames differ, or there is no reference. The message names the position and the
+            remedy.
         TypeError, ValueError
             An argument is wrong, or a reference's file is damaged; with `exact`, the driver of the
             frames has no hash, or no reference has the same one.
@@ -317,21 +318,22 @@ class FrameRegression:
     def _of_one_driver(self, references: list[Reference], given: _Given) -> list[Reference]:
         """Return the references that the driver of the given frames made.
 
-        Raises ValueError where exact values cannot be expected of what was given.
+        Raises ValueError if the driver has no hash, or no reference has the same hash.
         """
         origin = given.origin
         if not origin.driver_sha256:
             raise ValueError(
-                f"exact: the driver of the frames has no hash ({origin.summary}), and may draw "
-                "other bits elsewhere; use the driver of vkbloom-lavapipe, or tolerances"
+                f"exact: the driver of the frames has no hash ({origin.summary}), so its "
+                "results may differ between machines; use the driver of vkbloom-lavapipe, or "
+                "tolerances"
             )
         same = [one for one in references if one.origin.driver_sha256 == origin.driver_sha256]
         if references and not same and not (self._mode.update or self._mode.add):
             made_by = "; ".join(one.origin.summary for one in references)
             raise ValueError(
                 f"exact: {self._folder.file(given.name)} has no reference of the frames' driver "
-                f"({origin.summary}), only of {made_by}; install that one's vkbloom-lavapipe, or "
-                "write a reference with --bloom-update or --bloom-add"
+                f"({origin.summary}), only of {made_by}; install that version of "
+                "vkbloom-lavapipe, or write a reference with --bloom-update or --bloom-add"
             )
         return same
 
@@ -344,7 +346,7 @@ class FrameRegression:
         if not self._mode.allow_missing:
             record["message"] = message = (
                 f"{given.name}: there is no reference {self._folder.file(given.name)}. Create it "
-                "with --bloom-update, look at it, and commit it with the tests"
+                "with --bloom-update, view it, and commit it with the tests"
             )
             raise AssertionError(message)
 
@@ -409,7 +411,7 @@ class FrameRegression:
 
 
 def name_of_test(test: str) -> str:
-    """Make the name of a reference from a test's name.
+    """Return the name of a reference for a test's name.
 
     Parameters
     ----------
@@ -469,7 +471,7 @@ def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
 def _closest(
     references: Sequence[Reference], given: _Given
 ) -> tuple[Reference, tuple[Verdict, ...]]:
-    """Return a reference that matches, or else the one that fails latest in the data flow."""
+    """Return a reference that matches; otherwise the one that fails last in the data flow."""
     judged = [(each, judge(each.images, given.images, given.tolerances)) for each in references]
 
     def depth(pair: tuple[Reference, tuple[Verdict, ...]]) -> float:

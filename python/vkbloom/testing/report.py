@@ -60,7 +60,7 @@ def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
         json.dumps(_plain(ordered), indent=2, allow_nan=False) + "\n", encoding="utf-8"
     )
     page = folder / "index.html"
-    # Written piece by piece, so that not all pictures are in memory at once.
+    # Written in pieces, so that the memory holds only a few images at a time.
     with page.open("w", encoding="utf-8") as stream:
         for piece in _page(ordered, parts):
             stream.write(piece)
@@ -233,8 +233,8 @@ def _pictures(group: str, figures: Figures, shown: Shown) -> Iterable[str]:
     yield "</div>\n"
     if shown["shrunk"]:
         yield (
-            "<p>The pictures are smaller than the framebuffer: of a group of pixels they show the "
-            "mean, in the difference and in FLIP the largest.</p>\n"
+            "<p>The images are smaller than the framebuffer. Each pixel is the mean of a group of "
+            "pixels; in the difference and in FLIP, it is the largest value of the group.</p>\n"
         )
     if shown["flip_note"] is not None:
         yield f"<p>FLIP: {_text(shown['flip_note'])}</p>\n"

@@ -1,6 +1,6 @@
-"""The report's part of one check: figures of all framebuffers, pictures of those that differ.
+"""One check in the report: figures of all framebuffers, and images of those that differ.
 
-Written in the process that ran the test, because only that one has the images.
+The process that ran the test writes these parts, because only this process has the images.
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ class Shown(TypedDict):
     expected: str | None
     actual: str | None
     difference: str | None
-    magnified: float  # what the differences are multiplied with
+    magnified: float  # factor of the differences
     shrunk: bool  # pictures are smaller than the framebuffer
     flip: str | None
-    flip_note: str | None  # why there is no map
+    flip_note: str | None  # reason for a missing map
     flip_mean: float | None
     histogram: Histogram | None
     worst: dict[str, str]  # surroundings of the worst pixel by kind of picture
-    worst_at: list[int] | None  # its place in them, x and y
+    worst_at: list[int] | None  # its x and y in these images
     worst_expected: list[float]  # its channels
     worst_actual: list[float]
 
@@ -230,7 +230,7 @@ def _picture(name: str, image: NDArray[Any] | None, range_of: NDArray[Any] | Non
 
 
 def _colours(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Remove alpha, so that it hides nothing."""
+    """Remove alpha, so that no pixel is transparent."""
     return pixels[:, :, : 3 if pixels.shape[2] >= 3 else 1]
 
 

@@ -1,4 +1,4 @@
-"""Whether a bloom keeps its look at other resolutions."""
+"""Measures whether a bloom depends on the resolution."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FINE: Final = 512
 class ResolutionResponse:
     """Figures of the bloom of one scene at several sizes.
 
-    All figures are of the first channel, less the bloom of a black image.
+    All figures are computed from the first channel, after the bloom of a black image is subtracted.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class ResolutionResponse:
         Radius around the centroid that has 50 % and 90 % of the bloom's light, as a share of the
         height; NaN without light.
     peak : ndarray of float64, shape (N,)
-        The largest value of the bloom, as a share of the light's.
+        The largest value of the bloom relative to the value of the light.
 
     See Also
     --------
@@ -77,8 +77,8 @@ def resolution_response(
 ) -> ResolutionResponse:
     """Measure the bloom of one scene at several sizes.
 
-    The scene is a bright square in the middle of a black picture. It is area-sampled: each image
-    is the exact box reduction of the larger ones, also where a pixel covers a part of another.
+    The scene is a bright square in the middle of a black image. It is area-sampled: each image
+    is the exact box-filtered reduction of the larger ones, also by factors that are not integers.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def resolution_response(
 
     Examples
     --------
-    The radius of this blur is in pixels, and half the share of twice the height:
+    The radius of this blur is fixed in pixels, so at twice the height its share is half as large:
 
     >>> from vkbloom import reference, testing
     >>> def bloom(image):
@@ -146,9 +146,9 @@ def assert_resolution_independent(
 ) -> None:
     """Assert that a bloom looks the same at all sizes of the frame.
 
-    The law: the radii that have 50 % and 90 % of the light are the same share of the height at
-    all sizes, and so is the peak of the bloom. A radius that is set in pixels breaks it, and so
-    does a number of levels that does not follow the height.
+    The law: the radii that contain 50 % and 90 % of the light are the same share of the height at
+    all sizes, and the peak of the bloom is the same. A method with a radius in pixels, or with a
+    number of levels that does not depend on the height, does not obey it.
 
     Parameters
     ----------
@@ -157,7 +157,8 @@ def assert_resolution_independent(
     scales, light, probe
         As for `resolution_response`.
     radius, peak : float
-        Allowed change of both radii and of the peak: largest less smallest, as a share of the mean.
+        Allowed difference of the largest and the smallest value, relative to the mean, for both
+        radii and for the peak.
 
     Raises
     ------
@@ -194,8 +195,8 @@ def assert_resolution_independent(
         if not values.mean() > 0:
             fail(
                 "assert_resolution_independent",
-                "a light gives light",
-                f"{what} is {values.min():.3g} of {share}: none is allowed",
+                "the bloom of a light is not black",
+                f"{what} is {values.min():.3g} of {share}: only values above 0 are allowed",
             )
         low, high = int(values.argmin()), int(values.argmax())
         change = (values[high] - values[low]) / values.mean()
@@ -211,7 +212,7 @@ def assert_resolution_independent(
 
 def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, int], ...]:
     if not len(scales):
-        raise ValueError("scales: there are none; give at least one")
+        raise ValueError("scales: the sequence is empty; give at least one scale")
     found = []
     for scale in scales:
         check_number("scales", scale, 1e-3, 1e3)
@@ -219,7 +220,7 @@ def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, i
         if not (width.is_integer() and height.is_integer() and min(width, height) >= 1):
             raise ValueError(
                 f"scales: {scale!r} makes {width:g} x {height:g} of an image of {_shown(size)}, "
-                "which are not integers"
+                "not integers; choose a scale or a size with integer sides"
             )
         found.append((int(width), int(height)))
     return tuple(found)
@@ -230,7 +231,7 @@ def _radii(plane: Image, shares: Sequence[float]) -> list[float]:
     total = float(plane.sum())
     if not total > 0:
         return [math.nan] * len(shares)
-    # A pixel's light lies on all of it, not in its middle, which counts where pixels are few.
+    # The light is spread over the area of a pixel. This matters if there are few pixels.
     fine = -(-_FINE // min(plane.shape))
     plane = plane.repeat(fine, axis=0).repeat(fine, axis=1)
     total *= fine**2
