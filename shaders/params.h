@@ -149,9 +149,11 @@
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, shares, 2)
 
+// A pass of dual Kawase. The threshold is for a first level that reads the image itself.
 #define KAWASE_BLOCK(B, READS, INPUT, VEC4S) \
     READS(B, offset) \
-    SAMPLING_ROWS(B, INPUT)
+    SAMPLING_ROWS(B, INPUT) \
+    THRESHOLD_ROWS(B, READS)
 
 // An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
 // weight of each for each channel. The threshold is for the first iteration.
@@ -375,6 +377,7 @@
 #define TEXEL_ROWS                    16
 #define UPSAMPLE_COLUMNS(CHANNEL)     (16 / (CHANNEL))
 #define UPSAMPLE_ROWS                 64
+#define GRID_COLUMNS                  4
 #define SHRINK_ROWS                   32
 #define FILTER_COLUMNS                4
 #define FILTER_ROWS                   16
@@ -534,6 +537,7 @@
     NAME(GROUPS_URP, 7, urp) \
     NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(GROUPS_BEVY, 9, bevy) \
+    NAME(GROUPS_KAWASE, 10, kawase) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

@@ -1,7 +1,10 @@
-// Large images by bands of rows. Where the first smaller image of a graph is made of the source's
-// rows, and the result of the source's rows and a few smaller images, only these need to be held
-// as a whole: bands of the source become the first smaller image, this becomes the others, and they
-// and the bands of the source become bands of the result. Each of these is a part of the graph.
+// Large images by bands of rows. A graph can run in three parts if its first smaller image depends
+// only on rows of the source, and its result only on rows of the source and on a few smaller
+// images:
+// 1. Bands of the source become the first smaller image.
+// 2. The first smaller image becomes the others.
+// 3. The smaller images and bands of the source become bands of the result.
+// Only the smaller images are complete in memory.
 #ifndef VKB_BANDS_H
 #define VKB_BANDS_H
 
@@ -9,13 +12,13 @@
 
 struct vkb_bands {
     uint32_t head;                     // the first smaller image; VKB_NO_IMAGE: there is none
-    uint32_t levels[GATHERED_LEVELS];  // the smaller images that the result is made of
+    uint32_t levels[GATHERED_LEVELS];  // the smaller images that the result depends on
     uint32_t level_count;
     uint32_t step;   // bands start and end at multiples of this, in rows
     uint32_t reach;  // rows beyond a band that it may depend on
 };
 
-// Finds the parts of a graph of images that are `height` rows high. False if it has no such parts.
+// Finds the parts of a graph whose source has `height` rows. False if it has no such parts.
 bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t height,
                      struct vkb_bands *bands);
 
@@ -30,7 +33,7 @@ struct vkb_part {
     uint32_t first, rows;  // of a band of it: the other images have their share; rows 0: no bands
 };
 
-// Leaves of the graph what the part needs.
+// Removes the images and passes that the part does not need.
 bool vkb_graph_take(struct vkb_graph *graph, const struct vkb_part *part, struct vkb_error *error);
 
 #endif

@@ -18,9 +18,8 @@ enum {
 
 #define VKB_NO_IMAGE UINT32_MAX
 
-// What the host fills an image with, if it does: the image that a source is of, what takes its
-// place as the source of the bloom, the mask of what glows, and images that another part of the
-// graph has made.
+// Which of its data the host writes to an image: the image of a source, its emission, its mask, or
+// an image that another part of the graph has made.
 enum vkb_input_kind {
     VKB_INPUT_NONE,
     VKB_INPUT_IMAGE,
@@ -75,9 +74,9 @@ enum vkb_reading {
 
 // Where the rows of a band may begin in the images of a pass (bands.h).
 enum vkb_band_rows {
-    VKB_BAND_SAME_PLACE,  // at the same place in all: at any row if they have the same height
-    VKB_BAND_ANY_ROW,     // at any row: the pass finds its place by row_offset (SAMPLING_ROWS)
-    VKB_BAND_EVEN_ROW,    // at the same place in all, at an even row
+    VKB_BAND_SAME_PLACE,  // at the same position in all: at any row if they have the same height
+    VKB_BAND_ANY_ROW,  // at any row: the pass computes its position from row_offset (SAMPLING_ROWS)
+    VKB_BAND_EVEN_ROW,  // at the same position in all, at an even row
 };
 
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
@@ -94,7 +93,7 @@ enum vkb_blend {
 // the load operation of the first.
 struct vkb_pass_row {
     char name[VKB_NAME_SIZE];
-    const char *variant;  // runs in place of the method's pass; NULL: the method's pass
+    const char *variant;  // name of the variant that replaces the method's pass; NULL: none
     enum vkb_geometry geometry;
     bool textured;  // draws the mesh's triangles that have textures, not those that have none
     enum vkb_shader vertex, shader;  // a dispatch has no vertex shader
@@ -110,7 +109,7 @@ struct vkb_pass_row {
     uint32_t depth;  // VKB_NO_IMAGE: none
     enum vkb_load load;
     enum vkb_blend blend;
-    // How far from its target's place the pass reads, in rows of what it reads; INFINITY: anywhere.
+    // Largest distance of a read from the target's position, in source rows; INFINITY: anywhere.
     float reach;
     enum vkb_band_rows band_rows;
     enum vkb_block block;
@@ -136,7 +135,7 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
 // How shaders round what they store to an image of that format: of STORED_*.
 enum vkb_mode vkb_storage_mode(enum vkb_format format);
 
-// Checks all rules for rows, so that only a valid graph reaches Vulkan.
+// Checks the rows, so that Vulkan gets only valid graphs.
 bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error);
 
 // Checks that both sides are 1 to max_side; `name` is used in the message.
@@ -174,8 +173,8 @@ bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image);
 // How a pass reads its images.
 enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass);
 
-// The access that an image is left in between frames: that of its first reader, else copy source. A
-// depth image that no pass reads stays an attachment.
+// The access of an image between frames: that of its first reader, or copy source if no pass reads
+// it. A depth image that no pass reads stays an attachment.
 enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image);
 
 // The accesses of passes first..end-1 to their targets: the colours in order, then the depth.

@@ -46,6 +46,9 @@ static bool add_kawase(const struct vkb_levels *levels, enum vkb_shader fragment
 
     row.block = VKB_BLOCK_kawase;
     vkb_params_read(row.block, &levels->settings->values, &row.params);
+    // The threshold pass has applied it.
+    row.params.kawase.threshold = 0.0f;
+    row.params.kawase.knee = 0.0f;
     row.params.kawase.target_width = sampling.width;
     row.params.kawase.target_height = sampling.height;
     row.params.kawase.limit = sampling.limit;

@@ -1,11 +1,11 @@
-// The composite: the pass that combines scene and bloom into the finished picture.
+// The composite: the pass that combines scene and bloom into the final image.
 #ifndef VKB_COMPOSITE_H
 #define VKB_COMPOSITE_H
 
 #include "passes/pass.h"
 
 // The inputs of the last pass: the scene, the bloom (VKB_NO_IMAGE: none), and the part of the scene
-// from which the bloom was made: all of it, the part under the mask (VKB_NO_IMAGE: no mask), or
+// that is the source of the bloom: all of it, the part under the mask (VKB_NO_IMAGE: no mask), or
 // nothing (`apart`).
 struct vkb_composite_source {
     uint32_t scene, bloom, mask;

@@ -1,5 +1,4 @@
-// Python's settings and cameras as the core's structs. All functions return false with an
-// exception set.
+// Python's settings as the core's struct. All functions return false with an exception set.
 #include "python/module.h"
 
 #include <float.h>
@@ -80,66 +79,6 @@ static PyObject *optional_attribute(const struct reader *reader, size_t attribut
     return NULL;
 }
 
-bool vkb_require_tuple(PyObject *object, const char *what)
-{
-    if (!PyTuple_Check(object))
-        PyErr_Format(PyExc_TypeError, "%s: a tuple is needed, not %R", what, object);
-    return PyTuple_Check(object);
-}
-
-int vkb_read_uint32(PyObject *object, void *number)
-{
-    const unsigned long long wide =
-        PyLong_Check(object) ? PyLong_AsUnsignedLongLong(object) : (unsigned long long)-1;
-
-    if (wide <= UINT32_MAX) {
-        *(uint32_t *)number = (uint32_t)wide;
-        return 1;
-    }
-    if (!PyLong_Check(object)) {
-        PyErr_Format(PyExc_TypeError, "%R is not an integer", object);
-        return 0;
-    }
-    PyErr_Clear();
-    PyErr_Format(PyExc_ValueError, "%R is out of range, 0 to %u", object, UINT32_MAX);
-    return 0;
-}
-
-int vkb_read_serial(PyObject *object, void *number)
-{
-    const unsigned long long serial = PyLong_AsUnsignedLongLong(object);
-
-    if (PyErr_Occurred())
-        return 0;
-    if (serial == 0)
-        PyErr_SetString(PyExc_ValueError, "scene: the serial 0 is reserved");
-    *(uint64_t *)number = serial;
-    return serial != 0;
-}
-
-bool vkb_out_of_range(const char *name, PyObject *value, double low, double high)
-{
-    PyObject *from = PyFloat_FromDouble(low), *to = PyFloat_FromDouble(high);
-
-    if (from && to)
-        PyErr_Format(PyExc_ValueError, "%s: %R is out of range, %R to %R", name, value, from, to);
-    Py_XDECREF(from);
-    Py_XDECREF(to);
-    return false;
-}
-
-bool vkb_read_number(PyObject *value, const struct vkb_value_row *row, void *values)
-{
-    const double number = PyFloat_AsDouble(value);
-
-    if (PyErr_Occurred())
-        return false;
-    if (!(number >= row->low && number <= row->high))
-        return vkb_out_of_range(row->name, value, row->low, row->high);
-    vkb_value_store(values, row, number);
-    return true;
-}
-
 // None keeps the default.
 static bool read_value(const struct reader *reader, size_t index, struct vkb_values *values)
 {
@@ -152,16 +91,6 @@ static bool read_value(const struct reader *reader, size_t index, struct vkb_val
     const bool done = value == Py_None || vkb_read_number(value, row, values);
     Py_DECREF(value);
     return done;
-}
-
-int vkb_read_name(PyObject *value, const char *const *names, int count, const char *what,
-                  const char *noun)
-{
-    for (int i = 0; PyUnicode_Check(value) && i < count; ++i)
-        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0)
-            return i;
-    PyErr_Format(PyExc_ValueError, "%s: unknown %s %R", what, noun, value);
-    return -1;
 }
 
 static bool read_choice(const struct reader *reader, int index, int *choice)
@@ -352,75 +281,4 @@ bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
     const bool done = read_all(&reader, settings);
     Py_XDECREF(reader.fields);
     return done;
-}
-
-// (pixels, serial, whether it is grey, (min, max, factor))
-static bool read_kernel_tuple(PyObject *tuple, struct vkb_held_kernel *held,
-                              struct vkb_kernel_data *kernel)
-{
-    PyObject *pixels;
-    int grey;
-
-    if (!vkb_require_tuple(tuple, "core_kernel")
-        || !PyArg_ParseTuple(tuple,
-                             "OO&p(fff);core_kernel must be (pixels, serial, grey, prefilter)",
-                             &pixels, vkb_read_serial, &kernel->serial, &grey,
-                             &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2])
-        || PyObject_GetBuffer(pixels, &held->view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0)
-        return false;
-    held->held = true;
-    if (!vkb_has_element(&held->view, "f") || held->view.ndim != 3 || held->view.shape[2] != 4
-        || held->view.shape[0] < 1 || held->view.shape[0] > VKB_MAX_SIDE || held->view.shape[1] < 1
-        || held->view.shape[1] > VKB_MAX_SIDE) {
-        PyErr_Format(PyExc_ValueError,
-                     "kernel: an array (h, w, 4) of float32 with sides of 1 to %d is needed",
-                     VKB_MAX_SIDE);
-        return false;
-    }
-    kernel->pixels = held->view.buf;
-    kernel->height = (uint32_t)held->view.shape[0];
-    kernel->width = (uint32_t)held->view.shape[1];
-    kernel->grey = grey;
-    return true;
-}
-
-bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
-                          struct vkb_kernel_data *kernel)
-{
-    PyObject *tuple = PyObject_CallMethod(object, "core_kernel_size", "(II)(II)", frame.width,
-                                          frame.height, buffers.width, buffers.height);
-    const bool done = tuple && vkb_require_tuple(tuple, "core_kernel_size")
-                   && PyArg_ParseTuple(tuple, "O&O&", vkb_read_uint32, &kernel->width,
-                                       vkb_read_uint32, &kernel->height);
-
-    Py_XDECREF(tuple);
-    // No other kernel has this number, and the check of memory is for graphs with one.
-    kernel->serial = UINT64_MAX;
-    return done;
-}
-
-bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
-                     struct vkb_held_kernel *held, struct vkb_kernel_data *kernel)
-{
-    PyObject *tuple = PyObject_CallMethod(object, "core_kernel", "(II)(II)", frame.width,
-                                          frame.height, buffers.width, buffers.height);
-    const bool done = tuple && read_kernel_tuple(tuple, held, kernel);
-
-    Py_XDECREF(tuple);
-    return done;
-}
-
-void vkb_release_kernel(struct vkb_held_kernel *held)
-{
-    if (held->held)
-        PyBuffer_Release(&held->view);
-    held->held = false;
-}
-
-bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)
-{
-    double *p = camera->position, *r = camera->rotation;
-
-    return PyArg_ParseTuple(tuple, "(ddd)(ddd)ddd", &p[0], &p[1], &p[2], &r[0], &r[1], &r[2],
-                            &camera->fov, &camera->near, &camera->far);
 }

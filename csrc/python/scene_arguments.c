@@ -266,3 +266,11 @@ void vkb_release_scene(struct vkb_held_scene *scene)
     vkb_free(scene->data.glow.surfaces);
     *scene = (struct vkb_held_scene){0};
 }
+
+bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera)
+{
+    double *p = camera->position, *r = camera->rotation;
+
+    return PyArg_ParseTuple(tuple, "(ddd)(ddd)ddd", &p[0], &p[1], &p[2], &r[0], &r[1], &r[2],
+                            &camera->fov, &camera->near, &camera->far);
+}

@@ -1,6 +1,5 @@
 // The Vulkan objects of a pass row: shader modules, render pass, pipeline. Each is created once for
-// its key. If there are many pipelines, the old ones are destroyed. Of the other objects there are
-// only a few.
+// its key. If there are many pipelines, the old ones are destroyed. The other objects are few.
 #ifndef VKB_PIPELINE_H
 #define VKB_PIPELINE_H
 

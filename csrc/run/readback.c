@@ -92,7 +92,10 @@ bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_
 {
     const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
 
-    return output->imported && output->row_count == height
+    // A run of three channels is as long as three quarters of one of four, see store.glsl.
+    const size_t run = VKB_STORE_SIZE / 4 * output->channels;
+
+    return output->imported && output->row_count == height && output_row_size(output) % run == 0
         && output_row_size(output) % VKB_WORD_SIZE == 0
         && output->imported_offset % VKB_WORD_SIZE == 0 && output->imported_offset % align == 0;
 }

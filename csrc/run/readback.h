@@ -25,7 +25,7 @@ struct vkb_output {
     VkDeviceSize imported_offset;
     VkDeviceSize offset;  // in the staging memory; unused if the device copies to imported memory
     // Set while the passes are recorded: the last pass stores to the imported memory, so there is
-    // no copy. Only so does the device write fewer channels than the image has.
+    // no copy. In all other cases, the device writes all channels of the image.
     bool stored;
 };
 

@@ -30,8 +30,8 @@ struct vkb_show {
     bool acquired;  // the surface had an image
 };
 
-// Makes a screen of a surface, which it takes over, also on failure. VK_NULL_HANDLE: a surface
-// without a window. The screen is added to a list. NULL on failure.
+// Makes a screen, which owns the surface from now on, also on failure. VK_NULL_HANDLE: a surface
+// without a window is created. The screen is added to a list. NULL on failure.
 struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceKHR surface,
                                      bool mailbox, struct vkb_screen **screens,
                                      struct vkb_error *error);

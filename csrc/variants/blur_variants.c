@@ -167,14 +167,14 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-// The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of a word, so
-// that the invocations of a workgroup share a row as evenly as possible.
+// The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of two words of
+// any format, so that the invocations of a workgroup share a row as evenly as possible.
 static uint32_t strip_columns(uint32_t width)
 {
     const uint32_t most = ROW_INVOCATIONS * STRIP_COLUMNS;
     const uint32_t invocations = ROW_INVOCATIONS * ((width + most - 1) / most);
 
-    return ((width + invocations - 1) / invocations + 3) / 4 * 4;
+    return ((width + invocations - 1) / invocations + 7) / 8 * 8;
 }
 
 // Adds the composite, and after it the fused pass in strips, which may replace it.

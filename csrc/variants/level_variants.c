@@ -3,6 +3,7 @@
 
 #include "passes/levels.h"
 
+#include <math.h>
 #include <string.h>
 
 static const enum vkb_shader halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
@@ -12,6 +13,7 @@ static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
 static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
 static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
 static const enum vkb_shader reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
+static const enum vkb_shader grid_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_grid);
 static const enum vkb_shader shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
 static const enum vkb_shader godot_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(godot_rows);
 static const enum vkb_shader hdrp_rows_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(hdrp_rows);
@@ -254,6 +256,56 @@ bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb
         return true;
     return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, FILTER_ROWS, error)
                 : add_words(choice, pass, hdrp_columns_words[format], word, HDRP_OUTPUTS, error);
+}
+
+// Turns a pass with bilinear taps in three rows and columns into one of halve_grid.comp. False: it
+// has none, or they are at other distances.
+static bool read_grid(const struct vkb_pass_row *pass, struct vkb_pass_row *row)
+{
+    struct vkb_kawase_params *params = &row->params.kawase;
+
+    memcpy(row, pass, sizeof *row);
+    row->block = VKB_BLOCK_kawase;
+    if (pass->shader == VKB_SHADER_filament_down_frag) {
+        memset(&row->params, 0, sizeof row->params);
+        // The distance of the taps is half of the offset.
+        params->offset = 2.0f * 1.761629f;
+        params->limit = pass->params.pyramid.limit;
+        params->row_offset = pass->params.pyramid.row_offset;
+    } else if (pass->shader != VKB_SHADER_kawase_down_frag) {
+        return false;
+    }
+    const float distance = 0.5f * params->offset;
+    const bool next = floorf(0.5f + distance) == 2.0f && floorf(0.5f - distance) == -2.0f;
+    row->constants.groups =
+        pass->shader == VKB_SHADER_filament_down_frag ? GROUPS_FILAMENT : GROUPS_KAWASE;
+    row->constants.sampling = 0;
+    row->constants.radius = next;
+    return params->row_offset == 0 && (next || distance <= 0.5f);
+}
+
+bool vkb_add_halved_grid(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         bool *fits, struct vkb_error *error)
+{
+    const struct vkb_pass_row *threshold;
+    struct vkb_pass_row row;
+
+    *fits = read_grid(pass, &row) && is_half(&choice->plain, pass) && loads(choice, pass);
+    if (!*fits)
+        return true;
+    const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
+    vkb_make_words(&row, grid_words[format], GRID_COLUMNS, HALVE_WORDS_ROWS);
+    if (!vkb_graph_add_pass(choice->graph, &row, error))
+        return false;
+    threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
+    if (!threshold)
+        return true;
+    row.reads[0] = threshold->reads[0];
+    row.fused = true;
+    row.constants.from_image = true;
+    row.constants.format = vkb_stored_as(choice->device, format);
+    VKB_TAKE_THRESHOLD(&row, kawase, threshold);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

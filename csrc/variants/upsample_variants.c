@@ -12,7 +12,7 @@ static const enum vkb_shader rows_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMA
 static const enum vkb_shader columns_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(filter_columns);
 static const enum vkb_shader gather_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(gather_columns);
-static const enum vkb_shader kawase_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(kawase_columns);
+static const enum vkb_shader kawase_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(kawase_up);
 
 // The size of an image that is filtered along rows.
 static struct vkb_size rows_size(const struct vkb_variant_choice *choice,
@@ -88,6 +88,16 @@ bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *p
         && vkb_same_size(graph, pass->reads[0], pass->targets[0]);
 }
 
+// Whether the image that the pass reads is not higher than its target, both complete if they are
+// bands (see SAMPLING_ROWS).
+static bool is_enlarged(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                        int source_height, int target_height)
+{
+    const uint32_t own = graph->images[pass->reads[0]].height;
+
+    return (source_height ? (uint32_t)source_height : own) <= (uint32_t)target_height;
+}
+
 // Whether the pass upsamples a level, not larger than its target and of the same format, with a
 // filter of adjacent texels.
 static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -98,10 +108,8 @@ static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row
     if (pass->shader != VKB_SHADER_pyramid_up_frag || vkb_doubles(pass)
         || vkb_only_scales(graph, pass))
         return false;
-    const uint32_t height = params->source_height ? (uint32_t)params->source_height
-                                                  : graph->images[pass->reads[0]].height;
     return (kind == UPSAMPLE_LINEAR || kind == UPSAMPLE_CUBIC || kind == UPSAMPLE_UNIT_TENT)
-        && height <= (uint32_t)params->target_height
+        && is_enlarged(graph, pass, params->source_height, params->target_height)
         && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
@@ -224,22 +232,19 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
 bool vkb_add_kawase_up(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        bool *fits, struct vkb_error *error)
 {
+    const struct vkb_graph *plain = &choice->plain;
+    const struct vkb_kawase_params *params = &pass->params.kawase;
+    const enum vkb_format format = plain->images[pass->targets[0]].format;
     struct vkb_pass_row row;
 
-    *fits = pass->shader == VKB_SHADER_kawase_up_frag && fits_rows(choice, pass, 1);
+    *fits = pass->shader == VKB_SHADER_kawase_up_frag
+         && is_enlarged(plain, pass, params->source_height, params->target_height)
+         && vkb_has_format_of(plain, pass->reads[0], pass->targets[0])
+         && vkb_fits_words(choice, pass);
     if (!*fits)
         return true;
-    const float offset = pass->params.kawase.offset;
-    const struct row_filter filters[] = {
-        {pass->reads[0], UPSAMPLE_LINEAR, 0.0f},
-        {pass->reads[0], UPSAMPLE_PAIR, 0.5f * offset},
-        {pass->reads[0], UPSAMPLE_PAIR, offset},
-    };
     memcpy(&row, pass, sizeof row);
-    row.read_count = sizeof filters / sizeof filters[0];
-    for (uint32_t i = 0; i < row.read_count; ++i)
-        if (!add_rows(choice, pass, &filters[i], i, &row.reads[i], error))
-            return false;
-    make_columns(choice, &row, kawase_shaders);
+    vkb_make_words(&row, kawase_shaders[format], 4 / vkb_formats[format].channel_size,
+                   UPSAMPLE_ROWS);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

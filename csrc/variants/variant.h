@@ -28,6 +28,8 @@ vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lin
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 // The first of these with taps that are weighted by brightness.
 vkb_variant_add vkb_add_halved_taps, vkb_add_godot_rows;
+// The same with bilinear taps in three rows and columns.
+vkb_variant_add vkb_add_halved_grid;
 // First passes of published methods, with taps among 4 x 4 texels of an image of twice the size.
 vkb_variant_add vkb_add_reduced;
 // The same of an image of any larger size.

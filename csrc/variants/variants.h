@@ -1,4 +1,4 @@
-// The variants of passes. All give the same picture; each class of devices runs the fastest for it.
+// The variants of passes. All have the same result; each device class runs its fastest variant.
 #ifndef VKB_VARIANTS_H
 #define VKB_VARIANTS_H
 

@@ -69,16 +69,44 @@ static VkDeviceSize import_alignment(const struct vkb_device *device)
     return host.minImportedHostPointerAlignment;
 }
 
+static VkPhysicalDeviceFeatures available_features(const struct vkb_device *device)
+{
+    VkPhysicalDeviceFeatures available;
+
+    device->instance->vk.vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
+    return available;
+}
+
+static bool has_scalar_layout(const struct vkb_device *device)
+{
+    VkPhysicalDeviceScalarBlockLayoutFeatures layout = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
+    };
+
+    device->instance->vk.vkGetPhysicalDeviceFeatures2(
+        device->adapter.physical, &(VkPhysicalDeviceFeatures2){
+                                      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2,
+                                      .pNext = &layout,
+                                  });
+    return layout.scalarBlockLayout;
+}
+
 static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
     const struct vkb_instance_table *vk = &device->instance->vk;
-    VkPhysicalDeviceFeatures available;
-    const char *extensions[2];
+    const VkPhysicalDeviceFeatures available = available_features(device);
+    const char *extensions[3];
     uint32_t extension_count = 0;
+    VkPhysicalDeviceScalarBlockLayoutFeatures scalar_layout = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
+        .scalarBlockLayout = VK_TRUE,
+    };
     bool has_import;
 
     if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
-        || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error))
+        || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error)
+        || !has_extension(device, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME, &device->scalar_layout,
+                          error))
         return false;
     if (has_import && imports_buffers(device)) {
         device->import_alignment = import_alignment(device);
@@ -88,12 +116,15 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
     device->presents = device->presents && device->instance->surfaces;
     if (device->presents)
         extensions[extension_count++] = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
-    vk->vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
+    device->scalar_layout = device->scalar_layout && has_scalar_layout(device);
+    if (device->scalar_layout)
+        extensions[extension_count++] = VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME;
     device->dispatch = available.shaderStorageImageWriteWithoutFormat;
     return VK(error, vk->vkCreateDevice(
                          device->adapter.physical,
                          &(VkDeviceCreateInfo){
                              .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                             .pNext = device->scalar_layout ? &scalar_layout : NULL,
                              .pEnabledFeatures =
                                  &(VkPhysicalDeviceFeatures){
                                      .shaderStorageImageWriteWithoutFormat = device->dispatch,
@@ -175,7 +206,7 @@ static bool is_linear(const struct vkb_device *device, VkFormat format)
         && limits.maxExtent.height >= device->max_side;
 }
 
-// Whether the row pitch of linear images is a multiple of a word.
+// Whether the row pitch of linear images is a multiple of what variants store at once.
 static bool has_whole_words(const struct vkb_device *device)
 {
     VkSubresourceLayout layout;
@@ -200,17 +231,15 @@ static bool has_whole_words(const struct vkb_device *device)
         device->handle, image, &(VkImageSubresource){.aspectMask = VK_IMAGE_ASPECT_COLOR_BIT},
         &layout);
     device->vk.vkDestroyImage(device->handle, image, NULL);
-    return layout.offset == 0 && layout.rowPitch % VKB_WORD_SIZE == 0;
+    return layout.offset == 0 && layout.rowPitch % VKB_STORE_SIZE == 0;
 }
 
 static bool has_words(const struct vkb_device *device)
 {
-    VkPhysicalDeviceFeatures available;
     VkFormatProperties properties;
 
-    device->instance->vk.vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
     if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU || !device->dispatch
-        || !available.shaderInt64)
+        || !device->scalar_layout || !available_features(device).shaderInt64)
         return false;
     for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
         if (format != VKB_FORMAT_DEPTH32_FLOAT && !is_linear(device, vkb_formats[format].vk))

@@ -21,7 +21,8 @@ struct vkb_device {
     VkPhysicalDeviceLimits limits;
     uint32_t max_side;                                // of images that passes write
     VkFormatFeatureFlags features[VKB_FORMAT_COUNT];  // of images with optimal tiling
-    bool dispatch;  // compute shaders can write images of every format
+    bool dispatch;       // compute shaders can write images of every format
+    bool scalar_layout;  // VK_EXT_scalar_block_layout is enabled
     // Colour images have linear tiling and lie in host-visible memory, which shaders also access as
     // buffers of 16-byte words. This is the case on a CPU: its memory is host memory.
     bool words;

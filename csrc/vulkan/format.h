@@ -22,6 +22,8 @@ enum { VKB_MAX_SIDE = 32768 };
 
 // Images of a CPU are also buffers of such words.
 enum { VKB_WORD_SIZE = 16 };
+// Variants store up to so many bytes at once, and rows begin at multiples of it.
+enum { VKB_STORE_SIZE = 2 * VKB_WORD_SIZE };
 #define VKB_WORD_FORMAT VK_FORMAT_R32G32B32A32_UINT
 
 struct vkb_format_info {

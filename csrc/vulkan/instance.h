@@ -23,6 +23,7 @@ extern const char vkb_install_hint[];
     NAME(vkGetDeviceProcAddr) \
     NAME(vkGetPhysicalDeviceExternalBufferProperties) \
     NAME(vkGetPhysicalDeviceFeatures) \
+    NAME(vkGetPhysicalDeviceFeatures2) \
     NAME(vkGetPhysicalDeviceFormatProperties) \
     NAME(vkGetPhysicalDeviceImageFormatProperties) \
     NAME(vkGetPhysicalDeviceMemoryProperties) \

@@ -12,8 +12,8 @@ enum vkb_memory_kind {
     VKB_MEMORY_SHARED,    // mapped and coherent; for images, on devices whose memory is the host's
 };
 
-// From so much on, memory is in the system's large pages: fewer have to be given, zeroed, pinned
-// and looked up.
+// Allocations of at least this size use the system's large pages, so that fewer pages are mapped,
+// zeroed, pinned and looked up.
 #define VKB_LARGE_BYTES ((size_t)4 << 20)
 
 struct vkb_buffer {
@@ -47,7 +47,7 @@ struct vkb_image_spec {
     bool mapped;
 };
 
-// Asks the system for large pages for memory that nobody has written to yet.
+// Advises the system to use large pages for memory that has not been written yet.
 void vkb_advise_large(void *memory, size_t size);
 
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.

@@ -15,19 +15,18 @@ typedef void vkb_rows(void *context, uint32_t part, uint32_t first, uint32_t end
 // The rows before `end` are done.
 typedef void vkb_rows_done(void *context, uint32_t end);
 
-// Threads that wait for work, so that none has to be started for each image. They are started when
-// they are first needed. Calls with one object must not overlap.
+// Threads that wait for work, so that threads are not started for each image. They are started by
+// the first call that needs them. Calls with one object must not overlap.
 struct vkb_workers;
 
 struct vkb_workers *vkb_workers_create(struct vkb_error *error);
 // `workers` may be NULL.
 void vkb_workers_destroy(struct vkb_workers *workers);
 
-// Divides the rows `first` to `end` between the processor's cores, if they have `size` bytes that
-// are worth it, and returns when all are done. Rows are begun in their order. `done` is called in
-// the caller's thread, while the other threads go on, and at last with `end`; NULL: nobody needs
-// to know. A thread that cannot be started is no error: the others do its part. The threads receive
-// no signals.
+// Divides the rows `first` to `end` between the processor's cores, if their `size` in bytes is
+// large enough, and returns when all are done. Rows are started in order. `done` may be NULL. It is
+// called in the caller's thread while the other threads continue, and finally with `end`. If a
+// thread cannot be started, the others do its part. The threads receive no signals.
 void vkb_in_parts(struct vkb_workers *workers, vkb_rows *rows, vkb_rows_done *done, void *context,
                   uint32_t first, uint32_t end, size_t size);
 

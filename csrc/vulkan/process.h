@@ -1,4 +1,4 @@
-// The process id, and locks that a fork does not leave held.
+// The process id, and locks that are free in a forked process.
 #ifndef VKB_PROCESS_H
 #define VKB_PROCESS_H
 

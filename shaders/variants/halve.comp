@@ -34,15 +34,7 @@ WRITE_IMAGE(2);
 #define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
-vec4 thresholded(vec4 value)
-{
-    if (FROM_IMAGE == 0)
-        return value;
-    vec4 kept =
-        apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
-    // Without a knee the value is the texel or 0, which needs no rounding.
-    return THRESHOLD_MODE == THRESHOLD_KNEE ? as_stored(kept, FORMAT) : kept;
-}
+#include "variants/thresholded.glsl"
 
 void main()
 {

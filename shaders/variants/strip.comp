@@ -1,13 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#if CHANNEL_BYTES == 4 && !defined TARGET_CHANNELS
-#define STORES_HALVES
-#extension GL_ARB_gpu_shader_int64 : require
-#endif
 // The complete bloom of an image for devices without fast shared memory. An invocation writes some
-// rows from left to right, one word of each at a time: it adds up the columns of the word, keeps the
-// sums of the last columns in registers, and adds them up along the rows.
+// rows from left to right. It adds up the columns of a word for all rows, adds these sums to the
+// pixels near them, which it keeps in registers, and stores the pixels of two words at once.
 #include "variants/fused_bloom.glsl"
 #include "variants/pixels.glsl"
 
@@ -15,22 +11,20 @@ const int COLUMNS = 4 / CHANNEL_BYTES, WORD_SHIFT = COLUMNS >> 1;  // of a word;
 const int ROWS = STRIP_ROWS(CHANNEL_BYTES), LOADED = ROWS + 2 * STRIP_RADIUS;
 const int KEPT = 2 * STRIP_RADIUS;
 const int WAITING = STRIP_RADIUS / COLUMNS;
+const int STEP = 2 * COLUMNS;
+// Words of each row that are loaded before the first of them is used: llvmpipe calls a function for
+// each load, before which it moves what is in registers to memory.
+const int AHEAD = CHANNEL_BYTES == 4 ? 1 : 2;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, image);
 WRITE_IMAGE(2);
-// Where a step has three quarters of a word, and where a word has one pixel.
-layout(set = 0, binding = 2, std430) writeonly buffer Quarters { uint quarters[]; } target_quarters;
-#ifdef STORES_HALVES
-layout(set = 0, binding = 2, std430) writeonly buffer Halves { u64vec2 halves[]; } target_halves;
-#endif
-
-#define STORE_COUNT COLUMNS
+#define STORE_COUNT STEP
 #include "variants/store.glsl"
 
 int rows[LOADED];
 float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
-// Of each row: the vertical sums of the last columns, and their words that are not finished yet.
+// Of each row: the blooms that lack later columns, and the words that they belong to.
 vec3 kept[ROWS][KEPT];
 uvec4 waiting[ROWS][WAITING + 1];
 
@@ -62,14 +56,20 @@ void pixels_of(uvec4 word, out uvec4 raw[COLUMNS])
 #endif
 }
 
-// Sums of columns of the word `at` for all rows.
-void add_columns(int at, out vec3 sums[ROWS][COLUMNS])
+void load_columns(int at, out uvec4 loaded[LOADED])
+{
+    [[unroll]] for (int i = 0; i < LOADED; ++i)
+        loaded[i] = texelFetch(image, rows[i] + at);
+}
+
+// Sums of the columns of a word for all rows.
+void add_columns(uvec4 words[LOADED], out vec3 sums[ROWS][COLUMNS])
 {
     [[unroll]] for (int loaded = 0; loaded < LOADED; ++loaded) {
-        uvec4 raw[COLUMNS], word = texelFetch(image, rows[loaded] + at);
-        pixels_of(word, raw);
+        uvec4 raw[COLUMNS];
+        pixels_of(words[loaded], raw);
         if (loaded >= STRIP_RADIUS && loaded < ROWS + STRIP_RADIUS)
-            waiting[loaded - STRIP_RADIUS][WAITING] = word;
+            waiting[loaded - STRIP_RADIUS][WAITING] = words[loaded];
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             vec3 added = thresholded(value_of(raw[i]).rgb);
             // (A loop over the rows of this tap alone has no constant ends, so it is not unrolled.)
@@ -99,43 +99,38 @@ void repeat_edges(int x, int at, int width, inout vec3 sums[ROWS][COLUMNS])
     }
 }
 
-// The finished pixels from `first` on, and the sums and words moved on.
+// Adds a word's columns to the row, which finishes the pixels of the word STRIP_RADIUS before.
 void finish_row(int row, ivec2 first, vec3 sums[COLUMNS], out uvec4 raw[COLUMNS])
 {
-    vec3 line[KEPT + COLUMNS];
-
-    [[unroll]] for (int i = 0; i < KEPT; ++i)
-        line[i] = kept[row][i];
-    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        line[KEPT + i] = sums[i];
-    [[unroll]] for (int i = 0; i < KEPT; ++i)
-        kept[row][i] = line[i + COLUMNS];
     pixels_of(waiting[row][0], raw);
     [[unroll]] for (int i = 0; i < WAITING; ++i)
         waiting[row][i] = waiting[row][i + 1];
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        vec3 sum = vec3(0.0);
-        [[unroll]] for (int tap = -STRIP_RADIUS; tap <= STRIP_RADIUS; ++tap)
-            sum += row_weights[abs(tap)] * line[i + STRIP_RADIUS + tap];
-        vec4 bloom = vec4(as_stored(sum, FORMAT), 1.0);
-        raw[i] = finished(raw[i], finish(value_of(raw[i]), bloom, first + ivec2(i, 0)));
+        vec3 bloom = kept[row][0] + row_weights[STRIP_RADIUS] * sums[i];
+        [[unroll]] for (int tap = 1; tap < KEPT; ++tap)
+            kept[row][tap - 1] = kept[row][tap] + row_weights[abs(STRIP_RADIUS - tap)] * sums[i];
+        kept[row][KEPT - 1] = vec3(0.0) + row_weights[STRIP_RADIUS] * sums[i];
+        vec4 scene = value_of(raw[i]);
+        raw[i] = finished(raw[i], finish(scene, vec4(as_stored(bloom, FORMAT), 1.0),
+                                         first + ivec2(i, 0)));
     }
 }
 
-void store_step(ivec2 first, uvec4 raw[COLUMNS])
+// The word of the column x, or the nearest one in the image.
+int word_of(int x, int width)
 {
-#if TARGET_CHANNELS == 3
-    int start = 4 * (first.y - target_shape.w) * target_shape.z + 3 * (first.x >> WORD_SHIFT);
-    [[unroll]] for (int i = 0; i < 3; ++i)
-        target_quarters.quarters[start + i] = max(quarter_of(raw, i), unknown_zero);
-#elif defined STORES_HALVES
-    // llvmpipe stores one integer after the other: two take less time than four.
-    uvec4 word = max(raw[0], uvec4(unknown_zero));
-    target_halves.halves[(first.y - target_shape.w) * target_shape.z + first.x] =
-        u64vec2(packUint2x32(word.xy), packUint2x32(word.zw));
-#else
-    store(first.x, first.y, raw);
-#endif
+    return clamp(x >> WORD_SHIFT, 0, (width - 1) >> WORD_SHIFT);
+}
+
+// Adds the word of the column x to all rows. The pixels from `done` on are finished then.
+void add_word(int x, uvec4 loaded[LOADED], ivec2 done, int width, out uvec4 raw[ROWS][COLUMNS])
+{
+    vec3 sums[ROWS][COLUMNS];
+
+    add_columns(loaded, sums);
+    repeat_edges(x, word_of(x, width), width, sums);
+    [[unroll]] for (int row = 0; row < ROWS; ++row)
+        finish_row(row, done + ivec2(0, row), sums[row], raw[row]);
 }
 
 void main()
@@ -143,25 +138,29 @@ void main()
     read_words();
     ivec2 size = READ_SIZE(image, 1);
     ivec2 first = first_pixel(ivec2(params.columns, ROWS));
-    int end = min(first.x + params.columns, size.x), last = (size.x - 1) >> WORD_SHIFT;
+    int end = min(first.x + params.columns, size.x);
 
     if (any(greaterThanEqual(first, size)))
         return;
     start_row_sums(first, size);
-    for (int x = first.x - STRIP_RADIUS; x < end + STRIP_RADIUS; x += COLUMNS) {
-        vec3 sums[ROWS][COLUMNS];
-        uvec4 raw[ROWS][COLUMNS];
-        int at = clamp(x >> WORD_SHIFT, 0, last);
+    for (int x = first.x - STRIP_RADIUS; x < end + STRIP_RADIUS; x += STEP) {
+        uvec4 loaded[2][LOADED], added[ROWS][COLUMNS], raw[ROWS][STEP];
         ivec2 done = ivec2(x - STRIP_RADIUS, first.y);
-        add_columns(at, sums);
-        repeat_edges(x, at, size.x, sums);
-        // All before the first store, after which compilers load parameters lane by lane.
-        [[unroll]] for (int row = 0; row < ROWS; ++row)
-            finish_row(row, done + ivec2(0, row), sums[row], raw[row]);
+        // All pixels before the first store, after which compilers load parameters lane by lane.
+        [[unroll]] for (int word = 0; word < 2; ++word) {
+            int start = word * COLUMNS;
+            if (word % AHEAD == 0)
+                [[unroll]] for (int i = 0; i < AHEAD; ++i)
+                    load_columns(word_of(x + start + i * COLUMNS, size.x), loaded[word + i]);
+            add_word(x + start, loaded[word], done + ivec2(start, 0), size.x, added);
+            [[unroll]] for (int row = 0; row < ROWS; ++row)
+                [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+                    raw[row][start + i] = added[row][i];
+        }
         if (done.x < first.x)
             continue;
         [[unroll]] for (int row = 0; row < ROWS; ++row)
             if (done.y + row < size.y)
-                store_step(done + ivec2(0, row), raw[row]);
+                store(done.x, done.y + row, raw[row]);
     }
 }

@@ -13,8 +13,12 @@ from tests.images import hdr_picture
 from tests.methods.cases import DTYPES, METHODS, by_turns
 from tests.tolerance import assert_matches_reference, real, tolerance
 from vkbloom import (
+    BevyBloom,
     Convolution,
+    DualKawase,
+    FilamentBloom,
     Frames,
+    HdrpBloom,
     Pyramid,
     Renderer,
     Scene,
@@ -56,6 +60,12 @@ BIT_EQUAL = {
     "long": METHODS["longest"],
     "still": METHODS["still"],
     "kawase": METHODS["dual-kawase-offset"],
+    "kawase-near": DualKawase(levels=2, threshold=0.3, knee=0.5),
+    "kawase-far": DualKawase(levels=2, threshold=0.3, offset=3.5),
+    # Levels that are smaller than the images here.
+    "bevy": BevyBloom(max_mip_dimension=32),
+    "filament": FilamentBloom(resolution=32),
+    "hdrp": HdrpBloom(anamorphism=0.3),
 }
 
 # Presets with a blur into another size, and Fourier transforms, whose stages differ.
@@ -212,7 +222,9 @@ def test_values_that_are_not_finite(varied: Renderer) -> None:
     image[20, 30, 1] = np.nan
     image[21, 40, 0] = np.inf
     image[49, 69, 2] = -np.inf
-    for settings in (*WHOLE.values(), presets["filament"]):
+    # (Also passes that read the image itself: into half of its size and into other sizes.)
+    halving = (presets["filament"], presets["unity_hdrp"], BIT_EQUAL["kawase-near"])
+    for settings in (*WHOLE.values(), *halving, BIT_EQUAL["bevy"]):
         frames = varied.apply(image, settings)
         alone = varied.apply(image, settings, attachments=("final",))
         for final in (frames["final"], alone["final"]):

@@ -1,0 +1,72 @@
+// Single Python objects as numbers, names and tuples.
+#include "python/module.h"
+
+bool vkb_require_tuple(PyObject *object, const char *what)
+{
+    if (!PyTuple_Check(object))
+        PyErr_Format(PyExc_TypeError, "%s: a tuple is needed, not %R", what, object);
+    return PyTuple_Check(object);
+}
+
+int vkb_read_uint32(PyObject *object, void *number)
+{
+    const unsigned long long wide =
+        PyLong_Check(object) ? PyLong_AsUnsignedLongLong(object) : (unsigned long long)-1;
+
+    if (wide <= UINT32_MAX) {
+        *(uint32_t *)number = (uint32_t)wide;
+        return 1;
+    }
+    if (!PyLong_Check(object)) {
+        PyErr_Format(PyExc_TypeError, "%R is not an integer", object);
+        return 0;
+    }
+    PyErr_Clear();
+    PyErr_Format(PyExc_ValueError, "%R is out of range, 0 to %u", object, UINT32_MAX);
+    return 0;
+}
+
+int vkb_read_serial(PyObject *object, void *number)
+{
+    const unsigned long long serial = PyLong_AsUnsignedLongLong(object);
+
+    if (PyErr_Occurred())
+        return 0;
+    if (serial == 0)
+        PyErr_SetString(PyExc_ValueError, "scene: the serial 0 is reserved");
+    *(uint64_t *)number = serial;
+    return serial != 0;
+}
+
+bool vkb_out_of_range(const char *name, PyObject *value, double low, double high)
+{
+    PyObject *from = PyFloat_FromDouble(low), *to = PyFloat_FromDouble(high);
+
+    if (from && to)
+        PyErr_Format(PyExc_ValueError, "%s: %R is out of range, %R to %R", name, value, from, to);
+    Py_XDECREF(from);
+    Py_XDECREF(to);
+    return false;
+}
+
+bool vkb_read_number(PyObject *value, const struct vkb_value_row *row, void *values)
+{
+    const double number = PyFloat_AsDouble(value);
+
+    if (PyErr_Occurred())
+        return false;
+    if (!(number >= row->low && number <= row->high))
+        return vkb_out_of_range(row->name, value, row->low, row->high);
+    vkb_value_store(values, row, number);
+    return true;
+}
+
+int vkb_read_name(PyObject *value, const char *const *names, int count, const char *what,
+                  const char *noun)
+{
+    for (int i = 0; PyUnicode_Check(value) && i < count; ++i)
+        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0)
+            return i;
+    PyErr_Format(PyExc_ValueError, "%s: unknown %s %R", what, noun, value);
+    return -1;
+}
