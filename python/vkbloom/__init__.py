@@ -38,7 +38,7 @@ from vkbloom.settings import Settings
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
-    from vkbloom import psf, reference
+    from vkbloom import psf, reference, testing
     from vkbloom.explorer import explore
     from vkbloom.fits import FitResult, fit, fit_pyramid, translate
     from vkbloom.glare.base import Glare, GlareLight
@@ -76,6 +76,7 @@ _LATE_MODULES = {
     "reductions": "vkbloom.grid.reductions",
     "reference": "vkbloom.reference",
     "scene": "vkbloom.scene",
+    "testing": "vkbloom.testing",
 }
 _LATE = {
     "BevyBloom": "vkbloom.methods.bevy",
@@ -169,6 +170,7 @@ __all__ = [
     "reductions",
     "reference",
     "response_curves",
+    "testing",
     "translate",
     "write",
 ]

@@ -91,6 +91,7 @@ def test_it_tells_its_version() -> None:
         (("rendr",), "No such command 'rendr'"),
         (("render",), "Missing option '-o'"),
         (("render", "-o", "x.png", "--nonsense"), "--nonsense"),
+        (("render", "-o", "-"), "give --out a file or a folder"),
         (("adapters", "more"), "more"),
     ],
 )

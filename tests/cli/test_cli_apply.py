@@ -360,7 +360,7 @@ class TestErrors:
             ("a.exr none/b.png", 1, "none/b.png: No such file or directory"),
             ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold this picture"),
             ("a.exr b.png --subimage 1", 1, "a.exr: subimage 1 is not in 0..0"),
-            ("a.exr b.unknown", 2, "'.unknown' is not the extension of a writable"),
+            ("a.exr b.unknown", 2, "b.unknown: '.unknown' is not the extension of a writable"),
             ("a.exr b", 2, "'' is not the extension of a writable"),
             ("a.exr", 2, "Missing argument 'OUT'"),
             ("a.exr b.png c.png", 2, "c.png: one file cannot hold 2 images"),

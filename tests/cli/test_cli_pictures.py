@@ -55,6 +55,13 @@ class TestSequences:
         found = [str(path.relative_to(frames)) for path in frames.rglob("*") if path.is_file()]
         assert sorted(found) == sorted([*written, *(f"f.{n:04d}.png" for n in range(8, 12))])
 
+    def test_other_files_of_a_folder_are_told(self, frames: Path) -> None:
+        (frames / "notes.txt").write_text("dear")
+        result = run(".", "out/")
+        assert result.exit_code == 0
+        assert result.stderr == "vkbloom: note: .: left out what is no image: notes.txt\n"
+        assert names(frames / "out") == [f"f.{n:04d}.png" for n in range(8, 12)]
+
     def test_each_is_as_if_alone(self, frames: Path) -> None:
         assert run("f.%04d.png", "g.%04d.png").exit_code == 0
         assert run("f.0010.png", "-o", "alone.png").exit_code == 0
@@ -122,6 +129,17 @@ def test_pipes(tmp_path: Path) -> None:
         assert run(path, tmp_path / f"b.{kind}").exit_code == 0
         piped = vkbloom.read(tmp_path / f"piped.{kind}")
         assert np.array_equal(piped, vkbloom.read(tmp_path / f"b.{kind}"))
+
+
+def test_a_pipe_without_an_image() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-m", "vkbloom.cli", "apply", "-", "-"],
+        input=b"dear",
+        capture_output=True,
+        check=False,
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.startswith(b"vkbloom: standard input: is not a readable image")
 
 
 def test_layers(tmp_path: Path) -> None:

@@ -57,4 +57,5 @@ def test_every_public_name_is_there_after_the_import(name: str) -> None:
 
 def test_late_modules_are_there_at_the_first_use() -> None:
     code = "import vkbloom; vkbloom.reference.apply; vkbloom.scene.Mesh; vkbloom.reductions.Mean"
+    code += "; vkbloom.testing.stability"
     assert "vkbloom.grid.reductions" in loaded(code)

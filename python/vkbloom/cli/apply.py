@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import itertools
 import json
+import os
 import sys
 import tempfile
 from collections.abc import Callable
@@ -164,9 +165,9 @@ def command(  # noqa: PLR0915  one step after the other
         raise click.UsageError("standard output takes only final; leave out --attachments")
     work = pairs(given, out)
     with as_wrong_use():
-        for name in {f"image{Path(target).suffix}" for _, target in work}:
-            checked = f"image.{pipe_format}" if out == PIPE else name
-            image_writing.check_writable(checked)
+        for target in {Path(target).suffix: target for _, target in work}.values():
+            checked = f"image.{pipe_format}" if out == PIPE else target
+            _check_writable(checked)
             image_writing.check_quality(checked, quality)
     names = attachments if attachments == "all" else ["final", *attachments.split(",")]
     wanted = no_bloom.with_bloom(names, settings)
@@ -176,7 +177,11 @@ def command(  # noqa: PLR0915  one step after the other
 
         def taken(source: str) -> Picture:
             file = _piped_in(folder) if source == PIPE else source
-            picture = read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            try:
+                picture = read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+            except ValueError as error:
+                # The user does not know the temporary folder of standard input.
+                raise ValueError(str(error).replace(f"{folder}{os.sep}", "")) from error
             return premultiplied(picture) if is_blended else picture
 
         def write(picture: Picture, frames: vkbloom.Frames, target: str) -> None:
@@ -256,6 +261,15 @@ def command(  # noqa: PLR0915  one step after the other
                         write_next(functools.partial(write, picture, kept, target))
     if several:
         click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
+
+
+def _check_writable(target: str) -> None:
+    """Raise ValueError that names the file if its extension is not that of a writable format."""
+    try:
+        image_writing.check_writable(target)
+    except ValueError as error:
+        reason = str(error).removeprefix("path: ")
+        raise ValueError(f"{target}: {reason}, such as .png or .exr") from None
 
 
 def _check_colours(

@@ -83,6 +83,8 @@ def command(
     settings: vkbloom.Settings,
 ) -> None:
     """Render a scene with its bloom and write the framebuffers."""
+    if out == "-":
+        raise click.UsageError("render does not write to a pipe; give --out a file or a folder")
     wanted = attachments or ("all" if count is None else "final")
     names = wanted if wanted == "all" else wanted.split(",")
     is_gif = count is not None and Path(out).suffix.lower() == ".gif"

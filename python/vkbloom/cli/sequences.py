@@ -11,10 +11,16 @@ from typing import Final
 
 import click
 
+from vkbloom.cli.image_files import note
+from vkbloom.io.image_reading import readable_extensions
+
 __all__ = ["PIPE", "pairs"]
 
 #: Stands for standard input and standard output.
 PIPE: Final = "-"
+
+#: The most names in a note.
+_MOST_NAMES: Final = 5
 
 _NUMBER: Final = re.compile(r"%(0?)(\d*)d")
 
@@ -33,7 +39,7 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     Raises
     ------
     FileNotFoundError
-        No file matches a pattern or a glob, or a folder is empty.
+        No file matches a pattern or a glob, or a folder has no image.
     click.UsageError
         There are several sources for one file.
     """
@@ -69,11 +75,7 @@ def _expanded(source: str) -> list[tuple[str, int | None]]:
     folder, name = os.path.split(source)
     found: list[tuple[str, int | None]] = []
     if os.path.isdir(source):
-        found = [
-            (file.path, None)
-            for file in sorted(os.scandir(source), key=lambda file: file.name)
-            if file.is_file() and not file.name.startswith(".")
-        ]
+        found = [(path, None) for path in _images_of(source)]
     elif (number := _NUMBER.search(name)) is not None:
         digits = rf"(\d{{{number[2] or 1},}})"
         form = re.compile(
@@ -92,6 +94,20 @@ def _expanded(source: str) -> list[tuple[str, int | None]]:
     if not found:
         raise FileNotFoundError(f"{source}: no file was found")
     return found
+
+
+def _images_of(folder: str) -> list[str]:
+    """Return the image files of a folder, and print a note about the other files."""
+    files = sorted(
+        file.path for file in os.scandir(folder) if file.is_file() and not file.name.startswith(".")
+    )
+    known = readable_extensions()
+    others = [file for file in files if Path(file).suffix.lower() not in known]
+    if others:
+        names = ", ".join(map(os.path.basename, others[:_MOST_NAMES]))
+        more = ", ..." * (len(others) > _MOST_NAMES)
+        note(f"{folder}: left out what is no image: {names}{more}")
+    return [file for file in files if file not in others]
 
 
 def _filled(pattern: str, number: int | None) -> str:

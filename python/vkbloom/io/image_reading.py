@@ -37,6 +37,7 @@ __all__ = [
     "load",
     "of_layer",
     "opened",
+    "readable_extensions",
     "size_of",
 ]
 
@@ -96,6 +97,22 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     finally:
         failure_of(reader)
         reader.close()
+
+
+def readable_extensions() -> set[str]:
+    """Return the extensions of the formats that can be read, such as ".png".
+
+    Raises
+    ------
+    ModuleNotFoundError
+        OpenImageIO is missing.
+    """
+    oiio = import_extra("OpenImageIO", "images", "Reading images")
+    # "openexr:exr,sxr,mxr;png:png;..."
+    formats = oiio.get_string_attribute("input_format_list").split(",")
+    listed = oiio.get_string_attribute("extension_list").split(";")
+    pairs = (one.partition(":") for one in listed)
+    return {f".{word}" for name, _, words in pairs if name in formats for word in words.split(",")}
 
 
 def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -> None:
