@@ -205,7 +205,7 @@ class TestStores:
                 ["--sheet", "a.png", "--attachments", "none", "--reduce", "mean"],
                 "needs framebuffers",
             ),
-            (["--curves", "a.svg", "--axis", "blur_scale=1"], "more than one value"),
+            (["--axis", "blur_scale=1"], "blur_scale is given twice"),
         ],
         ids=str,
     )
@@ -216,6 +216,14 @@ class TestStores:
         )
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert told in result.stderr
+        assert not out.exists()
+
+    def test_curves_without_an_axis_to_plot(self, tmp_path: Path, image_file: Path) -> None:
+        out = tmp_path / "a.zarr"
+        words = ["--axis", "blur_scale=1", "--curves", "a.svg"]
+        result = run(image_file, "--method", "separable", "-o", out, *words)
+        assert result.exit_code == 2
+        assert "more than one value" in result.stderr
         assert not out.exists()
 
     def test_a_reference_of_several_images(self, tmp_path: Path, image_file: Path) -> None:
