@@ -58,5 +58,5 @@ def test_the_light_of_two_lamps_adds_up(bloom_renderer: vkbloom.Renderer) -> Non
 def test_a_mix_is_not_additive(bloom_renderer: vkbloom.Renderer) -> None:
     """It takes from bright pixels what it gives to others: an average, not added light."""
     mix = vkbloom.Pyramid(composite="mix", intensity=0.3)
-    with pytest.raises(AssertionError, match="light is added and none is taken"):
+    with pytest.raises(AssertionError, match="light is added, and none is removed"):
         testing.assert_additive(lambda image: bloom_renderer.apply(image, mix)["final"])
