@@ -319,10 +319,11 @@ def test_limits_that_are_none(monkeypatch: pytest.MonkeyPatch, text: str) -> Non
 def test_a_device_that_takes_too_long(
     monkeypatch: pytest.MonkeyPatch, scene: Scene, large: NDArray[np.float32]
 ) -> None:
-    monkeypatch.setenv("VKBLOOM_TIMEOUT", "0.1")
+    # Of the 0.3 s of the work, the upload takes a part on GPUs.
+    monkeypatch.setenv("VKBLOOM_TIMEOUT", "0.05")
     renderer = Renderer(validation=True)
     with pytest.raises(
-        DeviceLostError, match=r"not finished within 0\.[12] s.*VKBLOOM_TIMEOUT"
+        DeviceLostError, match=r"not finished within 0\.(05|1) s.*VKBLOOM_TIMEOUT"
     ) as hung:
         long_work(renderer, large)
     assert hung.value.vk_call == "vkWaitForFences"
