@@ -117,13 +117,19 @@ uvec4 with_alpha_of(uvec4 own, vec4 value)
 #endif
 }
 
+// All bits of the half floats that are NaN or infinity.
+uvec2 special_halves(uvec2 bits)
+{
+    // A carry is where all bits of the exponent are set.
+    uvec2 special = ((bits & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
+    return special | (special - (special >> 15));
+}
+
 // The pixel with 0 in place of NaN and infinity in each channel.
 uvec4 finite_bits(uvec4 raw)
 {
 #if CHANNEL_BYTES == 2
-    // A carry is where all bits of the exponent are set.
-    uvec2 special = ((raw.xy & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
-    raw.xy &= ~(special | (special - (special >> 15)));
+    raw.xy &= ~special_halves(raw.xy);
 #elif CHANNEL_BYTES != 1
     raw = mix(raw, uvec4(0), equal(raw & 0x7f800000u, uvec4(0x7f800000u)));
 #endif
@@ -149,9 +155,7 @@ uvec4 finished(uvec4 own, vec4 value)
 {
     uvec4 result = ALPHA == ALPHA_KEEP ? with_alpha_of(own, value) : raw_of(value);
 #if CHANNEL_BYTES == 2
-    // A carry is where all bits of the exponent are set.
-    uvec2 special = ((own.xy & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
-    special |= special - (special >> 15);
+    uvec2 special = special_halves(own.xy);
     result.xy = (own.xy & special) | (result.xy & ~special);
 #elif CHANNEL_BYTES == 4
     result = mix(result, own, equal(own & 0x7f800000u, uvec4(0x7f800000u)));
