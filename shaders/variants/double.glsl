@@ -22,16 +22,7 @@ const int KEPT = 5;
 #define LOAD_COUNT LOADED
 #include "variants/load.glsl"
 
-#define LOAD load_own
-#define LOAD_IMAGE own
-#define LOAD_NUMBER 2
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
-#include "variants/load.glsl"
-
-#define STORE_COUNT COLUMNS
-#include "variants/store.glsl"
+#include "variants/own.glsl"
 
 void main()
 {

@@ -9,16 +9,7 @@ const int COLUMNS = UPSAMPLE_COLUMNS(CHANNEL_BYTES);
 const int KEPT = 4;
 const int AFTER = UPSAMPLE == UPSAMPLE_LINEAR ? 1 : 2;
 
-#define LOAD load_own
-#define LOAD_IMAGE own
-#define LOAD_NUMBER 2
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
-#include "variants/load.glsl"
-
-#define STORE_COUNT COLUMNS
-#include "variants/store.glsl"
+#include "variants/own.glsl"
 
 #define AXIS_FILTER filter_row
 #define AXIS_IMAGE usamplerBuffer image
