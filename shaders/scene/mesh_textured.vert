@@ -3,8 +3,8 @@
 // Triangles with textures.
 #include "scene/mesh.glsl"
 
-layout(location = 4) in vec4 texcoords;
-layout(location = 4) out vec4 surface_texcoords;
+layout(location = 3) in vec4 texcoords;
+layout(location = 3) out vec4 surface_texcoords;
 
 void main()
 {

@@ -1,11 +1,16 @@
 // The colour and the emission of a mesh at a fragment. With TEXTURED, they are multiplied by
 // textures, which hold linear values.
 
-layout(location = 2) in vec3 vertex_colour;
-layout(location = 3) in vec3 vertex_emission;
+#define VARYING in
+#include "scene/varyings.glsl"
+
+vec3 vertex_emission()
+{
+    return vec3(emission_red, emission_green, emission_blue);
+}
 
 #ifdef TEXTURED
-layout(location = 4) in vec4 surface_texcoords;
+layout(location = 3) in vec4 surface_texcoords;
 
 layout(set = 0, binding = 1) uniform sampler2D base_texture;
 layout(set = 0, binding = 2) uniform sampler2D emission_texture;
@@ -17,7 +22,7 @@ vec3 surface_colour()
 
 vec3 surface_emission()
 {
-    return vertex_emission * texture(emission_texture, surface_texcoords.zw).rgb;
+    return vertex_emission() * texture(emission_texture, surface_texcoords.zw).rgb;
 }
 #else
 vec3 surface_colour()
@@ -27,6 +32,6 @@ vec3 surface_colour()
 
 vec3 surface_emission()
 {
-    return vertex_emission;
+    return vertex_emission();
 }
 #endif
