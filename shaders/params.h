@@ -82,10 +82,13 @@
     VEC4S(B, weights, BLUR_VEC4S)
 
 // The same blur on integer texels: a symmetric kernel from the first tap to the last, then zeros.
-// `origin` is the position of the target's first pixel in the source, along the line.
+// `origin` is the position of the target's first pixel in the source, along the line. For ROLLED, so
+// that both directions share a pipeline: whether lines are columns, and whether texels are 8-bit levels.
 #define LINE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, radius) \
     INPUT(B, int, origin) \
+    INPUT(B, int, vertical) \
+    INPUT(B, int, levels) \
     INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 

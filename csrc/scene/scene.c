@@ -272,3 +272,20 @@ void vkb_scene_matrices(const struct vkb_camera *camera, double time, double asp
     rotate(model, 1, turn * time);
     store_product(view, model, params->model_view);
 }
+
+static double length(const float vector[4])
+{
+    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+}
+
+bool vkb_sky_is_magnified(const struct vkb_image *sky, const struct vkb_mesh_params *params,
+                          const struct vkb_image *target)
+{
+    // From the centre to an edge.
+    const double x = length(params->sky[1]) / (target->width / 2.0);
+    const double y = length(params->sky[2]) / (target->height / 2.0);
+
+    // A step in the picture, a plane at a distance of 1, is the longest at a corner of a face of
+    // the cube: sqrt(3) times, since that is as far away, and as much again, since it is oblique.
+    return 3.0 * fmax(x, y) * (sky->width / 2.0) <= 1.0;
+}
