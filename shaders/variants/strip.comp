@@ -17,7 +17,7 @@ const int COLUMNS_SHIFT = COLUMNS >> 1;  // the logarithm
 const int ROWS = STRIP_ROWS(CHANNEL_BYTES), LOADED = ROWS + 2 * STRIP_RADIUS;
 const int KEPT = 2 * STRIP_RADIUS;
 const int WAITING = STRIP_RADIUS / COLUMNS;
-const int RUNS_AT_ONCE = RUN_WORDS == 3 ? 1 : 2, STEP = RUNS_AT_ONCE * COLUMNS;
+const int RUNS_AT_ONCE = 2, STEP = RUNS_AT_ONCE * COLUMNS;
 // Runs of each row that are loaded before the first of them is used: llvmpipe calls a function for
 // each load, before which it moves what is in registers to memory.
 const int AHEAD = CHANNEL_BYTES == 4 ? 1 : 2;
