@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import tracemalloc
 from pathlib import Path
 from typing import Any, cast
 
@@ -296,6 +297,18 @@ def test_unreal() -> None:
     wide = psf.unreal(image, size=2).array((16, 16))
     assert wide[8, 3, 0] < array[8, 3, 0]
     assert psf.unreal(image).kernel((16, 9)).shape == (17, 31, 3)
+
+
+def test_the_kernel_of_a_thin_frame_has_no_hidden_rows() -> None:
+    spread = psf.unreal(np.random.default_rng(1).random((33, 33)))
+    np.testing.assert_array_equal(spread.kernel((200, 1))[0], spread.kernel((200, 200))[199])
+    tracemalloc.start()
+    try:
+        spread.kernel((2000, 1))
+        # 2000 x 2000 pixels would be 96 MB.
+        assert tracemalloc.get_traced_memory()[1] < 4e6
+    finally:
+        tracemalloc.stop()
 
 
 def test_measured() -> None:
