@@ -37,10 +37,11 @@ def box_resample(
         point is in the middle.
     """
     within = room or (None, None)
-    rows, columns = (
-        _edges(*axis) for axis in zip(kernel.shape[:2], point, scale, within, strict=True)
-    )
-    return np.ascontiguousarray(integrals(integrals(kernel, rows, 0), columns, 1))
+    edges = [_edges(*axis) for axis in zip(kernel.shape[:2], point, scale, within, strict=True)]
+    # The axis that shrinks more comes first, so that a thin result takes little memory.
+    for axis in sorted((0, 1), key=lambda axis: len(edges[axis]) / kernel.shape[axis]):
+        kernel = integrals(kernel, edges[axis], axis)
+    return np.ascontiguousarray(kernel)
 
 
 def integrals(values: Array, edges: Array, axis: int) -> Array:
