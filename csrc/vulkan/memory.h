@@ -27,7 +27,7 @@ struct vkb_buffer {
 struct vkb_image {
     VkImage handle;
     VkDeviceMemory memory;
-    VkImageView view;
+    VkImageView view, base_view;  // of all levels and of the first; of cubemaps see vkb_image_view
     enum vkb_format format;
     uint32_t width, height, layers, levels;
     enum vkb_access access;  // the last access recorded
@@ -76,6 +76,10 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
+
+// Creates the view of a cubemap with all levels, or with the first one, if there is none.
+bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
+                    VkImageView *view, struct vkb_error *error);
 
 // Creates the view of a mapped image's words if there is none. The image must be small enough (see
 // vkb_image_fits_words).
