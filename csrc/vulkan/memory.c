@@ -376,8 +376,8 @@ bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format forma
     return words * height <= device->limits.maxTexelBufferElements;
 }
 
-// The bytes of the image's buffer. Mesa 22.3's lavapipe compiles a shader once more for images whose
-// size is a power of two.
+// The bytes of the image's buffer. Mesa 22.3's lavapipe compiles a shader once more for images
+// whose size is a power of two.
 static VkDeviceSize buffer_size(const struct vkb_image *image)
 {
     const VkDeviceSize size = image->row_pitch * image->height;
