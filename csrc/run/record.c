@@ -328,9 +328,12 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
     struct vkb_pass_row packed;
     VkPipeline pipeline;
 
-    if (output && !vkb_readback_is_complete(output)) {
+    if (words) {
         memcpy(&packed, pass, sizeof packed);
-        packed.shader = vkb_spirv[pass->shader].packed;
+        if (run->images[pass->reads[0]]->image.channels == 3)
+            packed.shader = vkb_spirv[packed.shader].rgb;
+        if (output && !vkb_readback_is_complete(output))
+            packed.shader = vkb_spirv[packed.shader].packed;
         pass = &packed;
     }
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,

@@ -305,19 +305,56 @@ bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bo
     return true;
 }
 
-bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
-                     struct vkb_error *error)
+static bool create_words(const struct vkb_device *device, struct vkb_image *image,
+                         VkDeviceSize offset, VkDeviceSize size, struct vkb_error *error)
 {
-    return image->words
-        || VK(error,
+    return VK(error,
               device->vk.vkCreateBufferView(device->handle,
                                             &(VkBufferViewCreateInfo){
                                                 .sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
                                                 .buffer = image->buffer,
                                                 .format = VKB_WORD_FORMAT,
-                                                .range = image->row_pitch * image->height,
+                                                .offset = offset,
+                                                .range = size,
                                             },
                                             NULL, &image->words));
+}
+
+bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
+                     struct vkb_error *error)
+{
+    return image->words || create_words(device, image, 0, image->row_pitch * image->height, error);
+}
+
+bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
+                      struct vkb_image *image)
+{
+    const size_t size = borrowed->row_pitch * (borrowed->height - 1) + borrowed->row_size;
+    // Passes only read it.
+    void *memory = (void *)(uintptr_t)borrowed->memory;
+    struct vkb_buffer buffer;
+    struct vkb_error ignored;
+    VkDeviceSize offset;
+
+    *image = (struct vkb_image){0};
+    if (!vkb_buffer_import(device, vkb_device_import_usage(device), memory, size, &buffer, &offset))
+        return false;
+    *image = (struct vkb_image){
+        .memory = buffer.memory,
+        .format = borrowed->format,
+        .width = borrowed->width,
+        .height = borrowed->height,
+        .access = VKB_ACCESS_DISPATCH_LOADED,
+        .channels = borrowed->channels,
+        .mapped = memory,
+        .row_pitch = borrowed->row_pitch,
+        .buffer = buffer.handle,
+    };
+    if (offset % device->limits.minTexelBufferOffsetAlignment == 0
+        && create_words(device, image, offset, size, &ignored))
+        return true;
+    vkb_image_destroy(device, image);
+    return false;
 }
 
 static size_t round_up(size_t size, size_t step)
@@ -339,6 +376,14 @@ bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format forma
     return words * height <= device->limits.maxTexelBufferElements;
 }
 
+// The bytes of the image's buffer. Mesa 22.3's lavapipe compiles a shader once more for images
+// whose size is a power of two.
+static VkDeviceSize buffer_size(const struct vkb_image *image)
+{
+    const VkDeviceSize size = image->row_pitch * image->height;
+    return (size & (size - 1)) == 0 ? size + VKB_WORD_SIZE : size;
+}
+
 // The image's memory as a buffer.
 static bool create_buffer(const struct vkb_device *device, struct vkb_image *image,
                           VkMemoryRequirements *requirements, struct vkb_error *error)
@@ -353,7 +398,7 @@ static bool create_buffer(const struct vkb_device *device, struct vkb_image *ima
     if (!VK(error, device->vk.vkCreateBuffer(device->handle,
                                              &(VkBufferCreateInfo){
                                                  .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
-                                                 .size = image->row_pitch * image->height,
+                                                 .size = buffer_size(image),
                                                  .usage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
                                                         | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
                                                         | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
@@ -391,6 +436,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .height = spec->height,
         .layers = spec->layers,
         .levels = spec->levels,
+        .channels = vkb_formats[spec->format].channels,
     };
     if (!create_handle(device, spec, image, error))
         return false;

@@ -97,7 +97,7 @@ def run_one(
     arrays : tuple of ndarray
         One for each of the plan's outputs. They are filled.
     """
-    (timings,), counts = core.run(source, (plan,), (arrays,)).wait()
+    (timings,), counts = core.run(source, (plan,), (arrays,), True).wait()
     return Result(_named(plan, arrays), timings, counts)
 
 
