@@ -65,7 +65,7 @@ def modules(shader: Path) -> list[Module]:
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
     is compiled for each format that it may load from: for images as words, and for storage images,
     unless only CPUs run it. If it can make the finished picture, it is also compiled for a target
-    of three channels.
+    of three channels, and if it can read the caller's image, for an image of three single floats.
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
@@ -77,13 +77,17 @@ def modules(shader: Path) -> list[Module]:
                 options = (f"-DSOURCE_FORMAT={glsl}", *inlined)
                 found.append(Module(f"{name}_{ours}", shader, options))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
-            found.append(Module(f"{shader.stem}_words_{ours}", shader, words))
             if shader.name in WORDS_STORED:
                 stored = ("-DWORDS", "-DCHANNEL_BYTES=4", f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}")
                 found.append(Module(f"{shader.stem}_stored_words_{ours}", shader, stored))
-            if "finished(" in text:
-                packed = (*words, "-DTARGET_CHANNELS=3")
-                found.append(Module(f"{shader.stem}_packed_{ours}", shader, packed))
+            kinds = [("", ())]
+            if "SOURCE_CHANNELS" in text and ours == "rgba32float":
+                kinds.append(("rgb_", ("-DRGB",)))
+            for kind, options in kinds:
+                found.append(Module(f"{shader.stem}_words_{kind}{ours}", shader, words + options))
+                if "finished(" in text:
+                    packed = (*words, *options, "-DTARGET_CHANNELS=3")
+                    found.append(Module(f"{shader.stem}_packed_{kind}{ours}", shader, packed))
         return found
     if "SOURCE_FORMAT" in text:
         return [
@@ -167,8 +171,10 @@ def write_spirv() -> None:
     for module in built:
         dispatch = f"{module.shader.stem}_dispatch"
         packed = module.name.replace("_words_", "_packed_")
+        rgb = module.name.replace("_words_", "_words_rgb_")
         twins = ", ".join(
-            f"VKB_SHADER_{twin if twin in names else module.name}" for twin in (dispatch, packed)
+            f"VKB_SHADER_{twin if twin in names else module.name}"
+            for twin in (dispatch, packed, rgb)
         )
         rows += f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twins}}},\n'
     (SPIRV / "spirv.h").write_text(
@@ -176,9 +182,10 @@ def write_spirv() -> None:
         "#include <stddef.h>\n#include <stdint.h>\n\n"
         f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
         "// `dispatch`: the same pass as a compute shader; `packed`: with a target of three\n"
-        "// channels; each is the shader itself where there is none.\n"
+        "// channels; `rgb`: with a first image of three; each is the shader itself where there\n"
+        "// is none.\n"
         "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
-        "    enum vkb_shader dispatch, packed;\n};\n"
+        "    enum vkb_shader dispatch, packed, rgb;\n};\n"
         "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
     )
     (SPIRV / "spirv.c").write_text(

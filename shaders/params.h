@@ -58,12 +58,16 @@
     INPUT(B, float, limit) \
     INPUT(B, int, noise_seed)
 
-// The matrices of a mesh or skybox draw, and the largest value of the colour targets. The glow
-// mesh's colours are multiplied by the intensity before the threshold.
+// The matrices of a mesh or skybox draw, and the largest value of the colour targets. Only what is
+// not constant is passed, in a form that is ready for the vertex shader: llvmpipe compiles a test
+// of the bounds for each number that a shader loads. `projection` has the scales of x, y and z and
+// the offset of z, `model_view` three rows. `sky` has the direction of the picture's centre and its
+// changes from there to the right and to the lower edge. The glow mesh's colours are multiplied by
+// the intensity before the threshold.
 #define MESH_BLOCK(B, READS, INPUT, VEC4S) \
-    VEC4S(B, projection, 4) \
-    VEC4S(B, view, 4) \
-    VEC4S(B, model, 4) \
+    VEC4S(B, projection, 1) \
+    VEC4S(B, model_view, 3) \
+    VEC4S(B, sky, 3) \
     INPUT(B, float, limit) \
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, READS)
@@ -78,10 +82,14 @@
     VEC4S(B, weights, BLUR_VEC4S)
 
 // The same blur on integer texels: a symmetric kernel from the first tap to the last, then zeros.
-// `origin` is the position of the target's first pixel in the source, along the line.
+// `origin` is the position of the target's first pixel in the source, along the line. For ROLLED,
+// so that both directions share a pipeline: whether lines are columns, and whether texels are 8-bit
+// levels.
 #define LINE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, radius) \
     INPUT(B, int, origin) \
+    INPUT(B, int, vertical) \
+    INPUT(B, int, levels) \
     INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 

@@ -19,7 +19,9 @@ struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
     struct vkb_pass_row row = vkb_fullscreen_row(name, fragment, target);
 
     row.geometry = geometry;
-    row.vertex = geometry == VKB_GEOMETRY_SKYBOX ? VKB_SHADER_skybox_vert : VKB_SHADER_mesh_vert;
+    row.vertex = geometry == VKB_GEOMETRY_SKYBOX ? VKB_SHADER_skybox_vert
+               : geometry == VKB_GEOMETRY_GLOW   ? VKB_SHADER_glow_vert
+                                                 : VKB_SHADER_mesh_vert;
     row.depth = depth;
     row.load = VKB_LOAD_CLEAR;
     row.block = VKB_BLOCK_mesh;
@@ -39,7 +41,8 @@ bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_sh
     memcpy(&second, row, sizeof second);
     snprintf(second.name, sizeof second.name, "%.16s_textured", row->name);
     second.textured = true;
-    second.vertex = VKB_SHADER_mesh_textured_vert;
+    second.vertex = row->geometry == VKB_GEOMETRY_GLOW ? VKB_SHADER_glow_textured_vert
+                                                       : VKB_SHADER_mesh_textured_vert;
     second.shader = textured;
     return vkb_graph_add_pass(graph, &second, error);
 }

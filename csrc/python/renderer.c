@@ -378,10 +378,10 @@ static PyMethodDef methods[] = {
      "image of so many rows, of which the source has some, can be made of bands: see "
      "graph/bands.h."},
     {"run", vkb_renderer_run, METH_VARARGS,
-     "run(source, plans, arrays[, first, count]) -> Submission. Submits plans with the same "
-     "images; "
-     "arrays has a tuple for each plan, in the order of its outputs, or of rows first to first + "
-     "count of each."},
+     "run(source, plans, arrays, in_place=False[, first, count]) -> Submission. Submits plans "
+     "with the same images; arrays has a tuple for each plan, in the order of its outputs, or of "
+     "rows first to first + count of each. `in_place`: the source does not change before the end "
+     "of the wait, so that the device may read it where it is."},
     {"upload", vkb_renderer_upload, METH_VARARGS,
      "upload(source, spare, recycled, height=0) -> Source. A copy of an image on the device. "
      "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "

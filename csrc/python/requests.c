@@ -211,11 +211,13 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
 
 // `show` may be NULL.
 static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object *source,
-                   struct vkb_pending *pending, struct vkb_show *show, struct vkb_error *error)
+                   struct vkb_pending *pending, bool in_place, struct vkb_show *show,
+                   struct vkb_error *error)
 {
     struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
         .resident = source->resident,
+        .in_place = in_place,
     };
 
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
@@ -229,14 +231,15 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
              && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
                                  pending->count, show, &pending->submission, error);
     if (done)
-        pending->specials = vkb_frame_specials(&renderer->frame, &data);
+        pending->specials = renderer->frame.specials;
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
 }
 
 static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *plans,
-                     const struct rows *rows, PyObject *arrays, struct vkb_show *show)
+                     const struct rows *rows, PyObject *arrays, bool in_place,
+                     struct vkb_show *show)
 {
     struct vkb_source_object *given = (struct vkb_source_object *)source;
     struct vkb_error error = {0};
@@ -244,7 +247,7 @@ static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *
     if (!vkb_check_source(renderer, given) || !check_plans(renderer, &given->source, plans, arrays))
         return NULL;
     struct submission *self = new_submission(renderer, source, plans, rows, arrays);
-    if (self && !submit(renderer, given, self->pending, show, &error)) {
+    if (self && !submit(renderer, given, self->pending, in_place, show, &error)) {
         // The exception is kept while the arrays are released, which may run Python code.
         vkb_raise(state_of((PyObject *)renderer), &error);
         PyObject *type, *value, *traceback;
@@ -262,12 +265,14 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     struct vkb_module_state *state = state_of(object);
     PyObject *source, *plans, *arrays;
     struct rows rows = {0};
+    int in_place = false;
 
-    if (!PyArg_ParseTuple(arguments, "O!O!O!|O&O&:run", state->source_type, &source, &PyTuple_Type,
-                          &plans, &PyTuple_Type, &arrays, vkb_read_uint32, &rows.first,
+    if (!PyArg_ParseTuple(arguments, "O!O!O!|pO&O&:run", state->source_type, &source, &PyTuple_Type,
+                          &plans, &PyTuple_Type, &arrays, &in_place, vkb_read_uint32, &rows.first,
                           vkb_read_uint32, &rows.count))
         return NULL;
-    return run(renderer, source, plans, PyTuple_Size(arguments) > 3 ? &rows : NULL, arrays, NULL);
+    return run(renderer, source, plans, PyTuple_Size(arguments) > 4 ? &rows : NULL, arrays,
+               in_place, NULL);
 }
 
 PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
@@ -288,7 +293,7 @@ PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
     PyObject *plans = PyTuple_Pack(1, plan);
     PyObject *arrays = Py_BuildValue("((O))", Py_None);
     PyObject *submission =
-        plans && arrays ? run(renderer, source, plans, NULL, arrays, &show) : NULL;
+        plans && arrays ? run(renderer, source, plans, NULL, arrays, false, &show) : NULL;
     Py_XDECREF(plans);
     Py_XDECREF(arrays);
     if (!submission || show.acquired)

@@ -154,9 +154,64 @@ static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
         || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
 }
 
+// Whether the output of that image lies in the memory of the input's rows.
+static bool overlaps(const struct vkb_output *output, const struct vkb_image_row *row,
+                     const struct vkb_input *input)
+{
+    const uintptr_t start = (uintptr_t)output->memory, other = (uintptr_t)input->memory;
+    const size_t pixel_size = output->channels * vkb_formats[row->format].channel_size;
+    const size_t size = (size_t)row->width * output->row_count * pixel_size;
+
+    return output->memory && start < other + (size_t)input->row_stride * input->height
+        && other < start + size;
+}
+
+// Whether all passes of the request that may read the image read words, and nothing copies it to an
+// output or writes to the memory of its pixels.
+static bool allows_in_place(const struct vkb_request *request, uint32_t image,
+                            const struct vkb_input *input)
+{
+    const struct vkb_graph *graph = &request->plan->graph;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        if (vkb_pass_reads(pass, image)
+            && (pass->reading != VKB_READING_WORDS
+                || (input->channels != 4
+                    && (pass->reads[0] != image || vkb_spirv[pass->shader].rgb == pass->shader))))
+            return false;
+    }
+    for (uint32_t i = 0; i < request->plan->output_count; ++i)
+        if (request->plan->outputs[i] == image
+            || overlaps(&request->outputs[i], &graph->images[request->plan->outputs[i]], input))
+            return false;
+    return true;
+}
+
+// Makes the caller's own pixels the image, if the passes can read them there.
+static bool stage_in_place(struct vkb_run *run, uint32_t image, const struct vkb_input *input,
+                           const struct vkb_request *requests, uint32_t request_count)
+{
+    const enum vkb_input_kind kind = run->graph->images[image].input;
+    struct vkb_in_place *place = &run->frame->in_place[kind];
+
+    for (uint32_t i = 0; i < request_count; ++i)
+        if (!allows_in_place(&requests[i], image, input))
+            return false;
+    if (!vkb_in_place_stage(run->device, place, input, &run->frame->cache.clock))
+        return false;
+    run->inputs[kind] = &place->cached;
+    run->submission->inputs[kind] = place->cached.image;
+    return true;
+}
+
 static bool stage_inputs(struct vkb_run *run, const struct vkb_frame_source *source,
+                         const struct vkb_request *requests, uint32_t request_count,
                          struct vkb_error *error)
 {
+    struct vkb_specials *specials = &run->frame->specials;
+
+    *specials = (struct vkb_specials){0};
     for (uint32_t i = 0; i < run->graph->image_count; ++i) {
         const enum vkb_input_kind kind = run->graph->images[i].input;
         if (kind == VKB_INPUT_NONE)
@@ -166,12 +221,20 @@ static bool stage_inputs(struct vkb_run *run, const struct vkb_frame_source *sou
             run->uploads[kind] = &source->resident->inputs[kind].upload;
             run->send_input[kind] = source->resident->staged;
         }
+        const struct vkb_input *input = source->inputs[kind];
+        if (source->in_place && input && stage_in_place(run, i, input, requests, request_count)) {
+            vkb_add_specials(specials, run->frame->in_place[kind].specials);
+            continue;
+        }
         if (!resolve(run, i, error))
             return false;
         run->inputs[kind] = run->images[i];
-        if (!source->resident && !stage_input(run, kind, source->inputs[kind], error))
+        if (!source->resident && !stage_input(run, kind, input, error))
             return false;
+        vkb_add_specials(specials, run->uploads[kind]->specials);
     }
+    if (source->resident)
+        *specials = source->resident->specials;
     return true;
 }
 
@@ -357,7 +420,7 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
 {
     run->graph = &requests[0].plan->graph;
     return (!source->scene || load_scene(run, source->scene, error))
-        && stage_inputs(run, source, error) && stage_constants(run, error)
+        && stage_inputs(run, source, requests, request_count, error) && stage_constants(run, error)
         && reserve(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }
@@ -494,19 +557,6 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
     if (*over)
         vkb_submissions_give_back(device, &frame->submissions, submission);
     return done;
-}
-
-struct vkb_specials vkb_frame_specials(const struct vkb_frame *frame,
-                                       const struct vkb_frame_source *source)
-{
-    struct vkb_specials sum = {0};
-
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
-        const struct vkb_upload *upload = &frame->uploads[kind];
-        sum.nan += source->inputs[kind] ? upload->specials.nan : 0;
-        sum.inf += source->inputs[kind] ? upload->specials.inf : 0;
-    }
-    return source->resident ? source->resident->specials : sum;
 }
 
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,

@@ -5,6 +5,7 @@
 
 #include "graph/plan.h"
 #include "run/image_cache.h"
+#include "run/in_place.h"
 #include "run/pipeline.h"
 #include "run/resident.h"
 #include "run/screen.h"
@@ -18,7 +19,9 @@ struct vkb_frame {
     struct vkb_pipelines pipelines;
     struct vkb_scene scene;
     struct vkb_upload uploads[VKB_INPUT_COUNT];  // by kind
-    struct vkb_buffer constants;                 // staging memory of images that are filled once
+    struct vkb_in_place in_place[VKB_INPUT_COUNT];
+    struct vkb_specials specials;  // of the inputs of the last submission
+    struct vkb_buffer constants;   // staging memory of images that are filled once
     struct vkb_image_cache cache;
     struct vkb_planner planner;
     uint64_t submitted;  // submissions so far
@@ -31,6 +34,9 @@ struct vkb_frame_source {
     const struct vkb_scene_data *scene;
     const struct vkb_input *inputs[VKB_INPUT_COUNT];  // by kind
     struct vkb_resident *resident;  // instead of inputs: images that are on the device
+    // The inputs do not change until the device has run the submission, so that it may read them
+    // where they are.
+    bool in_place;
 };
 
 struct vkb_timing {
@@ -69,10 +75,6 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
 // device has finished it, which is not always so after a failure.
 bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
                        struct vkb_submission *submission, bool *over, struct vkb_error *error);
-
-// The number of NaNs and infinities in the source's image, after it was submitted.
-struct vkb_specials vkb_frame_specials(const struct vkb_frame *frame,
-                                       const struct vkb_frame_source *source);
 
 // Releases an abandoned submission without a wait. False if the device may still run it.
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,

@@ -272,7 +272,7 @@ static const struct geometry_state {
     bool depth_test, depth_write;
 } geometry_states[] = {
     [VKB_GEOMETRY_FULLSCREEN] = {VK_CULL_MODE_NONE, false, false},
-    [VKB_GEOMETRY_SKYBOX] = {VK_CULL_MODE_FRONT_BIT, true, false},
+    [VKB_GEOMETRY_SKYBOX] = {VK_CULL_MODE_NONE, true, false},
     [VKB_GEOMETRY_BODY] = {VK_CULL_MODE_BACK_BIT, true, true},
     [VKB_GEOMETRY_GLOW] = {VK_CULL_MODE_BACK_BIT, true, true},
 };

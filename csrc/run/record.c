@@ -22,23 +22,28 @@ static bool read_image(struct vkb_run *run, const struct vkb_pass_row *pass,
                        const struct vkb_surface *surface, uint32_t index,
                        VkDescriptorImageInfo *info, struct vkb_error *error)
 {
-    const struct vkb_scene *scene = &run->frame->scene;
+    struct vkb_scene *scene = &run->frame->scene;
+    const bool sky = pass->geometry == VKB_GEOMETRY_SKYBOX;
     const struct vkb_texture *texture = NULL;
     const struct vkb_image *image;
 
     if (surface) {
         texture = &scene->textures[index == 0 ? surface->base : surface->emission];
         image = &texture->image;
-    } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
-        image = &scene->sky;
     } else {
-        image = &run->images[pass->reads[index]]->image;
+        image = sky ? &scene->sky : &run->images[pass->reads[index]]->image;
     }
     *info = (VkDescriptorImageInfo){
         .sampler = texture ? texture->sampler : VK_NULL_HANDLE,
         .imageView = image->view,
         .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
     };
+    if (sky) {
+        const struct vkb_image *target = &run->images[pass->targets[0]]->image;
+        const bool smaller = !vkb_sky_is_magnified(image, &pass->params.mesh, target);
+        if (!vkb_image_view(run->device, &scene->sky, smaller, &info->imageView, error))
+            return false;
+    }
     return texture || pass->reading != VKB_READING_SAMPLED
         || vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
                                 &info->sampler, error);
@@ -305,7 +310,7 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
         dispatch(run, pass, run->graph->images[pass->targets[0]].height);
     } else if (!vkb_is_mesh(pass->geometry)) {
-        vk->vkCmdDraw(commands, pass->geometry == VKB_GEOMETRY_SKYBOX ? 36 : 3, 1, 0, 0);
+        vk->vkCmdDraw(commands, 3, 1, 0, 0);
     } else if (mesh->plain_count > 0) {
         bind_mesh(run, mesh, false);
         vk->vkCmdDrawIndexed(commands, mesh->plain_count, 1, 0, 0, 0);
@@ -323,9 +328,12 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
     struct vkb_pass_row packed;
     VkPipeline pipeline;
 
-    if (output && !vkb_readback_is_complete(output)) {
+    if (words) {
         memcpy(&packed, pass, sizeof packed);
-        packed.shader = vkb_spirv[pass->shader].packed;
+        if (run->images[pass->reads[0]]->image.channels == 3)
+            packed.shader = vkb_spirv[packed.shader].rgb;
+        if (output && !vkb_readback_is_complete(output))
+            packed.shader = vkb_spirv[packed.shader].packed;
         pass = &packed;
     }
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,

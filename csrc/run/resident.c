@@ -122,9 +122,7 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
     if (!vkb_upload_rows(device, &resident->inputs[kind].upload, input, first, error))
         return false;
     resident->specials = (struct vkb_specials){0};
-    for (int i = 0; i < VKB_INPUT_COUNT; ++i) {
-        resident->specials.nan += resident->inputs[i].upload.specials.nan;
-        resident->specials.inf += resident->inputs[i].upload.specials.inf;
-    }
+    for (int i = 0; i < VKB_INPUT_COUNT; ++i)
+        vkb_add_specials(&resident->specials, resident->inputs[i].upload.specials);
     return true;
 }

@@ -2,12 +2,20 @@
 
 enum { KEPT_SUBMISSIONS = 3 };  // unused ones; several threads at once may have needed more
 
+static void release_inputs(const struct vkb_device *device, struct vkb_submission *submission)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (submission->inputs[kind].buffer)
+            vkb_image_destroy(device, &submission->inputs[kind]);
+}
+
 static void destroy_submission(const struct vkb_device *device, struct vkb_submission *submission)
 {
     vkb_timer_destroy(device, &submission->timer);
     device->vk.vkDestroyDescriptorPool(device->handle, submission->descriptors, NULL);
     vkb_buffer_destroy(device, &submission->uniforms);
     vkb_readback_destroy(device, &submission->readback);
+    release_inputs(device, submission);
     vkb_commands_destroy(device, &submission->commands);
     vkb_free(submission);
 }
@@ -72,6 +80,7 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
         return;
     submission->request_count = 0;
     vkb_readback_release(device, &submission->readback);
+    release_inputs(device, submission);
     for (size_t i = 0; i < submissions->count; ++i)
         free_count += !submissions->submissions[i]->taken && !submissions->submissions[i]->pending;
     if (free_count <= KEPT_SUBMISSIONS)

@@ -3,6 +3,7 @@
 #ifndef VKB_SUBMISSION_H
 #define VKB_SUBMISSION_H
 
+#include "graph/graph.h"
 #include "run/readback.h"
 #include "vulkan/commands.h"
 #include "vulkan/timing.h"
@@ -15,8 +16,9 @@ struct vkb_submission {
     uint32_t descriptor_capacity;  // in sets
     struct vkb_timer timer;
     struct vkb_readback readback;
-    uint64_t number;               // submissions are numbered from 1
-    struct vkb_request *requests;  // owned by the caller
+    struct vkb_image inputs[VKB_INPUT_COUNT];  // the caller's, which it reads in place; by kind
+    uint64_t number;                           // submissions are numbered from 1
+    struct vkb_request *requests;              // owned by the caller
     uint32_t request_count;
     bool taken;    // in use: not given back yet
     bool pending;  // the device may still run it, even if it was abandoned

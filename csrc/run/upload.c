@@ -78,11 +78,6 @@ static bool is_contiguous(const struct vkb_input *input)
     return input->channel_stride == size && input->pixel_stride == input->channels * size;
 }
 
-static const unsigned char *input_row(const struct vkb_input *input, uint32_t y)
-{
-    return (const unsigned char *)input->memory + y * input->row_stride;
-}
-
 static size_t row_size(const struct vkb_input *input)
 {
     return (size_t)input->width * vkb_pixel_size(input->format);
@@ -90,7 +85,7 @@ static size_t row_size(const struct vkb_input *input)
 
 static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t y)
 {
-    const unsigned char *from = input_row(input, y);
+    const unsigned char *from = vkb_input_row(input, y);
     const void *one = channel_one(input->format);
     const bool contiguous = is_contiguous(input);
 
@@ -131,7 +126,7 @@ struct rows {
 static const unsigned char *packed_row(const struct rows *rows, uint32_t part, uint32_t y)
 {
     const struct vkb_input *input = rows->input;
-    const unsigned char *own = input_row(input, y);
+    const unsigned char *own = vkb_input_row(input, y);
     unsigned char *packed = rows->upload->packed + part * row_size(input);
 
     if (is_complete(input) && is_contiguous(input)
@@ -176,61 +171,6 @@ static uint32_t first_difference(const struct vkb_device *device, struct vkb_upl
     for (int part = 0; part < VKB_MAX_PARTS; ++part)
         first = rows.different[part] < first ? rows.different[part] : first;
     return first;
-}
-
-enum { COUNTED_AT_ONCE = 32768 };  // a sum of this many fits the 16-bit counters below
-
-// Whether no half is special. If all bits of its exponent are set, a sum carries to the sign.
-static bool has_no_special(const uint16_t *bits, size_t count)
-{
-    uint16_t sums = 0;
-
-    for (size_t i = 0; i < count; ++i)
-        sums |= (uint16_t)((bits[i] & 0x7c00) + 0x0400);
-    return sums < 0x8000;
-}
-
-static struct vkb_specials count_halves(const uint16_t *bits, size_t count)
-{
-    // The counters have the width of the elements, so that compilers use vectors of this width.
-    uint16_t special = 0, infinite = 0;
-
-    // Half the time of the count.
-    if (has_no_special(bits, count))
-        return (struct vkb_specials){0};
-    for (size_t i = 0; i < count; ++i) {
-        special = (uint16_t)(special + ((bits[i] & 0x7c00) == 0x7c00));
-        infinite = (uint16_t)(infinite + ((bits[i] & 0x7fff) == 0x7c00));
-    }
-    return (struct vkb_specials){(uint64_t)(special - infinite), infinite};
-}
-
-static struct vkb_specials count_singles(const uint32_t *bits, size_t count)
-{
-    uint32_t special = 0, infinite = 0;
-
-    for (size_t i = 0; i < count; ++i) {
-        special += (bits[i] & 0x7f800000) == 0x7f800000;
-        infinite += (bits[i] & 0x7fffffff) == 0x7f800000;
-    }
-    return (struct vkb_specials){special - infinite, infinite};
-}
-
-static struct vkb_specials count_row(const struct vkb_upload *upload, const void *row)
-{
-    const size_t count = (size_t)upload->width * vkb_formats[upload->format].channels;
-    struct vkb_specials sum = {0};
-
-    for (size_t i = 0; upload->format != VKB_FORMAT_RGBA8_UNORM && i < count;
-         i += COUNTED_AT_ONCE) {
-        const size_t part = count - i < COUNTED_AT_ONCE ? count - i : COUNTED_AT_ONCE;
-        const struct vkb_specials found = upload->format == VKB_FORMAT_RGBA16_FLOAT
-                                            ? count_halves((const uint16_t *)row + i, part)
-                                            : count_singles((const uint32_t *)row + i, part);
-        sum.nan += found.nan;
-        sum.inf += found.inf;
-    }
-    return sum;
 }
 
 void vkb_upload_forget(struct vkb_upload *upload)
@@ -312,7 +252,8 @@ static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end
         const unsigned char *row = streams ? packed_row(rows, part, y) : to;
         if (!streams)
             pack_row(to, rows->input, y);
-        upload->rows[rows->offset + y] = count_row(upload, row);
+        upload->rows[rows->offset + y] = vkb_count_specials(
+            upload->format, row, (size_t)upload->width * vkb_formats[upload->format].channels);
         if (streams)
             stream(to, row, row_size(rows->input));
     }
@@ -322,10 +263,8 @@ static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end
 static void sum_specials(struct vkb_upload *upload)
 {
     upload->specials = (struct vkb_specials){0};
-    for (uint32_t y = 0; y < upload->height; ++y) {
-        upload->specials.nan += upload->rows[y].nan;
-        upload->specials.inf += upload->rows[y].inf;
-    }
+    for (uint32_t y = 0; y < upload->height; ++y)
+        vkb_add_specials(&upload->specials, upload->rows[y]);
 }
 
 static void record_rows(const struct vkb_device *device, VkCommandBuffer commands,

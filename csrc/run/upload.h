@@ -4,6 +4,7 @@
 #ifndef VKB_UPLOAD_H
 #define VKB_UPLOAD_H
 
+#include "run/specials.h"
 #include "run/submission.h"
 
 #include <stddef.h>
@@ -16,9 +17,10 @@ struct vkb_input {
     uint32_t width, height, channels;
 };
 
-struct vkb_specials {
-    uint64_t nan, inf;
-};
+static inline const unsigned char *vkb_input_row(const struct vkb_input *input, uint32_t y)
+{
+    return (const unsigned char *)input->memory + y * input->row_stride;
+}
 
 struct vkb_upload {
     struct vkb_buffer staging;

@@ -4,11 +4,10 @@
 #include <string.h>
 
 const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES] = {
-    {0, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, position)},
-    {1, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, normal)},
-    {2, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, colour)},
-    {3, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(struct vkb_vertex, emission)},
-    {4, 1, VK_FORMAT_R32G32B32A32_SFLOAT, 0},
+    {0, 0, VK_FORMAT_R32G32B32A32_SFLOAT, offsetof(struct vkb_vertex, position)},
+    {1, 0, VK_FORMAT_R32G32B32A32_SFLOAT, offsetof(struct vkb_vertex, normal)},
+    {2, 0, VK_FORMAT_R32G32B32A32_SFLOAT, offsetof(struct vkb_vertex, colour)},
+    {3, 1, VK_FORMAT_R32G32B32A32_SFLOAT, 0},
 };
 
 const VkVertexInputBindingDescription vkb_vertex_bindings[VKB_VERTEX_BINDINGS] = {
@@ -47,6 +46,12 @@ static VkDeviceSize scene_size(const struct vkb_scene_data *data)
     return size;
 }
 
+static void join(float out[4], const float given[3], float emission)
+{
+    memcpy(out, given, 3 * sizeof *given);
+    out[3] = emission;
+}
+
 static VkDeviceSize stage_vertices(struct vkb_staging *staging, const struct vkb_mesh_data *data)
 {
     static const float none[3];
@@ -54,9 +59,11 @@ static VkDeviceSize stage_vertices(struct vkb_staging *staging, const struct vkb
     struct vkb_vertex *vertices = vkb_stage(staging, vertex_bytes(data), &offset);
 
     for (size_t i = 0; i < data->vertex_count; ++i) {
-        memcpy(&vertices[i], data->vertices + VKB_GIVEN_FLOATS * i,
-               offsetof(struct vkb_vertex, emission));
-        memcpy(vertices[i].emission, data->emission ? data->emission + 3 * i : none, sizeof none);
+        const float *given = data->vertices + VKB_GIVEN_FLOATS * i;
+        const float *emission = data->emission ? data->emission + 3 * i : none;
+        join(vertices[i].position, given, emission[0]);
+        join(vertices[i].normal, given + 3, emission[1]);
+        join(vertices[i].colour, given + 6, emission[2]);
     }
     return offset;
 }
@@ -221,11 +228,16 @@ static void rotate(matrix m, int axis, double angle)
     }
 }
 
-static void store(matrix m, float out[4][4])
+// out = a * b, without the last row, which is 0 0 0 1.
+static void store_product(matrix a, matrix b, float out[3][4])
 {
-    for (int column = 0; column < 4; ++column)
-        for (int row = 0; row < 4; ++row)
-            out[column][row] = (float)m[column][row];
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 4; ++column) {
+            double sum = 0.0;
+            for (int i = 0; i < 4; ++i)
+                sum += a[i][row] * b[column][i];
+            out[row][column] = (float)sum;
+        }
 }
 
 void vkb_scene_matrices(const struct vkb_camera *camera, double time, double aspect,
@@ -235,26 +247,45 @@ void vkb_scene_matrices(const struct vkb_camera *camera, double time, double asp
     const double degree = pi / 180.0, turn = 2.0 * pi;
     const double focal = 1.0 / tan(camera->fov * degree / 2.0);
     const double near = camera->near, far = camera->far;
-    matrix m;
+    matrix view, model;
 
     // Perspective with y down and depth 0..1 (the forward system's camera).
-    memset(m, 0, sizeof m);
-    m[0][0] = focal / aspect;
-    m[1][1] = focal;
-    m[2][2] = far / (near - far);
-    m[2][3] = -1.0;
-    m[3][2] = near * far / (near - far);
-    store(m, params->projection);
+    params->projection[0][0] = (float)(focal / aspect);
+    params->projection[0][1] = (float)focal;
+    params->projection[0][2] = (float)(far / (near - far));
+    params->projection[0][3] = (float)(near * far / (near - far));
 
-    set_identity(m);
-    translate(m, camera->position[0], camera->position[1], camera->position[2]);
+    set_identity(view);
+    translate(view, camera->position[0], camera->position[1], camera->position[2]);
     for (int axis = 0; axis < 3; ++axis)
-        rotate(m, axis, camera->rotation[axis] * degree);
-    store(m, params->view);
+        rotate(view, axis, camera->rotation[axis] * degree);
+    // The inverse of a rotation is its transpose.
+    for (int axis = 0; axis < 3; ++axis) {
+        params->sky[0][axis] = (float)-view[axis][2];
+        params->sky[1][axis] = (float)(view[axis][0] * aspect / focal);
+        params->sky[2][axis] = (float)(view[axis][1] / focal);
+    }
 
-    set_identity(m);
-    translate(m, 0.25 * sin(turn * time), -1.0, 0.25 * cos(turn * time));
-    rotate(m, 0, -0.15 * sin(turn * time));
-    rotate(m, 1, turn * time);
-    store(m, params->model);
+    set_identity(model);
+    translate(model, 0.25 * sin(turn * time), -1.0, 0.25 * cos(turn * time));
+    rotate(model, 0, -0.15 * sin(turn * time));
+    rotate(model, 1, turn * time);
+    store_product(view, model, params->model_view);
+}
+
+static double length(const float vector[4])
+{
+    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+}
+
+bool vkb_sky_is_magnified(const struct vkb_image *sky, const struct vkb_mesh_params *params,
+                          const struct vkb_image *target)
+{
+    // From the centre to an edge.
+    const double x = length(params->sky[1]) / (target->width / 2.0);
+    const double y = length(params->sky[2]) / (target->height / 2.0);
+
+    // A step in the picture, a plane at a distance of 1, is the longest at a corner of a face of
+    // the cube: sqrt(3) times, since that is as far away, and as much again, since it is oblique.
+    return 3.0 * fmax(x, y) * (sky->width / 2.0) <= 1.0;
 }

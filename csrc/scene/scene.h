@@ -6,16 +6,16 @@
 #include "scene/texture.h"
 #include "vulkan/commands.h"
 
-// The vertex layout on the device, tightly packed.
+// The vertex layout on the device, tightly packed. The fourth numbers are the emission.
 struct vkb_vertex {
-    float position[3], normal[3], colour[3], emission[3];
+    float position[4], normal[4], colour[4];
 };
 
 // Binding 0 has struct vkb_vertex. Binding 1, only for textured triangles, has the coordinates in
 // two textures.
 enum {
-    VKB_VERTEX_ATTRIBUTES = 4,
-    VKB_TEXTURED_ATTRIBUTES = 5,
+    VKB_VERTEX_ATTRIBUTES = 3,
+    VKB_TEXTURED_ATTRIBUTES = 4,
     VKB_VERTEX_BINDINGS = 2,
     VKB_GIVEN_FLOATS = 9,
     VKB_TEXCOORDS = 4,
@@ -81,8 +81,13 @@ void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data 
                    struct vkb_scene *scene);
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene);
 
-// Writes projection, view and model matrix at `time` (in turns), column by column.
+// Writes the matrices at `time` (in turns).
 void vkb_scene_matrices(const struct vkb_camera *camera, double time, double aspect,
                         struct vkb_mesh_params *params);
+
+// Whether every pixel of a target of that size has less than a texel of the sky, so that no smaller
+// level is read. llvmpipe compiles a view of one level in half the time.
+bool vkb_sky_is_magnified(const struct vkb_image *sky, const struct vkb_mesh_params *params,
+                          const struct vkb_image *target);
 
 #endif

@@ -30,11 +30,12 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
                       vertical ? LINE_OUTPUTS : 1);
     row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
-    row.constants.direction = direction;
     row.constants.radius = kernel->radius <= LINE_SHORT_RADIUS ? kernel->radius : 0;
     row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.radius > 0
                         && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
-    if (row.constants.rolled) {
+    if (!row.constants.rolled) {
+        row.constants.direction = direction;
+    } else {
         const uint32_t across = vertical ? image->width : image->height;
         const uint32_t along = vertical ? image->height : image->width;
         row.groups_width = (across + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
@@ -43,10 +44,22 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     row.block = VKB_BLOCK_line;
     row.params.line.radius = kernel->radius;
     row.params.line.origin = origin;
+    row.params.line.vertical = vertical;
+    row.params.line.levels = row.constants.rolled && image->format == VKB_FORMAT_RGBA8_UNORM;
     row.params.line.limit = vkb_formats[image->format].limit;
     for (int tap = 0; tap <= 2 * kernel->radius; ++tap)
         row.params.line.kernel[tap / 4][tap % 4] = kernel->weights[abs(tap - kernel->radius)];
     return row;
+}
+
+static bool add_line_row(struct vkb_graph *graph, const struct vkb_pass_row *row,
+                         struct vkb_error *error)
+{
+    if (!vkb_graph_add_pass(graph, row, error))
+        return false;
+    if (row->params.line.levels)
+        graph->passes[graph->pass_count - 1].constants.stored = STORED_SINGLE;
+    return true;
 }
 
 // Adds a line blur if the source has the target's size.
@@ -62,7 +75,7 @@ bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass
     if (!*fits)
         return true;
     struct vkb_pass_row row = line_row(choice, pass, &kernel, pass->targets[0], 0);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return add_line_row(choice->graph, &row, error);
 }
 
 // For a horizontal blur into a target of another size whose taps are integer texels apart. Such a
@@ -106,8 +119,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.params.threshold.target_width = sampling.width;
     row.params.threshold.target_height = sampling.height;
     row.params.threshold.limit = sampling.limit;
-    return vkb_graph_add_pass(choice->graph, &line, error)
-        && vkb_add_fullscreen(choice, &row, error);
+    return add_line_row(choice->graph, &line, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
 // The chain of passes that adds a bloom to an image, all at the image's size.

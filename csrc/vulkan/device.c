@@ -31,6 +31,7 @@ VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device)
 {
     return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
              ? VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+                   | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
              : VK_BUFFER_USAGE_TRANSFER_DST_BIT;
 }
 

@@ -268,17 +268,17 @@ static bool create_handle(const struct vkb_device *device, const struct vkb_imag
                   NULL, &image->handle));
 }
 
-static VkImageSubresourceRange all_of_image(const struct vkb_image *image)
+static VkImageSubresourceRange levels_of_image(const struct vkb_image *image, uint32_t levels)
 {
     return (VkImageSubresourceRange){
         .aspectMask = vkb_formats[image->format].aspect,
-        .levelCount = image->levels,
+        .levelCount = levels,
         .layerCount = image->layers,
     };
 }
 
-static bool create_view(const struct vkb_device *device, struct vkb_image *image,
-                        struct vkb_error *error)
+static bool create_view(const struct vkb_device *device, const struct vkb_image *image,
+                        uint32_t levels, VkImageView *view, struct vkb_error *error)
 {
     return VK(error, device->vk.vkCreateImageView(
                          device->handle,
@@ -288,24 +288,73 @@ static bool create_view(const struct vkb_device *device, struct vkb_image *image
                              .viewType = image->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
                                                             : VK_IMAGE_VIEW_TYPE_2D,
                              .format = vkb_formats[image->format].vk,
-                             .subresourceRange = all_of_image(image),
+                             .subresourceRange = levels_of_image(image, levels),
                          },
-                         NULL, &image->view));
+                         NULL, view));
 }
 
-bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
-                     struct vkb_error *error)
+bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
+                    VkImageView *view, struct vkb_error *error)
 {
-    return image->words
-        || VK(error,
+    const bool all = all_levels || image->levels == 1;
+    VkImageView *kept = all ? &image->view : &image->base_view;
+
+    if (!*kept && !create_view(device, image, all ? image->levels : 1, kept, error))
+        return false;
+    *view = *kept;
+    return true;
+}
+
+static bool create_words(const struct vkb_device *device, struct vkb_image *image,
+                         VkDeviceSize offset, VkDeviceSize size, struct vkb_error *error)
+{
+    return VK(error,
               device->vk.vkCreateBufferView(device->handle,
                                             &(VkBufferViewCreateInfo){
                                                 .sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
                                                 .buffer = image->buffer,
                                                 .format = VKB_WORD_FORMAT,
-                                                .range = image->row_pitch * image->height,
+                                                .offset = offset,
+                                                .range = size,
                                             },
                                             NULL, &image->words));
+}
+
+bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
+                     struct vkb_error *error)
+{
+    return image->words || create_words(device, image, 0, image->row_pitch * image->height, error);
+}
+
+bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
+                      struct vkb_image *image)
+{
+    const size_t size = borrowed->row_pitch * (borrowed->height - 1) + borrowed->row_size;
+    // Passes only read it.
+    void *memory = (void *)(uintptr_t)borrowed->memory;
+    struct vkb_buffer buffer;
+    struct vkb_error ignored;
+    VkDeviceSize offset;
+
+    *image = (struct vkb_image){0};
+    if (!vkb_buffer_import(device, vkb_device_import_usage(device), memory, size, &buffer, &offset))
+        return false;
+    *image = (struct vkb_image){
+        .memory = buffer.memory,
+        .format = borrowed->format,
+        .width = borrowed->width,
+        .height = borrowed->height,
+        .access = VKB_ACCESS_DISPATCH_LOADED,
+        .channels = borrowed->channels,
+        .mapped = memory,
+        .row_pitch = borrowed->row_pitch,
+        .buffer = buffer.handle,
+    };
+    if (offset % device->limits.minTexelBufferOffsetAlignment == 0
+        && create_words(device, image, offset, size, &ignored))
+        return true;
+    vkb_image_destroy(device, image);
+    return false;
 }
 
 static size_t round_up(size_t size, size_t step)
@@ -379,6 +428,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .height = spec->height,
         .layers = spec->layers,
         .levels = spec->levels,
+        .channels = vkb_formats[spec->format].channels,
     };
     if (!create_handle(device, spec, image, error))
         return false;
@@ -388,7 +438,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                      &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
-        || !create_view(device, image, error)) {
+        || (spec->layers == 1 && !create_view(device, image, spec->levels, &image->view, error))) {
         vkb_image_destroy(device, image);
         return false;
     }
@@ -400,6 +450,7 @@ void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
     device->vk.vkDestroyBufferView(device->handle, image->words, NULL);
     device->vk.vkDestroyBuffer(device->handle, image->buffer, NULL);
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
+    device->vk.vkDestroyImageView(device->handle, image->base_view, NULL);
     device->vk.vkDestroyImage(device->handle, image->handle, NULL);
     device->vk.vkFreeMemory(device->handle, image->memory, NULL);
     *image = (struct vkb_image){0};
@@ -419,7 +470,7 @@ void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer comma
         .oldLayout = vkb_image_layout(image, image->access),
         .newLayout = vkb_image_layout(image, access),
         .image = image->handle,
-        .subresourceRange = all_of_image(image),
+        .subresourceRange = levels_of_image(image, image->levels),
     };
 
     // A mapped image is also accessed as a buffer, and only a memory barrier covers these writes.

@@ -27,12 +27,13 @@ struct vkb_buffer {
 struct vkb_image {
     VkImage handle;
     VkDeviceMemory memory;
-    VkImageView view;
+    VkImageView view, base_view;  // of all levels and of the first; of cubemaps see vkb_image_view
     enum vkb_format format;
     uint32_t width, height, layers, levels;
     enum vkb_access access;  // the last access recorded
     void *mapped;            // its pixels, row by row; NULL: not host-visible
     size_t row_pitch;        // of the mapped pixels, in bytes
+    uint32_t channels;       // of the mapped pixels; those of the caller may lack the fourth
     // The mapped pixels as a buffer, and as words.
     VkBuffer buffer;
     VkBufferView words;  // created at its first use
@@ -76,6 +77,23 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
+
+// Pixels of the caller, row by row.
+struct vkb_borrowed {
+    enum vkb_format format;
+    uint32_t width, height, channels;
+    size_t row_size, row_pitch;  // multiples of VKB_WORD_SIZE
+    const void *memory;
+};
+
+// Creates a mapped image over the caller's memory, whose words passes can read, and nothing else.
+// False without an error if the device cannot do this.
+bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
+                      struct vkb_image *image);
+
+// Creates the view of a cubemap with all levels, or with the first one, if there is none.
+bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
+                    VkImageView *view, struct vkb_error *error);
 
 // Creates the view of a mapped image's words if there is none. The image must be small enough (see
 // vkb_image_fits_words).

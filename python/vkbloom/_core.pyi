@@ -96,6 +96,7 @@ class Renderer:
         source: Source,
         plans: tuple[Plan, ...],
         arrays: tuple[tuple[_Array | None, ...], ...],
+        in_place: bool = False,
         first: int = ...,
         count: int = ...,
         /,

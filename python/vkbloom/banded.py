@@ -269,5 +269,5 @@ class ImageByBands:
         """Return rows of the framebuffer `final`; the first call renders it."""
         ((_, (_, *rest), dtype),) = self._plan.outputs
         array = np.empty((count, *rest), dtype)
-        self._core.run(self._source, (self._plan,), ((array,),), first, count).wait()
+        self._core.run(self._source, (self._plan,), ((array,),), False, first, count).wait()
         return array

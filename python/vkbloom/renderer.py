@@ -442,6 +442,10 @@ class Renderer:
         An image with the same bytes as before is not uploaded again. Passes run only if their
         inputs or settings have changed. The same is true for mask and emission.
 
+        On a CPU, passes read an image of 1 MiB or more where it is, if its layout allows this. Then
+        nothing is kept of it. If the same array comes again, it is copied, all passes run once
+        more, and from then on the paragraph above holds.
+
         The composite "mix" subtracts only the part of the scene s that is the source of the bloom.
         With a mask m the result is s + i (b - m s), with an emission s + i b.
 
@@ -901,7 +905,7 @@ class Renderer:
     ) -> Frames:
         plan = self._plan_of(source, settings, names)
         arrays = _arrays_for(self._core, plan, out)
-        submission = self._core.run(source, (plan,), (arrays,))
+        submission = self._core.run(source, (plan,), (arrays,), True)
         # While the device works.
         frames = self._frames(settings, requests.named(plan, arrays))
         (timings,), counts = submission.wait()

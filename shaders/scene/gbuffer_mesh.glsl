@@ -6,9 +6,6 @@ UNIFORM_BLOCK(MESH_BLOCK);
 #include "lib/storage.glsl"
 #include "scene/surface.glsl"
 
-layout(location = 0) in vec3 view_position;
-layout(location = 1) in vec3 view_normal;
-
 void main()
 {
     float size = length(view_normal);

@@ -1,4 +1,5 @@
 // The glow mesh: its unlit colour times the intensity, after the threshold if there is one.
+#define GLOW
 #include "lib/block.glsl"
 #include "scene/surface.glsl"
 #include "lib/threshold.glsl"

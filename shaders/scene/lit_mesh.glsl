@@ -6,8 +6,6 @@
 UNIFORM_BLOCK(MESH_BLOCK);
 #include "lib/storage.glsl"
 
-layout(location = 0) in vec3 view_position;
-layout(location = 1) in vec3 view_normal;
 layout(location = 0) out vec4 colour;
 
 void main()

@@ -1,29 +1,34 @@
-// A mesh in view space, for the glow, the Phong and the G-buffer passes.
+// A mesh in view space, for the glow (GLOW), the Phong and the G-buffer passes.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(MESH_BLOCK);
 
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec3 normal;
-layout(location = 2) in vec3 colour;
-layout(location = 3) in vec3 emission;
+// The fourth components are the emission.
+layout(location = 0) in vec4 position;
+layout(location = 1) in vec4 normal;
+layout(location = 2) in vec4 colour;
+#ifdef TEXTURED
+layout(location = 3) in vec4 texcoords;
+#endif
 
-layout(location = 0) out vec3 view_position;
-layout(location = 1) out vec3 view_normal;
-layout(location = 2) out vec3 vertex_colour;
-layout(location = 3) out vec3 vertex_emission;
+#define VARYING out
+#include "scene/varyings.glsl"
 
-void write_vertex()
+void main()
 {
-    mat4 projection = mat4(params.projection[0], params.projection[1], params.projection[2],
-                           params.projection[3]);
-    mat4 view = mat4(params.view[0], params.view[1], params.view[2], params.view[3]);
-    mat4 model = mat4(params.model[0], params.model[1], params.model[2], params.model[3]);
-    mat4 model_view = view * model;
-    vec4 in_view = model_view * vec4(position, 1.0);
-    view_position = in_view.xyz;
-    view_normal = mat3(model_view) * normal;
-    vertex_colour = colour;
-    vertex_emission = emission;
-    gl_Position = projection * in_view;
+    mat3x4 model_view = mat3x4(params.model_view[0], params.model_view[1], params.model_view[2]);
+    vec4 projection = params.projection[0];
+    vec3 in_view = vec4(position.xyz, 1.0) * model_view;
+    gl_Position = vec4(in_view * projection.xyz + vec3(0.0, 0.0, projection.w), -in_view.z);
+    vertex_colour = colour.rgb;
+#ifdef TEXTURED
+    surface_texcoords = texcoords;
+#endif
+#ifndef GLOW
+    view_position = in_view;
+    view_normal = vec4(normal.xyz, 0.0) * model_view;
+    emission_red = position.w;
+    emission_green = normal.w;
+    emission_blue = colour.w;
+#endif
 }

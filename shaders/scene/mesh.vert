@@ -2,8 +2,3 @@
 #extension GL_GOOGLE_include_directive : require
 // Triangles without textures.
 #include "scene/mesh.glsl"
-
-void main()
-{
-    write_vertex();
-}

@@ -1,13 +1,5 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // Triangles with textures.
+#define TEXTURED
 #include "scene/mesh.glsl"
-
-layout(location = 4) in vec4 texcoords;
-layout(location = 4) out vec4 surface_texcoords;
-
-void main()
-{
-    write_vertex();
-    surface_texcoords = texcoords;
-}

@@ -19,7 +19,7 @@ WRITE_IMAGE(3);
 #define LOAD load_scene
 #define LOAD_IMAGE scene
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
+#define LOAD_CHANNELS SOURCE_CHANNELS
 #define LOAD_FROM 0
 #define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"

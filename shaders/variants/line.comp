@@ -16,7 +16,8 @@ const int LOADED = LINE_OUTPUTS + 2 * RADIUS;
 
 ivec2 along()
 {
-    return DIRECTION == DIRECTION_VERTICAL ? ivec2(0, 1) : ivec2(1, 0);
+    bool vertical = ROLLED != 0 ? params.vertical != 0 : DIRECTION == DIRECTION_VERTICAL;
+    return vertical ? ivec2(0, 1) : ivec2(1, 0);
 }
 
 vec4 load(ivec2 pixel, int texels)
@@ -57,7 +58,14 @@ void add_long(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
 void write(ivec2 pixel, vec4 sum)
 {
     if (all(lessThan(pixel, imageSize(target))))
-        imageStore(target, pixel, stored(sum));
+        imageStore(target, pixel, sum);
+}
+
+// With `levels` STORED is that of floats.
+vec4 stored_rolled(vec4 sum)
+{
+    vec4 level = vec4(nearest_level(sum.rgb), nearest_level(sum.aaa).r) * (1.0 / 255.0);
+    return params.levels == 0 ? stored(sum) : vec4(level.rgb, ALPHA == ALPHA_BLUR ? level.a : 1.0);
 }
 
 // The same as with add_short, where a compiler takes longer than the pass: it has one load and one
@@ -66,23 +74,31 @@ void write(ivec2 pixel, vec4 sum)
 void blur_rolled()
 {
     ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, ROLLED_OUTPUTS);
-    ivec2 first = DIRECTION == DIRECTION_VERTICAL ? place : place.yx;
+    ivec2 first = along().y != 0 ? place : place.yx;
     float weights[2 * RADIUS + 1];
-    vec4 sums[2 * RADIUS + 1];
+    // Alpha apart: compilers do not remove a part of a vector that lives over an iteration.
+    vec3 sums[2 * RADIUS + 1];
+    float alphas[2 * RADIUS + 1];
 
     [[unroll]] for (int tap = 0; tap < 2 * RADIUS + 1; ++tap) {
-        weights[tap] = params.kernel[tap >> 2][tap & 3];
-        sums[tap] = vec4(0.0);
+        // The kernel is symmetric.
+        int same = max(tap, 2 * RADIUS - tap);
+        weights[tap] = params.kernel[same >> 2][same & 3];
+        sums[tap] = vec3(0.0);
+        alphas[tap] = 0.0;
     }
     if (any(greaterThanEqual(first, imageSize(target))))
         return;
     for (int number = 0; number < ROLLED_OUTPUTS + 2 * params.radius; ++number) {
         vec4 texel = load(first, number - RADIUS);
-        [[unroll]] for (int j = 0; j < 2 * RADIUS; ++j)
-            sums[2 * RADIUS - j] = sums[2 * RADIUS - j - 1] + weights[2 * RADIUS - j] * texel;
-        sums[0] = weights[0] * texel;
+        [[unroll]] for (int j = 2 * RADIUS; j > 0; --j) {
+            sums[j] = sums[j - 1] + weights[j] * texel.rgb;
+            alphas[j] = alphas[j - 1] + weights[j] * texel.a;
+        }
+        sums[0] = weights[0] * texel.rgb;
+        alphas[0] = weights[0] * texel.a;
         if (number >= 2 * RADIUS)
-            write(first + (number - 2 * RADIUS) * along(), sums[2 * RADIUS]);
+            write(first + (number - 2 * RADIUS) * along(), stored_rolled(vec4(sums[2 * RADIUS], alphas[2 * RADIUS])));
     }
 }
 
@@ -100,7 +116,7 @@ void blur_unrolled()
     else
         add_long(first, sums);
     [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
-        write(first + i * along(), sums[i]);
+        write(first + i * along(), stored(sums[i]));
 }
 
 void main()

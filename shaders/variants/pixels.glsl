@@ -5,6 +5,13 @@
 // A `raw` pixel has its channels as bits: with WORDS the bits of CHANNEL_BYTES bytes for each
 // channel, otherwise the bits of single floats. load.glsl and store.glsl define the functions.
 
+// Channels of the source in memory: 3 where it is the caller's array and has no alpha.
+#ifdef RGB
+#define SOURCE_CHANNELS 3
+#else
+#define SOURCE_CHANNELS 4
+#endif
+
 // Channels of the target in memory: 3 where the caller's array has no alpha.
 #ifndef TARGET_CHANNELS
 #define TARGET_CHANNELS 4

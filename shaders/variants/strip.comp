@@ -2,17 +2,23 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 // The complete bloom of an image for devices without fast shared memory. An invocation writes some
-// rows from left to right. It adds up the columns of a word for all rows, adds these sums to the
-// pixels near them, which it keeps in registers, and stores the pixels of two words at once.
+// rows from left to right. It adds up the columns of a run for all rows, adds these sums to the
+// pixels near them, which it keeps in registers, and stores the pixels of one or two runs at once.
 #include "variants/fused_bloom.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = 4 / CHANNEL_BYTES, WORD_SHIFT = COLUMNS >> 1;  // of a word; its logarithm
+// A run of a row: a word, or three words with the pixels of three channels.
+#if SOURCE_CHANNELS == 3
+const int RUN_WORDS = 3, COLUMNS = 4;
+#else
+const int RUN_WORDS = 1, COLUMNS = 4 / CHANNEL_BYTES;
+#endif
+const int COLUMNS_SHIFT = COLUMNS >> 1;  // the logarithm
 const int ROWS = STRIP_ROWS(CHANNEL_BYTES), LOADED = ROWS + 2 * STRIP_RADIUS;
 const int KEPT = 2 * STRIP_RADIUS;
 const int WAITING = STRIP_RADIUS / COLUMNS;
-const int STEP = 2 * COLUMNS;
-// Words of each row that are loaded before the first of them is used: llvmpipe calls a function for
+const int RUNS_AT_ONCE = 2, STEP = RUNS_AT_ONCE * COLUMNS;
+// Runs of each row that are loaded before the first of them is used: llvmpipe calls a function for
 // each load, before which it moves what is in registers to memory.
 const int AHEAD = CHANNEL_BYTES == 4 ? 1 : 2;
 
@@ -24,9 +30,9 @@ WRITE_IMAGE(2);
 
 int rows[LOADED];
 float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
-// Of each row: the blooms that lack later columns, and the words that they belong to.
+// Of each row: the blooms that lack later columns, and the runs that they belong to.
 vec3 kept[ROWS][KEPT];
-uvec4 waiting[ROWS][WAITING + 1];
+uvec4 waiting[ROWS][WAITING + 1][RUN_WORDS];
 
 void start_row_sums(ivec2 first, ivec2 size)
 {
@@ -40,36 +46,43 @@ void start_row_sums(ivec2 first, ivec2 size)
         [[unroll]] for (int i = 0; i < KEPT; ++i)
             kept[row][i] = vec3(0.0);
         [[unroll]] for (int i = 0; i < WAITING; ++i)
-            waiting[row][i] = uvec4(0);
+            [[unroll]] for (int word = 0; word < RUN_WORDS; ++word)
+                waiting[row][i][word] = uvec4(0);
     }
 }
 
-void pixels_of(uvec4 word, out uvec4 raw[COLUMNS])
+void pixels_of(uvec4 run[RUN_WORDS], out uvec4 raw[COLUMNS])
 {
-    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-#if CHANNEL_BYTES == 4
-        raw[i] = word;
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+#if SOURCE_CHANNELS == 3
+        int at = 3 * i;
+        raw[i] = uvec4(run[at / 4][at % 4], run[(at + 1) / 4][(at + 1) % 4],
+                       run[(at + 2) / 4][(at + 2) % 4], 0);
+#elif CHANNEL_BYTES == 4
+        raw[i] = run[0];
 #elif CHANNEL_BYTES == 2
-        raw[i] = uvec4(word[2 * i], word[2 * i + 1], 0, 0);
+        raw[i] = uvec4(run[0][2 * i], run[0][2 * i + 1], 0, 0);
 #else
-        raw[i] = uvec4(word[i], 0, 0, 0);
+        raw[i] = uvec4(run[0][i], 0, 0, 0);
 #endif
+    }
 }
 
-void load_columns(int at, out uvec4 loaded[LOADED])
+void load_columns(int at, out uvec4 loaded[LOADED][RUN_WORDS])
 {
     [[unroll]] for (int i = 0; i < LOADED; ++i)
-        loaded[i] = texelFetch(image, rows[i] + at);
+        [[unroll]] for (int word = 0; word < RUN_WORDS; ++word)
+            loaded[i][word] = texelFetch(image, rows[i] + at * RUN_WORDS + word);
 }
 
-// Sums of the columns of a word for all rows.
-void add_columns(uvec4 words[LOADED], out vec3 sums[ROWS][COLUMNS])
+// Sums of the columns of a run for all rows.
+void add_columns(uvec4 runs[LOADED][RUN_WORDS], out vec3 sums[ROWS][COLUMNS])
 {
     [[unroll]] for (int loaded = 0; loaded < LOADED; ++loaded) {
         uvec4 raw[COLUMNS];
-        pixels_of(words[loaded], raw);
+        pixels_of(runs[loaded], raw);
         if (loaded >= STRIP_RADIUS && loaded < ROWS + STRIP_RADIUS)
-            waiting[loaded - STRIP_RADIUS][WAITING] = words[loaded];
+            waiting[loaded - STRIP_RADIUS][WAITING] = runs[loaded];
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             vec3 added = thresholded(value_of(raw[i]).rgb);
             // (A loop over the rows of this tap alone has no constant ends, so it is not unrolled.)
@@ -86,7 +99,7 @@ void add_columns(uvec4 words[LOADED], out vec3 sums[ROWS][COLUMNS])
 }
 
 // Replaces sums outside of the image by those of its outermost columns: of pixels from x on, which
-// are in the word `at` or beyond it.
+// are in the run `at` or beyond it.
 void repeat_edges(int x, int at, int width, inout vec3 sums[ROWS][COLUMNS])
 {
     [[unroll]] for (int row = 0; row < ROWS; ++row) {
@@ -99,7 +112,7 @@ void repeat_edges(int x, int at, int width, inout vec3 sums[ROWS][COLUMNS])
     }
 }
 
-// Adds a word's columns to the row, which finishes the pixels of the word STRIP_RADIUS before.
+// Adds a run's columns to the row, which finishes the pixels of the run STRIP_RADIUS before.
 void finish_row(int row, ivec2 first, vec3 sums[COLUMNS], out uvec4 raw[COLUMNS])
 {
     pixels_of(waiting[row][0], raw);
@@ -116,19 +129,20 @@ void finish_row(int row, ivec2 first, vec3 sums[COLUMNS], out uvec4 raw[COLUMNS]
     }
 }
 
-// The word of the column x, or the nearest one in the image.
-int word_of(int x, int width)
+// The run of the column x, or the nearest one in the image.
+int run_of(int x, int width)
 {
-    return clamp(x >> WORD_SHIFT, 0, (width - 1) >> WORD_SHIFT);
+    return clamp(x >> COLUMNS_SHIFT, 0, (width - 1) >> COLUMNS_SHIFT);
 }
 
-// Adds the word of the column x to all rows. The pixels from `done` on are finished then.
-void add_word(int x, uvec4 loaded[LOADED], ivec2 done, int width, out uvec4 raw[ROWS][COLUMNS])
+// Adds the run of the column x to all rows. The pixels from `done` on are finished then.
+void add_run(int x, uvec4 loaded[LOADED][RUN_WORDS], ivec2 done, int width,
+             out uvec4 raw[ROWS][COLUMNS])
 {
     vec3 sums[ROWS][COLUMNS];
 
     add_columns(loaded, sums);
-    repeat_edges(x, word_of(x, width), width, sums);
+    repeat_edges(x, run_of(x, width), width, sums);
     [[unroll]] for (int row = 0; row < ROWS; ++row)
         finish_row(row, done + ivec2(0, row), sums[row], raw[row]);
 }
@@ -144,15 +158,15 @@ void main()
         return;
     start_row_sums(first, size);
     for (int x = first.x - STRIP_RADIUS; x < end + STRIP_RADIUS; x += STEP) {
-        uvec4 loaded[2][LOADED], added[ROWS][COLUMNS], raw[ROWS][STEP];
+        uvec4 loaded[RUNS_AT_ONCE][LOADED][RUN_WORDS], added[ROWS][COLUMNS], raw[ROWS][STEP];
         ivec2 done = ivec2(x - STRIP_RADIUS, first.y);
         // All pixels before the first store, after which compilers load parameters lane by lane.
-        [[unroll]] for (int word = 0; word < 2; ++word) {
-            int start = word * COLUMNS;
-            if (word % AHEAD == 0)
+        [[unroll]] for (int run = 0; run < RUNS_AT_ONCE; ++run) {
+            int start = run * COLUMNS;
+            if (run % AHEAD == 0)
                 [[unroll]] for (int i = 0; i < AHEAD; ++i)
-                    load_columns(word_of(x + start + i * COLUMNS, size.x), loaded[word + i]);
-            add_word(x + start, loaded[word], done + ivec2(start, 0), size.x, added);
+                    load_columns(run_of(x + start + i * COLUMNS, size.x), loaded[run + i]);
+            add_run(x + start, loaded[run], done + ivec2(start, 0), size.x, added);
             [[unroll]] for (int row = 0; row < ROWS; ++row)
                 [[unroll]] for (int i = 0; i < COLUMNS; ++i)
                     raw[row][start + i] = added[row][i];

@@ -19,7 +19,7 @@ WRITE_IMAGE(2);
 #define LOAD load_run
 #define LOAD_IMAGE image
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
+#define LOAD_CHANNELS SOURCE_CHANNELS
 #define LOAD_FROM 0
 #define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"

@@ -415,6 +415,13 @@ class TestErrors:
             ["a.exr", "b.png", "bad.exr", "bad.png", "cut.exr", "cut.png", "xyz.exr"]
         )
 
+    def test_an_array_of_numpy_says_how_to_convert_it(self, tmp_path: Path) -> None:
+        file = tmp_path / "a.npy"
+        np.save(file, light(20, 30, 3))
+        result = run(file, tmp_path / "b.png")
+        assert result.exit_code == 1
+        assert f"vkbloom.write('image.exr', numpy.load('{file}'))" in result.stderr
+
     @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "tif"])
     def test_libraries_are_silenced(self, tmp_path: Path, suffix: str) -> None:
         path = tmp_path / f"a.{suffix}"

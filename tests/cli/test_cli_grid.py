@@ -197,6 +197,8 @@ class TestStores:
             (["--reduce", "mean@blur_scale=1"], "takes no @REFERENCE"),
             (["--reduce", "ssim@blur_scale=3"], "is not a value of the axis"),
             (["--chunk", "blur_scale"], "AXIS=COUNT"),
+            (["--chunk", "exposure=1"], "'exposure' is not an axis of the grid"),
+            (["--chunk", "blur_scale=0"], "0 is not an integer of at least 1"),
             (["--size", "3x3"], "the source is not a scene"),
             (["--attachments", "none"], "request some"),
             (["--sheet", "a.jpg"], "--sheet: a.jpg does not end in .png"),
@@ -217,6 +219,14 @@ class TestStores:
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
         assert told in result.stderr
         assert not out.exists()
+
+    def test_reference_frames_that_need_more_passes_than_are_saved(
+        self, tmp_path: Path, image_file: Path
+    ) -> None:
+        words = ["--axis", "blur_scale=1,2", "--reduce", "psnr:bloom@blur_scale=2"]
+        words += ["--attachments", "none", "--chunk", "blur_scale=1"]
+        told = done(image_file, "--method", "separable", *words, "-o", tmp_path / "a.zarr")
+        assert told.endswith(", saved 0\n")
 
     def test_curves_without_an_axis_to_plot(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "a.zarr"
@@ -404,6 +414,16 @@ class TestImageFiles:
             result = run(image_file, "--axis", "exposure=0", "-o", tmp_path / "files", *words)
             assert result.exit_code == 2
             assert "need a store" in result.stderr
+
+    def test_a_folder_named_like_an_image(self, tmp_path: Path, image_file: Path) -> None:
+        words = [image_file, "--axis", "exposure=0", "-o", tmp_path / "g.exr"]
+        result = run(*words)
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert "name a folder, and give --image-format exr" in result.stderr
+        assert not (tmp_path / "g.exr").exists()
+        # Such a folder may exist; nothing else would be there to resume.
+        (tmp_path / "g.exr").mkdir()
+        done(*words)
 
     def test_formats_that_are_not_there(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "files"

@@ -143,13 +143,13 @@ def test_rows_of_an_image(renderer: Renderer) -> None:
     plan = core.plan(source, Separable(), ("bloom", "final"))
     for first, count in ((0, 5), (5, 16), (20, 1), (0, 21)):
         arrays = tuple(np.empty((count, 33, 4 - i), np.float32) for i in range(2))
-        _, counts = core.run(source, (plan,), (arrays,), first, count).wait()
+        _, counts = core.run(source, (plan,), (arrays,), False, first, count).wait()
         assert counts == (3, 0)
         for name, array in zip(("bloom", "final"), arrays, strict=True):
             np.testing.assert_array_equal(array, expected[name][first : first + count])
     for first, count in ((0, 22), (21, 1), (0, 0)):
         with pytest.raises(ValueError, match="the rows are not within the framebuffer"):
-            core.run(source, (plan,), (arrays,), first, count)
+            core.run(source, (plan,), (arrays,), False, first, count)
     for rows, first in ((image[:8], 14), (image[:8, :30], 0), (image[:8].astype(np.float16), 0)):
         with pytest.raises(ValueError, match="the rows do not fit into the image"):
             core.fill(source, _core.image_source(rows), first)

@@ -258,6 +258,18 @@ def test_kernels() -> None:
     ).all()
 
 
+@pytest.mark.parametrize(
+    "spread", [kernel_of(5, 6), psf.spencer(), psf.fog_glow(8), psf.unreal(kernel_of(5, 6))]
+)
+def test_the_size_of_a_kernel_is_known_without_it(spread: Any) -> None:
+    """It is checked first, so that a kernel too large for the adapter takes no memory."""
+    frame = (40, 20)
+    for size in (None, (9, 7)):
+        settings = Convolution(spread, kernel_size=size)
+        width, height = settings.core_kernel_size(frame, frame)
+        assert settings.kernel(frame).shape[:2] == (height, width)
+
+
 def test_gain() -> None:
     gains = reference.gain(Convolution([[[1, 2, 3]]], normalize=False))
     np.testing.assert_allclose(gains, [1, 2, 3])

@@ -34,6 +34,24 @@ def test_the_device_is_the_reference(
     assert_matches_reference(renderer.apply(picture, settings), picture, settings)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_8_bits_are_off_by_the_rounding_of_each_level(renderer: Renderer, seed: int) -> None:
+    """Every stored value is rounded by half a level, and counts as often as its weight says.
+
+    down_k adds the rounding of k + 1 images. up_k is stored divided by the sum of the sizes of the
+    weights from k on.
+    """
+    random = np.random.default_rng(seed)
+    weights = tuple(random.uniform(-0.8, 1.0, 5).tolist())
+    sizes = np.abs(weights)
+    settings = Pyramid(levels=5, level_weights=weights, radius=random.uniform(0.0, 2.0))
+    picture = random.integers(0, 256, (75, 131, 3), np.uint8)
+    allowed = 0.5 + 0.5 * (sizes * np.arange(1, 6)).sum() + 0.5 * np.cumsum(sizes[::-1])[1:].sum()
+    bloom = renderer.apply(picture, settings)["bloom"]
+    expected = 255 * reference.apply(picture, settings)["bloom"]
+    assert_allclose(bloom, expected, rtol=0, atol=allowed)
+
+
 def test_a_sum_of_the_levels_by_themselves(renderer: Renderer) -> None:
     """The bloom is linear in the weights: that of each level alone, times its weight."""
     picture, weights = image((96, 64), "float32"), (0.5, -1.0, 0.25)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import tracemalloc
 from pathlib import Path
 from typing import Any, cast
 
@@ -296,6 +297,21 @@ def test_unreal() -> None:
     wide = psf.unreal(image, size=2).array((16, 16))
     assert wide[8, 3, 0] < array[8, 3, 0]
     assert psf.unreal(image).kernel((16, 9)).shape == (17, 31, 3)
+
+
+def test_the_kernel_of_a_thin_frame_has_no_hidden_rows() -> None:
+    spread = psf.unreal(np.random.default_rng(1).random((33, 33)))
+    whole = spread.kernel((200, 200))
+    np.testing.assert_allclose(spread.kernel((200, 1))[0], whole[199], atol=1e-15)
+    np.testing.assert_allclose(spread.kernel((1, 200))[:, 0], whole[:, 199], atol=1e-15)
+    tracemalloc.start()
+    try:
+        spread.kernel((2000, 1))
+        spread.kernel((1, 2000))
+        # 2000 x 2000 pixels would be 96 MB.
+        assert tracemalloc.get_traced_memory()[1] < 4e6
+    finally:
+        tracemalloc.stop()
 
 
 def test_measured() -> None:

@@ -175,7 +175,7 @@ def test_no_clip_plane_cuts_the_sky(
 
 
 @pytest.mark.parametrize(
-    ("side", "level"), [(128, 0.0), (48, math.log2(64 / 48)), (23, math.log2(64 / 23))]
+    ("side", "level"), [(200, 0.0), (128, 0.0), (48, math.log2(64 / 48)), (23, math.log2(64 / 23))]
 )
 def test_a_small_frame_sees_the_skys_mip_levels(
     renderer: Renderer, scene: Scene, side: int, level: float

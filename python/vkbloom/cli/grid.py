@@ -40,6 +40,7 @@ from vkbloom.grid.image_files import FileForm, GridFiles
 from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import visit
+from vkbloom.grid.zarr_grid import check_chunks
 from vkbloom.io import image_writing, safe_writing
 from vkbloom.io.images import Colour, Picture
 from vkbloom.settings import SHADINGS, Shading
@@ -177,8 +178,7 @@ def command(
     if not is_store:
         if sheet or curves:
             raise click.UsageError(f"--sheet and --curves need a store; use --out NAME{_STORE}")
-        with as_wrong_use():
-            image_writing.check_writable(f"image.{suffix.lstrip('.')}")
+        _check_image_files(out, suffix)
     if sheet and attachments == "none":
         raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
     _check_drawing("--sheet", sheet, (".png",))
@@ -208,6 +208,7 @@ def command(
     }
     with as_wrong_use():
         grid = ask(source, begun, axes, **shared)
+        check_chunks(grid, chunks)
     if curves and max(grid.shape, default=1) < 2:
         raise click.UsageError("--curves needs an --axis of more than one value")
     if not workers and not scheduler:
@@ -270,6 +271,23 @@ def _check_combination(
         raise click.UsageError("--workers and --scheduler exclude each other; give one of them")
     if needs_store and not is_store:
         raise click.UsageError(f"--reduce and --chunk need a store; use --out NAME{_STORE}")
+
+
+def _check_image_files(out: str, image_format: str) -> None:
+    """Raise click.UsageError for an unknown format, and for a folder named like an image."""
+    with as_wrong_use():
+        image_writing.check_writable(f"image.{image_format.lstrip('.')}")
+    suffix = Path(out).suffix
+    if not suffix or Path(out).is_dir():
+        return
+    try:
+        image_writing.check_writable(out)
+    except ValueError:
+        return
+    raise click.UsageError(
+        f"--out: {out} is an image's name, not a folder's; a grid writes an image for each point: "
+        f"name a folder, and give --image-format {suffix[1:]}"
+    )
 
 
 def _check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:

@@ -38,8 +38,8 @@ class Tally:
 
     @property
     def saved(self) -> int:
-        """Passes that did not have to run."""
-        return self.alone - self.ran
+        """Passes that did not have to run; 0 if reference frames need more than that."""
+        return max(0, self.alone - self.ran)
 
     def add(self, other: Tally) -> None:
         """Add another tally."""

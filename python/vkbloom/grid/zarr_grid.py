@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from vkbloom.scene import Scene
 
-__all__ = ["grid_to_zarr"]
+__all__ = ["check_chunks", "grid_to_zarr"]
 
 
 def grid_to_zarr(
@@ -142,6 +142,7 @@ def grid_to_zarr(
         raise TypeError("source: an uploaded image belongs to one renderer; give the array itself")
     if "done" in (axis.name for axis in grid.axes):
         raise ValueError("axes: 'done' is not a possible name; the store uses it for its marks")
+    check_chunks(grid, chunks)
     if client is not None and not keys.is_shared:
         raise ValueError("store: the workers cannot write to a store in memory; use a folder")
 
@@ -166,6 +167,27 @@ def _chunk(grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: K
         stored = stored_identity(read_json(keys.read(ROOT)) or {})
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout) if held is None else held
+    return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)
+
+
+def check_chunks(grid: Grid, chunks: Mapping[str, int] | None) -> None:
+    """Check the argument `chunks` of `grid_to_zarr`.
+
+    Parameters
+    ----------
+    grid : Grid
+    chunks : mapping of str to int or None
+
+    Raises
+    ------
+    TypeError
+        It is not a mapping.
+    ValueError
+        It names something that is not an axis of the grid, or a count is not an integer of at
+        least 1.
+    """
+    if chunks is None:
+        return
     if not isinstance(chunks, Mapping):
         raise TypeError(f"chunks: {chunks!r} is not a mapping of axis names to point counts")
     names = [axis.name for axis in grid.axes]
@@ -176,4 +198,3 @@ def _chunk(grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: K
             )
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
             raise ValueError(f"chunks: {name}: {count!r} is not an integer of at least 1")
-    return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)

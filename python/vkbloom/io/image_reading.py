@@ -85,6 +85,11 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     # OpenImageIO reports missing and damaged files alike; this raises the system's own reason.
     with open(name, "rb"):
         pass
+    if name.lower().endswith(".npy"):
+        raise ValueError(
+            f"{name}: is a NumPy array, not an image; write it as one: "
+            f"vkbloom.write('image.exr', numpy.load({name!r}))"
+        )
     # Otherwise OpenImageIO multiplies straight colours by alpha.
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)

@@ -16,7 +16,7 @@ from vkbloom.fields import choice_field
 from vkbloom.psf.base import PSF, check_above
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.resampling import box_resample
-from vkbloom.psf.sampled import SampledPSF, samples
+from vkbloom.psf.sampled import samples
 from vkbloom.settings import Settings
 
 __all__ = ["Boundary", "Convolution", "PSFLike"]
@@ -150,10 +150,11 @@ class Convolution(Settings):
         return CoreKernel(pixels, serial, is_grey, self.prefilter)
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
-        """Return estimates of the kernel's width and height; (1, 1) if they are not known yet."""
-        if self.kernel_size is None and isinstance(self.psf, SampledPSF):
-            return 1, 1
+        """Return estimates of the kernel's width and height, without the kernel."""
         sides = self.kernel_size or tuple(2 * side - 1 for side in frame)
+        if self.kernel_size is None and isinstance(self.psf, samples):
+            height, width = np.shape(self.psf.values.array)[:2]
+            sides = width, height
         width, height = (
             max(side * to // of, 1) for side, to, of in zip(sides, buffers, frame, strict=True)
         )

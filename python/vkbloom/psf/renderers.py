@@ -129,7 +129,7 @@ class unreal(SampledPSF):
 
     def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
         height, width = _image_of(self).shape[:2]
-        return self._for_frame(max(width, height) / self.size)
+        return _scattered(self, max(width, height) / self.size)
 
     def array(  # noqa: D102  as of PSF, for a frame of this size
         self, size: tuple[int, int], pixels_per_degree: float | None = None
@@ -142,16 +142,16 @@ class unreal(SampledPSF):
         size: tuple[int, int] | None = None,
         pixels_per_degree: float | None = None,
     ) -> Array:
-        width, height = frame
-        return centred(self._for_frame(max(frame)), size or (2 * width - 1, 2 * height - 1))
-
-    def _for_frame(self, longer_side: float) -> Array:
-        return _scattered(self, longer_side)
+        width, height = size or (2 * frame[0] - 1, 2 * frame[1] - 1)
+        return centred(_scattered(self, max(frame), (height, width)), (width, height))
 
 
 @functools.lru_cache(maxsize=2)
-def _scattered(psf: unreal, longer_side: float) -> Array:
-    """Return the kernel for a frame with this longer side."""
+def _scattered(psf: unreal, longer_side: float, room: tuple[int, int] | None = None) -> Array:
+    """Return the kernel for a frame with this longer side, of at most this height and width.
+
+    The kernel of a frame of 16384 x 1 would have 16384 rows, of which one counts.
+    """
     image = _image_of(psf)
     row, column = _place(image, psf.center)
     centre = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
@@ -169,7 +169,7 @@ def _scattered(psf: unreal, longer_side: float) -> Array:
     tint = total / total.max()
     pixels = longer_side * psf.size / max(image.shape[:2])
     spread = spread * np.divide(tint * share, spread_sum, where=spread_sum > 0, out=np.zeros(3))
-    kernel = box_resample(spread, (row, column), (pixels, pixels))
+    kernel = box_resample(spread, (row, column), (pixels, pixels), room)
     kernel[kernel.shape[0] // 2, kernel.shape[1] // 2] += tint * (1 - share)
     kernel.flags.writeable = False
     return kernel

@@ -11,7 +11,12 @@ from vkbloom.psf.base import Array
 __all__ = ["box_resample", "integrals"]
 
 
-def box_resample(kernel: Array, point: tuple[int, int], scale: tuple[float, float]) -> Array:
+def box_resample(
+    kernel: Array,
+    point: tuple[int, int],
+    scale: tuple[float, float],
+    room: tuple[int, int] | None = None,
+) -> Array:
     """Resample a kernel: a new pixel gets the energy of the area that it covers.
 
     Parameters
@@ -22,14 +27,21 @@ def box_resample(kernel: Array, point: tuple[int, int], scale: tuple[float, floa
         Row and column of the kernel's point.
     scale : (float, float)
         Height and width of an old pixel in new pixels, above 0.
+    room : (int, int), optional
+        Height and width around the point outside of which no new pixels are needed.
 
     Returns
     -------
     ndarray of float64, shape (H, W, C)
-        The sum of each channel is unchanged. H and W are odd, and the point is in the middle.
+        The sum of each channel is unchanged, unless `room` cuts some off. H and W are odd, and the
+        point is in the middle.
     """
-    rows, columns = (_edges(*axis) for axis in zip(kernel.shape[:2], point, scale, strict=True))
-    return np.ascontiguousarray(integrals(integrals(kernel, rows, 0), columns, 1))
+    within = room or (None, None)
+    edges = [_edges(*axis) for axis in zip(kernel.shape[:2], point, scale, within, strict=True)]
+    # The axis that shrinks more comes first, so that a thin result takes little memory.
+    for axis in sorted((0, 1), key=lambda axis: len(edges[axis]) / kernel.shape[axis]):
+        kernel = integrals(kernel, edges[axis], axis)
+    return np.ascontiguousarray(kernel)
 
 
 def integrals(values: Array, edges: Array, axis: int) -> Array:
@@ -56,9 +68,11 @@ def integrals(values: Array, edges: Array, axis: int) -> Array:
     return np.asarray(np.moveaxis(between, 0, axis), np.float64)
 
 
-def _edges(count: int, point: int, scale: float) -> Array:
+def _edges(count: int, point: int, scale: float, room: int | None) -> Array:
     """Return the edges of the new pixels, in old pixels."""
     reach = max(point + 0.5, count - point - 0.5) * scale
     # Rounding must not add an empty pixel.
     pixels = max(0, math.ceil(reach - 0.5 - 1e-9))
+    if room is not None:
+        pixels = min(pixels, room // 2)
     return np.asarray((np.arange(-pixels, pixels + 2) - 0.5) / scale + point + 0.5)
