@@ -207,6 +207,15 @@ static bool create_render_pass(const struct vkb_device *device, const struct ren
                   NULL, handle));
 }
 
+// Where colour images are always in the general layout, their render passes need not know who reads
+// them. So render passes of the same formats share their pipelines, which a CPU compiles slowly.
+static void generalize(struct vkb_target_use *uses, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i)
+        if (uses[i].during != VKB_ACCESS_DEPTH_TARGET)
+            uses[i].before = uses[i].after = VKB_ACCESS_ANY_READ;
+}
+
 bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipelines *pipelines,
                                const struct vkb_graph *graph, uint32_t first, uint32_t end,
                                VkRenderPass *render_pass, struct vkb_error *error)
@@ -222,6 +231,8 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
         key.depth_format = graph->images[pass->depth].format;
     key.load = pass->load;
     key.use_count = vkb_graph_target_uses(graph, first, end, key.uses);
+    if (device->words)
+        generalize(key.uses, key.use_count);
 
     for (size_t i = 0; i < pipelines->render_pass_count; ++i)
         if (memcmp(&pipelines->render_passes[i].key, &key, sizeof key) == 0) {

@@ -376,6 +376,14 @@ bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format forma
     return words * height <= device->limits.maxTexelBufferElements;
 }
 
+// The bytes of the image's buffer. Mesa 22.3's lavapipe compiles a shader once more for images
+// whose size is a power of two.
+static VkDeviceSize buffer_size(const struct vkb_image *image)
+{
+    const VkDeviceSize size = image->row_pitch * image->height;
+    return (size & (size - 1)) == 0 ? size + VKB_WORD_SIZE : size;
+}
+
 // The image's memory as a buffer.
 static bool create_buffer(const struct vkb_device *device, struct vkb_image *image,
                           VkMemoryRequirements *requirements, struct vkb_error *error)
@@ -390,7 +398,7 @@ static bool create_buffer(const struct vkb_device *device, struct vkb_image *ima
     if (!VK(error, device->vk.vkCreateBuffer(device->handle,
                                              &(VkBufferCreateInfo){
                                                  .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
-                                                 .size = image->row_pitch * image->height,
+                                                 .size = buffer_size(image),
                                                  .usage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
                                                         | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
                                                         | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,

@@ -58,23 +58,31 @@ void add_long(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
 void write(ivec2 pixel, vec4 sum)
 {
     if (all(lessThan(pixel, imageSize(target))))
-        imageStore(target, pixel, sum);
+        imageStore(target, pixel, stored(sum));
 }
 
 // With `levels` STORED is that of floats.
-vec4 stored_rolled(vec4 sum)
+vec3 stored_rolled(vec3 sum, bool levels, float limit)
 {
-    vec4 level = vec4(nearest_level(sum.rgb), nearest_level(sum.aaa).r) * (1.0 / 255.0);
-    return params.levels == 0 ? stored(sum) : vec4(level.rgb, ALPHA == ALPHA_BLUR ? level.a : 1.0);
+    if (STORED != STORED_SINGLE)
+        return storable(sum);
+    return levels ? nearest_level(sum) * (1.0 / 255.0) : limited(sum, limit);
 }
 
 // The same as with add_short, where a compiler takes longer than the pass: it has one load and one
 // store to translate. sums[tap] is of the pixel that gets this tap of the texel. The number of texels
-// is no constant, so that the loop stays one. Workgroups lie across the lines.
+// is no constant, so that the loop stays one. Workgroups lie across the lines. All parameters are read
+// before the loop: in it, llvmpipe loads them for one invocation after the other.
 void blur_rolled()
 {
     ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, ROLLED_OUTPUTS);
-    ivec2 first = along().y != 0 ? place : place.yx;
+    ivec2 direction = along(), first = direction.y != 0 ? place : place.yx;
+    ivec2 size = imageSize(target), last = imageSize(source) - 1;
+    ivec2 texel = first + (params.origin - RADIUS) * direction;
+    ivec2 pixel = first - 2 * RADIUS * direction;
+    int number = 0, count = ROLLED_OUTPUTS + 2 * params.radius;
+    bool levels = params.levels != 0;
+    float limit = params.limit;
     float weights[2 * RADIUS + 1];
     // Alpha apart: compilers do not remove a part of a vector that lives over an iteration.
     vec3 sums[2 * RADIUS + 1];
@@ -87,19 +95,23 @@ void blur_rolled()
         sums[tap] = vec3(0.0);
         alphas[tap] = 0.0;
     }
-    if (any(greaterThanEqual(first, imageSize(target))))
-        return;
-    for (int number = 0; number < ROLLED_OUTPUTS + 2 * params.radius; ++number) {
-        vec4 texel = load(first, number - RADIUS);
+    do {
+        vec4 value = imageLoad(source, clamp(texel, ivec2(0), last));
         [[unroll]] for (int j = 2 * RADIUS; j > 0; --j) {
-            sums[j] = sums[j - 1] + weights[j] * texel.rgb;
-            alphas[j] = alphas[j - 1] + weights[j] * texel.a;
+            sums[j] = sums[j - 1] + weights[j] * value.rgb;
+            alphas[j] = alphas[j - 1] + weights[j] * value.a;
         }
-        sums[0] = weights[0] * texel.rgb;
-        alphas[0] = weights[0] * texel.a;
-        if (number >= 2 * RADIUS)
-            write(first + (number - 2 * RADIUS) * along(), stored_rolled(vec4(sums[2 * RADIUS], alphas[2 * RADIUS])));
-    }
+        sums[0] = weights[0] * value.rgb;
+        alphas[0] = weights[0] * value.a;
+        if (number >= 2 * RADIUS && all(lessThan(pixel, size))) {
+            vec3 colour = stored_rolled(sums[2 * RADIUS], levels, limit);
+            float alpha = stored_rolled(vec3(alphas[2 * RADIUS]), levels, limit).r;
+            imageStore(target, pixel, vec4(colour, ALPHA == ALPHA_BLUR ? alpha : 1.0));
+        }
+        texel += direction;
+        pixel += direction;
+        ++number;
+    } while (number < count);
 }
 
 void blur_unrolled()
@@ -116,7 +128,7 @@ void blur_unrolled()
     else
         add_long(first, sums);
     [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
-        write(first + i * along(), stored(sums[i]));
+        write(first + i * along(), sums[i]);
 }
 
 void main()
