@@ -419,13 +419,14 @@
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
-// to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FROM_IMAGE, a
-// downsampling to half the size reads the image itself and applies the threshold. STORED is the
-// format of the target (STORED_*). FIRST marks an engine's first level. LEVELS is the number of
-// levels that a pass adds up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are
-// of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations.
-// Of complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup
-// has GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
+// to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
+// is known to have no NaN and no infinity. With FROM_IMAGE, a downsampling to half the size reads
+// the image itself and applies the threshold. STORED is the format of the target (STORED_*). FIRST
+// marks an engine's first level. LEVELS is the number of levels that a pass adds up. GROUPS is what
+// a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose
+// workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp)
+// RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for
+// each of GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -463,7 +464,8 @@
     CONSTANT(33, RADIX_4, radix_4) \
     CONSTANT(34, GROUP_WIDTH, group_width) \
     CONSTANT(35, GROUP_HEIGHT, group_height) \
-    CONSTANT(36, ROLLED, rolled)
+    CONSTANT(36, ROLLED, rolled) \
+    CONSTANT(37, FINITE, finite)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -31,9 +31,10 @@ struct pipeline_key {
     uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
     struct vkb_constants constants;
+    uint32_t unused;  // fills the 8 bytes
 };
 _Static_assert(sizeof(struct pipeline_key)
-                   == sizeof(VkRenderPass) + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                   == sizeof(VkRenderPass) + (8 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {

@@ -318,6 +318,15 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
     return true;
 }
 
+// Whether the pass is one that gains from a source without NaN and infinity, and this one has none.
+// It is compiled a second time for a source that has.
+static bool reads_finite(const struct vkb_run *run, const struct vkb_pass_row *pass)
+{
+    const struct vkb_specials *specials = &run->frame->specials;
+
+    return pass->block == VKB_BLOCK_fused_bloom && specials->nan == 0 && specials->inf == 0;
+}
+
 static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,
                         struct vkb_error *error)
 {
@@ -325,16 +334,17 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
     VkCommandBuffer commands = run->submission->commands.buffer;
     const bool words = pass->reading == VKB_READING_WORDS;
     struct vkb_output *output = words ? find_stored(run, pass) : NULL;
-    struct vkb_pass_row packed;
+    struct vkb_pass_row known;
     VkPipeline pipeline;
 
     if (words) {
-        memcpy(&packed, pass, sizeof packed);
+        memcpy(&known, pass, sizeof known);
         if (run->images[pass->reads[0]]->image.channels == 3)
-            packed.shader = vkb_spirv[packed.shader].rgb;
+            known.shader = vkb_spirv[known.shader].rgb;
         if (output && !vkb_readback_is_complete(output))
-            packed.shader = vkb_spirv[packed.shader].packed;
-        pass = &packed;
+            known.shader = vkb_spirv[known.shader].packed;
+        known.constants.finite = reads_finite(run, pass);
+        pass = &known;
     }
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
                            error))

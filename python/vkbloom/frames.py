@@ -85,6 +85,11 @@ class Frames(Mapping[str, NDArray[Any]]):
         self._settings = settings
         self._info = dict(info)
 
+    def _finish(self, timings: dict[str, float], nan: int, inf: int) -> None:
+        """Add what is known when the device has finished."""
+        self._timings = timings
+        self._info |= {"nan": nan, "inf": inf}
+
     @property
     def timings(self) -> Mapping[str, float]:
         """Seconds on the device by pass name, for the passes that ran; read-only.

@@ -585,7 +585,7 @@ class Renderer:
             raise ValueError("the renderer is closed")
         work = requests.uploaded(self._core, _paired(images, settings or check_settings(None)))
         results = requests.run(work, self._core, names, alone=True)
-        return (self._frames(one, result) for one, result in results)
+        return (self._frames_of(one, result) for one, result in results)
 
     def upload(
         self,
@@ -905,7 +905,11 @@ class Renderer:
     ) -> Frames:
         plan = self._plan_of(source, settings, names)
         arrays = _arrays_for(self._core, plan, out)
-        return self._frames(settings, requests.run_one(self._core, source, plan, arrays))
+        submission = self._core.run(source, (plan,), (arrays,), True)
+        # While the device works.
+        frames = self._frames(settings, requests.named(plan, arrays))
+        (timings,), counts = submission.wait()
+        return self._finished(frames, timings, counts)
 
     def _plan_of(
         self, source: _core.Source, settings: Settings, names: tuple[str, ...] | None
@@ -939,13 +943,21 @@ class Renderer:
         self, sequence: Iterable[requests.Work], names: tuple[str, ...] | None
     ) -> Iterator[Frames]:
         results = requests.run(sequence, self._core, names)
-        return (self._frames(settings, result) for settings, result in results)
+        return (self._frames_of(settings, result) for settings, result in results)
 
-    def _frames(self, settings: Settings, result: requests.Result) -> Frames:
+    def _frames_of(self, settings: Settings, result: requests.Result) -> Frames:
+        frames = self._frames(settings, result.arrays)
+        return self._finished(frames, result.timings, result.counts)
+
+    def _frames(self, settings: Settings, arrays: Mapping[str, NDArray[Any]]) -> Frames:
+        return Frames(arrays, timings={}, settings=settings, info=self._made_by)
+
+    def _finished(
+        self, frames: Frames, timings: dict[str, float], counts: tuple[int, int]
+    ) -> Frames:
         self._save_pipelines()
-        arrays, timings, (nan, inf) = result
-        info = {**self._made_by, "nan": nan, "inf": inf}
-        return Frames(arrays, timings=timings, settings=settings, info=info)
+        frames._finish(timings, *counts)
+        return frames
 
     def _save_pipelines(self) -> None:
         """Write the driver's pipeline cache to disk if it has new pipelines."""

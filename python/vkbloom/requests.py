@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from vkbloom.settings import Settings
 
-__all__ = ["Result", "Work", "new_array", "new_arrays", "run", "run_one", "uploaded"]
+__all__ = ["Result", "Work", "named", "new_array", "new_arrays", "run", "uploaded"]
 
 #: The most requests in one submission.
 REQUESTS = 32
@@ -80,27 +80,6 @@ def new_arrays(core: _core.Renderer, plan: _core.Plan) -> tuple[NDArray[Any], ..
     return tuple(arrays)
 
 
-def run_one(
-    core: _core.Renderer,
-    source: _core.Source,
-    plan: _core.Plan,
-    arrays: tuple[NDArray[Any], ...],
-) -> Result:
-    """Run a plan and wait for it.
-
-    Parameters
-    ----------
-    core : Renderer of the core
-    source : Source of the core
-    plan : Plan of the core
-        Made for this renderer and source.
-    arrays : tuple of ndarray
-        One for each of the plan's outputs. They are filled.
-    """
-    (timings,), counts = core.run(source, (plan,), (arrays,), True).wait()
-    return Result(_named(plan, arrays), timings, counts)
-
-
 def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
     """Copy each image to the device before the next one is taken.
 
@@ -125,7 +104,8 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
         yield Work(kept[-1], settings)
 
 
-def _named(plan: _core.Plan, arrays: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:
+def named(plan: _core.Plan, arrays: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a plan's outputs by name."""
     return {name: array for (name, _, _), array in zip(plan.outputs, arrays, strict=True)}
 
 
@@ -151,7 +131,7 @@ class _Request(NamedTuple):
 def _taken(
     request: _Request, timings: dict[str, float], counts: tuple[int, int]
 ) -> tuple[Settings, Result]:
-    return request.work.settings, Result(_named(request.plan, request.arrays), timings, counts)
+    return request.work.settings, Result(named(request.plan, request.arrays), timings, counts)
 
 
 class _Submitted(NamedTuple):

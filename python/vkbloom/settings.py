@@ -173,7 +173,7 @@ class Settings(Record):
             optional = str(field.type).endswith("None")
             if field.name in _core.VALUES and not (value is None and optional):
                 self._check_value(field, value)
-            elif field.name in _core.CHOICES:
+            elif field.name in _core.CHOICES and field.name != "composite":
                 self._check_name(field.name, _core.CHOICES[field.name])
         self._check_name("composite", self.composites, f", which the method {self.method} has")
         if self.knee != 0 and not self.has_knee:

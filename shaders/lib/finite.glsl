@@ -5,7 +5,8 @@ bvec3 is_finite(vec3 value)
 #if defined(WORDS) && CHANNEL_BYTES == 1
     return bvec3(true);
 #endif
-    return notEqual(floatBitsToUint(value) & 0x7f800000u, uvec3(0x7f800000u));
+    uvec3 bits = FINITE != 0 ? uvec3(0) : floatBitsToUint(value);
+    return notEqual(bits & 0x7f800000u, uvec3(0x7f800000u));
 }
 
 // Replaces NaN and infinity by 0 in each channel.

@@ -161,6 +161,8 @@ uvec4 buffer_of(vec4 value)
 uvec4 finished(uvec4 own, vec4 value)
 {
     uvec4 result = ALPHA == ALPHA_KEEP ? with_alpha_of(own, value) : raw_of(value);
+    if (FINITE != 0)
+        own = uvec4(0);
 #if CHANNEL_BYTES == 2
     uvec2 special = special_halves(own.xy);
     result.xy = (own.xy & special) | (result.xy & ~special);

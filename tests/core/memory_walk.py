@@ -10,6 +10,7 @@ is left, and the next frame is exact. Runs over a core built with VKBLOOM_FAULTS
 from __future__ import annotations
 
 import _testcapi  # type: ignore[import-not-found]
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from tests.core.fault_walk import SIZE, core, open_renderer
 from tests.images import picture
 from vkbloom import Renderer, Separable
-from vkbloom.requests import new_arrays, run_one
+from vkbloom.requests import named, new_arrays
 
 BEYOND = 40  # a frame that does without one refused block may stop at the next
 
@@ -28,7 +29,7 @@ def collected(
 ) -> tuple[bool, dict[str, Any] | None]:
     """Return whether request n was refused (0: refuse none), and the frame; None after an error."""
     settings = Separable()
-    result = None
+    result = submission = None
     failed = False
     if n:
         _testcapi.set_nomemory(n - 1, n)
@@ -36,11 +37,18 @@ def collected(
         source = core.image_source(image)
         plan = renderer._core.plan(source, settings, ("glow", "final"))
         arrays = new_arrays(renderer._core, plan)
-        result = run_one(renderer._core, source, plan, arrays).arrays
+        submission = renderer._core.run(source, (plan,), (arrays,), True)
+        frame = named(plan, arrays)
+        submission.wait()
+        result = frame
     except MemoryError:
         failed = True
     finally:
         _testcapi.remove_mem_hooks()
+    if failed and submission is not None:
+        # Otherwise the renderer keeps its blocks until a later call finds it finished.
+        with contextlib.suppress(RuntimeError):  # it was waited for
+            submission.wait()
     return failed, result
 
 

@@ -107,6 +107,25 @@ def test_an_array_that_changes_is_noticed(renderer: Renderer) -> None:
         np.testing.assert_array_equal(renderer.apply(image, SETTINGS[0])["glow"], expected)
 
 
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_specials_come_and_go(renderer: Renderer, dtype: str) -> None:
+    """The passes know whether the image has NaN or infinity, and stop checking if it has none."""
+    image = picture(640, 560, 4, dtype, 9)
+    (before,) = renderer.apply_many(image, [SETTINGS[0]], attachments=("final",))
+    lacking = image.copy()
+    lacking[100, 200, :3] = 0
+    (expected,) = renderer.apply_many(lacking, [SETTINGS[0]], attachments=("final",))
+    for value in (np.nan, np.inf, -np.inf):
+        changed = image.copy()
+        changed[100, 200, :3] = value
+        final = renderer.apply(changed, SETTINGS[0], attachments=("final",))["final"].copy()
+        np.testing.assert_array_equal(final[100, 200, :3], changed[100, 200, :3])
+        final[100, 200, :3] = expected["final"][100, 200, :3]
+        np.testing.assert_array_equal(final, expected["final"])
+    again = renderer.apply(image, SETTINGS[0], attachments=("final",))
+    np.testing.assert_array_equal(again["final"], before["final"])
+
+
 def test_a_sequence_may_reuse_its_array(renderer: Renderer) -> None:
     pictures = [picture(640, 560, 4, "float32", seed) for seed in range(4)]
     shared = np.empty_like(pictures[0])

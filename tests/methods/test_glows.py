@@ -149,7 +149,7 @@ def test_levels_after_the_last_weight_are_not_made(renderer: Renderer) -> None:
         ({"level_weights": (0, 0, 0, 0, 0, 0, -1)}, "level_weights: -1.0 is out of range, 0 to"),
         ({"knee": 0.5}, "knee: 0.5 is not 0"),
         ({"white": 0.0}, "white: 0.0 is out of range, 0.01"),
-        ({"composite": "under"}, "composite: 'under' is not one of add"),
+        ({"composite": "under"}, "composite: 'under' is not one of screen, soft_light"),
     ],
 )
 def test_what_godot_refuses(changes: dict[str, Any], message: str) -> None:
@@ -157,7 +157,7 @@ def test_what_godot_refuses(changes: dict[str, Any], message: str) -> None:
         GodotBloom(**changes)
 
 
-@pytest.mark.parametrize("composite", ["soft_light", "replace"])
+@pytest.mark.parametrize("composite", ["soft_light", "replace", "under"])
 def test_others_lack_its_composites(composite: Any) -> None:
     with pytest.raises(ValueError, match=r"composite: .* is not one of add, mix, screen, which"):
         Separable(composite=composite)

@@ -114,3 +114,23 @@ def test_large_images_are_read_in_blocks_like_small_ones(
     corner = reference.blur(glow[-size[0] - 20 :, -size[1] - 20 :], Separable())[..., 0]
     assert_allclose(bloom[-size[0] - 10 :, -size[1] - 10 :], corner[10:, 10:], rtol=1e-12)
     assert_array_equal(bloom[: -size[0] - 10], 0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "size"), [(Pyramid(levels=3), (34, 32)), (DualKawase(levels=3), (40, 32))]
+)
+def test_a_pixel_keeps_its_light_if_the_sides_halve_evenly(
+    settings: Pyramid | DualKawase, size: tuple[int, int]
+) -> None:
+    """In buffers with odd sides the taps skip texels, as the notes of both methods say."""
+
+    def energies(settings: Pyramid | DualKawase) -> list[float]:
+        blooms = [
+            reference.apply(np.repeat(impulse(31, 33, y, x), 3, axis=2), settings)["bloom"]
+            for x in range(14, 19)
+            for y in range(13, 18)
+        ]
+        return [float(bloom[..., 0].sum()) for bloom in blooms]
+
+    assert_allclose(energies(settings.replace(bloom_size=size)), 1, atol=0.1)
+    assert min(energies(settings)) < 0.3

@@ -52,6 +52,10 @@ class Pyramid(Settings):
     ``bloom`` = tent(up_0) is not divided: a flat image becomes the sum of the weights. In
     "rgba8unorm" up_k is divided by the sum of the weights' sizes, ``|w_k|`` + ... + ``|w_N-1|``.
 
+    The taps are whole texels apart. If a side of the bloom buffers is odd, they skip texels in the
+    middle of ``down_0``: a pixel of light there loses nearly all of its bloom, and a small moving
+    light flickers. An even `bloom_size`, such as the next larger one, avoids this.
+
     Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
     SIGGRAPH 2014.
 
@@ -105,6 +109,10 @@ class DualKawase(Settings):
     Downsample: (4 c + the four diagonals at half a texel of the source) / 8. Upsample: (the four
     axials at one texel of the smaller level + 2 times the four diagonals at half a texel of it)
     / 12.
+
+    The diagonals of `offset` 1 cover all texels only if each side of the image is twice that of the
+    level. Otherwise they skip some, and a small moving light flickers. A `bloom_size` whose sides
+    are multiples of 2^levels avoids this.
 
     Source: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
 
