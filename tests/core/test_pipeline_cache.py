@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from vkbloom import Renderer, Scene, Separable
+from vkbloom import Pyramid, Renderer, Scene, Separable
 from vkbloom.io import pipeline_cache
 
 SIZE = (16, 16)
@@ -185,3 +187,22 @@ def test_the_users_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"
+
+
+def test_a_cpu_compiles_each_shader_of_a_plan_once(
+    new_renderer: Callable[[], Renderer], scene: Scene
+) -> None:
+    """Whoever reads a target, and whichever way a line is blurred, the pipeline is the same."""
+    # Of this size some levels are drawn, and some of these are read by draws, others by dispatches.
+    image, pyramid = np.zeros((50, 75, 4), np.float16), Pyramid(levels=3)
+    renderer = new_renderer()
+    if renderer.info.type != "cpu":
+        pytest.skip("GPUs have other variants, and know who reads a target")
+    renderer.apply(image, pyramid, attachments="final")
+    created = renderer._core.pipeline_count
+    shaders = [step.shader for step in renderer.plan(image, pyramid, attachments="final").passes]
+    assert created == len(set(shaders)) < len(shaders)
+    renderer.render(scene, size=SIZE, attachments="final")
+    plan = renderer.plan(scene, size=SIZE, attachments="final")
+    shaders = [step.shader for step in plan.passes]
+    assert renderer._core.pipeline_count - created == len(set(shaders)) < len(shaders)
