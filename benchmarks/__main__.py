@@ -51,7 +51,7 @@ def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None
     metavar="FILE.json",
     multiple=True,
     type=click.Path(exists=True, dir_okay=False),
-    help="An earlier result, for example with another driver: its ratios stand beside the new ones.",
+    help="An earlier result, as with another driver: its ratios stand beside the new ones.",
 )
 @click.option(
     "--quick", is_flag=True, help="Small images, few rounds: a check only, the times mean nothing."
