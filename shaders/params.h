@@ -379,6 +379,7 @@
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8
 #define HALVE_WORDS_ROWS              32
+#define REDUCE_COLUMNS                4
 #define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))

@@ -220,7 +220,7 @@ bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_p
          && is_half(&choice->plain, pass) && pass->params.prefilter.row_offset == 0
          && loads(choice, pass);
     return !*fits
-        || add_prefilter(choice, pass, reduce_words[format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS,
+        || add_prefilter(choice, pass, reduce_words[format], REDUCE_COLUMNS, HALVE_WORDS_ROWS,
                          error);
 }
 

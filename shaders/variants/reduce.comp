@@ -13,7 +13,7 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/prefilters.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = HALVE_WORDS_COLUMNS, ROWS = HALVE_WORDS_ROWS;
+const int COLUMNS = REDUCE_COLUMNS, ROWS = HALVE_WORDS_ROWS;
 const int LOADED = 2 * COLUMNS + 2;
 // A pixel of the target has the texels BEFORE before twice its own position to 2 after it.
 const int BEFORE = 1, SIDE = 4;

@@ -314,6 +314,17 @@ def test_the_kernel_of_a_thin_frame_has_no_hidden_rows() -> None:
         tracemalloc.stop()
 
 
+def test_a_pattern_is_computed_as_far_as_it_is_wanted() -> None:
+    pattern = psf.aperture(psf.iris(size=64), f_number=64)
+    whole = pattern.own_array()
+    middle = len(whole) // 2
+    part = whole[middle - 20 : middle + 21, middle - 4 : middle + 4]
+    np.testing.assert_allclose(pattern.array((8, 41)), part, atol=1e-14)
+    # The complete pattern would have 23,361 x 23,361 pixels.
+    large = psf.aperture(psf.iris(size=64), f_number=2000)
+    assert large.array((8, 41)).shape == (41, 8, 3)
+
+
 def test_measured() -> None:
     settings = vkbloom.Separable(weights=(0.5, 0.25), blur_strength=1.0)
     spread = psf.measured(settings, size=(9, 8))

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom.checks import check_floats, check_index, check_number
-from vkbloom.psf.base import Array, check_above
+from vkbloom.checks import check_floats, check_index, check_number, check_size
+from vkbloom.psf.base import Array, centred, check_above
 from vkbloom.psf.sampled import SampledPSF
 from vkbloom.psf.values import ArrayValue
 
@@ -19,6 +19,8 @@ __all__ = ["aperture", "iris"]
 
 # Samples of the diffraction pattern per period of its highest frequency.
 _PADDING = 4
+# Rows that are computed at a time.
+_BAND = 256
 _SPECTRUM = tuple(range(390, 731, 10))
 # XYZ to linear sRGB (IEC 61966-2-1).
 _SRGB = np.array(
@@ -118,10 +120,13 @@ def _mask(made: iris) -> NDArray[np.float32]:
     places = (np.arange(fine) + 0.5) * 2 / fine - 1
     # Rows count downwards.
     x, y = places, -places[:, np.newaxis]
+    open_ = np.empty((fine, fine), np.bool_)
+    bands = [slice(first, first + _BAND) for first in range(0, fine, _BAND)]
     step = 2 * math.pi / made.blades
-    angle = np.mod(np.arctan2(y, x) - math.radians(made.rotation), step) - step / 2
-    edge = math.cos(step / 2) / np.cos(angle)
-    open_ = np.hypot(x, y) <= edge + made.roundness * (1 - edge)
+    for band in bands:
+        angle = np.mod(np.arctan2(y[band], x) - math.radians(made.rotation), step) - step / 2
+        edge = math.cos(step / 2) / np.cos(angle)
+        open_[band] = np.hypot(x, y[band]) <= edge + made.roundness * (1 - edge)
     generator = np.random.default_rng(made.seed)
     for _ in range(made.dust):
         (centre_x, centre_y), radius = generator.uniform(-1, 1, 2), generator.uniform(0.002, 0.02)
@@ -130,9 +135,10 @@ def _mask(made: iris) -> NDArray[np.float32]:
     for _ in range(made.scratches):
         (centre_x, centre_y), turn = generator.uniform(-1, 1, 2), generator.uniform(0, math.pi)
         length, width = generator.uniform(0.1, 0.8), generator.uniform(0.001, 0.003)
-        along = (x - centre_x) * math.cos(turn) + (y - centre_y) * math.sin(turn)
-        across = (y - centre_y) * math.cos(turn) - (x - centre_x) * math.sin(turn)
-        open_ &= (np.abs(along) > length / 2) | (np.abs(across) > width)
+        for band in bands:
+            along = (x - centre_x) * math.cos(turn) + (y[band] - centre_y) * math.sin(turn)
+            across = (y[band] - centre_y) * math.cos(turn) - (x - centre_x) * math.sin(turn)
+            open_[band] &= (np.abs(along) > length / 2) | (np.abs(across) > width)
     blocks = open_.reshape(made.size, 4, made.size, 4)
     mask: NDArray[np.float32] = blocks.mean(axis=(1, 3), dtype=np.float32)
     mask.flags.writeable = False
@@ -205,7 +211,15 @@ class aperture(SampledPSF):
             object.__setattr__(self, "wavelengths", lengths)
 
     def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
-        return _pattern(self)
+        return _pattern(self, _reach(self), _reach(self))
+
+    def array(  # noqa: D102  as of PSF
+        self, size: tuple[int, int], pixels_per_degree: float | None = None
+    ) -> Array:
+        # Patterns of small apertures are much larger than frames.
+        width, height = check_size("size", size)
+        reach = _reach(self)
+        return centred(_pattern(self, min(reach, height // 2), min(reach, width // 2)), size)
 
 
 def _check_mask(mask: Any) -> iris | ArrayValue:
@@ -222,28 +236,48 @@ def _check_mask(mask: Any) -> iris | ArrayValue:
     return held
 
 
+def _lengths(psf: aperture) -> tuple[float, ...]:
+    return _SPECTRUM if psf.wavelengths is None else psf.wavelengths
+
+
+def _scale(psf: aperture, length: float) -> float:
+    """Return the pixels per period of the pattern's lowest frequency, at a wavelength."""
+    return length * psf.f_number / (1000 * psf.pixel_pitch)
+
+
+def _reach(psf: aperture) -> int:
+    """Return the pixels from the centre to the end of the pattern."""
+    return max(1, math.ceil(_scale(psf, max(_lengths(psf))) * int(np.shape(psf.mask)[0]) / 2))
+
+
 @functools.lru_cache(maxsize=4)
-def _pattern(psf: aperture) -> Array:
-    """Return the sum over the wavelengths."""
-    mask = np.asarray(psf.mask, np.float64)
-    count = len(mask)
-    lengths = _SPECTRUM if psf.wavelengths is None else psf.wavelengths
-    sums = _sums(mask)
-    middle = _PADDING * count / 2 + 0.5
-    scales = [length * psf.f_number / (1000 * psf.pixel_pitch) for length in lengths]
-    reach = max(1, math.ceil(max(scales) * count / 2))
-    edges: Array = np.arange(-reach, reach + 2, dtype=np.float64) - 0.5
+def _pattern(psf: aperture, up: int, across: int) -> Array:
+    """Return the sum over the wavelengths, as far as some rows and columns from the centre."""
+    lengths = _lengths(psf)
+    sums = _sums(np.asarray(psf.mask, np.float64))
+    end = _reach(psf) + 0.5
     # The pattern of a real mask is point-symmetric: the upper half is enough.
-    total = np.zeros((reach + 1, 2 * reach + 1, 3))
-    for scale, colour in zip(scales, _colours(lengths), strict=True):
-        places: Array = np.asarray(middle + edges * _PADDING / scale)
-        rows = np.ascontiguousarray(_between(sums, places[: reach + 2]).T)
-        energy = _between(rows, places).T
-        total += energy[..., np.newaxis] * colour
-    whole = np.concatenate([total, total[-2::-1, ::-1]])
-    whole /= whole.sum(axis=(0, 1))
+    rows: Array = np.arange(-up, 2, dtype=np.float64) - 0.5
+    columns: Array = np.arange(-across, across + 2, dtype=np.float64) - 0.5
+    half, total = np.zeros((up + 1, 2 * across + 1, 3)), np.zeros(3)
+    for length, colour in zip(lengths, _colours(lengths), strict=True):
+        scale = _PADDING / _scale(psf, length)
+        half += _energies(sums, rows * scale, columns * scale)[..., np.newaxis] * colour
+        above, middle = _energies(
+            sums, np.array([-end, -0.5, 0.5]) * scale, np.array([-end, end]) * scale
+        )
+        total += (2 * above + middle) * colour
+    whole = np.concatenate([half, half[-2::-1, ::-1]])
+    whole /= total
     whole.flags.writeable = False
     return whole
+
+
+def _energies(sums: Array, rows: Array, columns: Array) -> Array:
+    """Return the energies between rows and columns, in cells from the centre."""
+    middle = (len(sums) - 1) / 2 + 0.5
+    bands = np.ascontiguousarray(_between(sums, middle + rows).T)
+    return _between(bands, middle + columns).T
 
 
 def _sums(mask: Array) -> Array:
@@ -252,11 +286,22 @@ def _sums(mask: Array) -> Array:
     The pattern is band-limited. So the integrals over the cells of the Fourier transform are exact:
     a product with a sinc in the domain of the autocorrelation.
     """
-    side = _PADDING * len(mask)
-    correlation = np.fft.irfft2(np.abs(np.fft.rfft2(mask, (side, side))) ** 2, (side, side))
-    lags = np.sinc(np.fft.fftfreq(side))
-    cells = np.fft.fftshift(np.fft.fft2(correlation * lags * lags[:, np.newaxis]).real)
-    return np.pad(cells.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    count = len(mask)
+    # All lags of the autocorrelation.
+    both = 2 * count
+    correlation = np.fft.irfft2(np.abs(np.fft.rfft2(mask, (both, both))) ** 2, (both, both))
+    side = _PADDING * count
+    lags = np.sinc(np.fft.fftfreq(both) * both / side)
+    padded = np.zeros((side, side))
+    places = np.r_[:count, side - count : side]
+    padded[np.ix_(places, places)] = correlation * lags * lags[:, np.newaxis]
+    # The other half of the real, point-symmetric transform has the same values.
+    half = np.fft.rfft2(padded).real
+    middle = side // 2
+    sums = np.zeros((side + 1, side + 1))
+    sums[1:, middle + 1 :] = np.fft.fftshift(half[:, :middle], axes=0)
+    sums[1:, 1 : middle + 1] = half[(middle - np.arange(side)) % side, middle:0:-1]
+    return sums.cumsum(axis=0, out=sums).cumsum(axis=1, out=sums)
 
 
 def _between(sums: Array, places: Array) -> Array:
