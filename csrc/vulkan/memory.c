@@ -109,6 +109,8 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
         vkb_buffer_destroy(device, buffer);
         return false;
     }
+    if (device->words && buffer->mapped)
+        vkb_advise_large(buffer->mapped, (size_t)size);
     vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)buffer->handle, buffer_name(usage));
     // Only a complete buffer has a size; vkb_buffer_reserve relies on that.
     buffer->size = size;
