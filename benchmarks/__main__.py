@@ -10,6 +10,7 @@ from rich.console import Console
 
 from benchmarks import BENCHMARKS, Plan, run, write
 from benchmarks.plan import usable_cores
+from benchmarks.writing import read_earlier
 from vkbloom.cli.device_options import adapter_option
 from vkbloom.cli.program import as_wrong_use
 
@@ -46,6 +47,13 @@ def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None
     help="The table. FILE.json and, with matplotlib, the curves are written beside it.",
 )
 @click.option(
+    "--beside",
+    metavar="FILE.json",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False),
+    help="An earlier result, as with another driver: its ratios stand beside the new ones.",
+)
+@click.option(
     "--quick", is_flag=True, help="Small images, few rounds: a check only, the times mean nothing."
 )
 @click.option("--rounds", type=int, help="Rounds for each contender, 3 or more.")
@@ -66,6 +74,7 @@ def command(
     *,
     only: tuple[str, ...],
     out: str,
+    beside: tuple[str, ...],
     quick: bool,
     rounds: int | None,
     requests: int,
@@ -83,6 +92,10 @@ def command(
     target = Path(out)
     if target.suffix != ".md":
         raise click.UsageError(f"--out: {out!r} does not end in .md")
+    try:
+        earlier = [read_earlier(Path(name)) for name in beside]
+    except ValueError as error:
+        raise click.UsageError(f"--beside: {error}") from error
     # Fail now rather than after a quarter of an hour.
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=target.parent):
@@ -100,7 +113,7 @@ def command(
             )
         # After each benchmark, so that an interrupted run keeps what it has.
         for report in run(plan):
-            written = write(report, target)
+            written = write(report, target, earlier)
     for path in written:
         click.echo(f"wrote {path}")
     for section in report.sections:

@@ -73,7 +73,7 @@ def run(plan: Plan, section: Section) -> None:
     section.tables.append(
         Table("Spread: standard deviation of the blur alone", ("", "pixels", "gain"), rows)
     )
-    for name, wanted in ((PYGFX, 10.0), (GAUSSIAN, 8.0)):
+    for name, wanted in ((PYGFX, 3.8), (GAUSSIAN, 7.0)):
         if name in times:
             ratio = times[name].over(times[OURS]).value
             section.goals.append(Goal(f"pyramid: {name} / {OURS}", ratio, wanted))

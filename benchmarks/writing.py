@@ -6,19 +6,47 @@ import dataclasses
 import importlib
 import json
 import math
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from benchmarks.results import Curve, Report, Section, Table
 
-__all__ = ["as_json", "as_markdown", "write"]
+__all__ = ["Earlier", "as_json", "as_markdown", "read_earlier", "write"]
 
 # An axis is logarithmic above this ratio of the largest to the smallest value.
 _WIDE: Final = 16
 
 
-def write(report: Report, path: Path) -> list[Path]:
+class Earlier(NamedTuple):
+    """What another report shares its table with: its driver, and the ratios of its goals."""
+
+    driver: str
+    ratios: dict[str, str]
+
+
+def read_earlier(path: Path) -> Earlier:
+    """Read the JSON file of a report.
+
+    Raises
+    ------
+    ValueError
+        It is no such file.
+    """
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+        goals = [goal for section in report["sections"] for goal in section["goals"]]
+        ratios = {
+            str(goal["what"]): "nan" if goal["ratio"] is None else f"{goal['ratio']:.3g}"
+            for goal in goals
+        }
+        return Earlier(str(report["machine"]["driver"]), ratios)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path.name} is not a result of the benchmarks") from error
+
+
+def write(report: Report, path: Path, beside: Sequence[Earlier] = ()) -> list[Path]:
     """Write a report as Markdown, and beside it as JSON and, with matplotlib, its curves.
 
     Parameters
@@ -27,6 +55,8 @@ def write(report: Report, path: Path) -> list[Path]:
     path : Path
         The Markdown file. Its folder is created if it is missing. The other files have the same
         name with another suffix.
+    beside : sequence of Earlier
+        Their ratios stand beside those of this report.
 
     Returns
     -------
@@ -36,7 +66,7 @@ def write(report: Report, path: Path) -> list[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     charts = _draw_curves(report, path)
     as_text = path.with_suffix(".json")
-    path.write_text(as_markdown(report, charts), encoding="utf-8")
+    path.write_text(as_markdown(report, charts, beside), encoding="utf-8")
     as_text.write_text(json.dumps(as_json(report), indent=1) + "\n", encoding="utf-8")
     return [path, as_text, *charts]
 
@@ -78,7 +108,9 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def as_markdown(report: Report, charts: list[Path] | None = None) -> str:
+def as_markdown(
+    report: Report, charts: list[Path] | None = None, beside: Sequence[Earlier] = ()
+) -> str:
     """Return a report as a page of Markdown, with the pictures of its curves."""
     machine = report.machine
     lines = [f"# Benchmarks on {machine['adapter']}", ""]
@@ -98,11 +130,13 @@ def as_markdown(report: Report, charts: list[Path] | None = None) -> str:
                 f"{'at most' if goal.at_most else 'at least'} {goal.wanted:.3g}",
                 f"{goal.ratio:.3g}",
                 "yes" if goal.met else "no",
+                *(other.ratios.get(goal.what, "not measured") for other in beside),
                 name,
             )
             for name, goal in goals
         )
-        header = ("ratio of medians", "wanted", "measured", "met", "benchmark")
+        drivers = tuple(f"with {other.driver}" for other in beside)
+        header = ("ratio of medians", "wanted", "measured", "met", *drivers, "benchmark")
         lines += ["## Goals", "", *_table(Table("", header, rows))]
     for section in report.sections:
         lines += _section(section)

@@ -25,6 +25,7 @@ from benchmarks.requests import best_order, worst_order
 from benchmarks.results import Curve, Goal, Section, Table, agreement
 from benchmarks.spread import spread
 from benchmarks.timing import Contender, Times, alternate
+from benchmarks.writing import Earlier, read_earlier
 from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
@@ -321,6 +322,20 @@ def test_what_is_written(tmp_path: Path) -> None:
     assert [goal["ratio"] for goal in found["goals"]] == [2.0, None]
 
 
+def test_two_drivers_in_one_table(tmp_path: Path) -> None:
+    machine = {"date": "", "command": "", "adapter": "X", "adapter type": "cpu", "peers": {}}
+    first, second = (
+        Report({**machine, "driver": f"Mesa {number}"}, (Section("id", "", [], [], goals),))
+        for number, goals in ((1, [Goal("x / y", 2.0, 3.0)]), (2, [Goal("x / y", 4.0, 3.0)]))
+    )
+    write(first, tmp_path / "first.md")
+    earlier = read_earlier(tmp_path / "first.json")
+    page = write(second, tmp_path / "both.md", [earlier, Earlier("Z", {})])[0].read_text()
+    header = "| ratio of medians | wanted | measured | met | with Mesa 1 | with Z | benchmark |"
+    assert header in page
+    assert "| x / y | at least 3 | 4 | yes | 2 | not measured | id |" in page
+
+
 def test_curves_are_drawn_by_their_kind(tmp_path: Path) -> None:
     oiio = pytest.importorskip("OpenImageIO")
     section = Section("cost", "Cost")
@@ -423,6 +438,7 @@ def test_the_list_names_every_benchmark() -> None:
         (("--requests", "0"), "requests: 0 is out of range"),
         (("--threads", "0"), "threads: 0 is out of range"),
         (("-o", "table.txt"), "does not end in .md"),
+        (("--beside", __file__), "test_bench.py is not a result of the benchmarks"),
         (("extra",), "extra"),
     ],
 )
