@@ -10,13 +10,10 @@ static size_t row_size(const struct vkb_input *input)
 // Whether the rows consist of whole words.
 static bool has_words(const struct vkb_device *device, const struct vkb_input *input)
 {
-    const size_t channel_size = vkb_formats[input->format].channel_size;
     const size_t pitch = (size_t)input->row_stride;
 
-    return input->channel_stride == (ptrdiff_t)channel_size
-        && input->pixel_stride == (ptrdiff_t)(input->channels * channel_size)
-        && input->row_stride > 0 && pitch >= row_size(input) && pitch % VKB_WORD_SIZE == 0
-        && row_size(input) % VKB_WORD_SIZE == 0
+    return vkb_input_is_contiguous(input) && input->row_stride > 0 && pitch >= row_size(input)
+        && pitch % VKB_WORD_SIZE == 0 && row_size(input) % VKB_WORD_SIZE == 0
         && pitch / VKB_WORD_SIZE * input->height <= device->limits.maxTexelBufferElements;
 }
 

@@ -71,7 +71,7 @@ static bool is_complete(const struct vkb_input *input)
     return input->channels == vkb_formats[input->format].channels;
 }
 
-static bool is_contiguous(const struct vkb_input *input)
+bool vkb_input_is_contiguous(const struct vkb_input *input)
 {
     const ptrdiff_t size = vkb_formats[input->format].channel_size;
 
@@ -87,7 +87,7 @@ static void pack_row(unsigned char *to, const struct vkb_input *input, uint32_t 
 {
     const unsigned char *from = vkb_input_row(input, y);
     const void *one = channel_one(input->format);
-    const bool contiguous = is_contiguous(input);
+    const bool contiguous = vkb_input_is_contiguous(input);
 
     if (contiguous && is_complete(input)) {
         memcpy(to, from, row_size(input));
@@ -129,7 +129,7 @@ static const unsigned char *packed_row(const struct rows *rows, uint32_t part, u
     const unsigned char *own = vkb_input_row(input, y);
     unsigned char *packed = rows->upload->packed + part * row_size(input);
 
-    if (is_complete(input) && is_contiguous(input)
+    if (is_complete(input) && vkb_input_is_contiguous(input)
         && (uintptr_t)own % vkb_formats[input->format].channel_size == 0)
         return own;
     pack_row(packed, input, y);

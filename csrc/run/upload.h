@@ -22,6 +22,9 @@ static inline const unsigned char *vkb_input_row(const struct vkb_input *input, 
     return (const unsigned char *)input->memory + y * input->row_stride;
 }
 
+// Whether the pixels of a row, and their channels, follow one another without gaps.
+bool vkb_input_is_contiguous(const struct vkb_input *input);
+
 struct vkb_upload {
     struct vkb_buffer staging;
     unsigned char

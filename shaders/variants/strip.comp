@@ -3,7 +3,7 @@
 #extension GL_EXT_control_flow_attributes : require
 // The complete bloom of an image for devices without fast shared memory. An invocation writes some
 // rows from left to right. It adds up the columns of a run for all rows, adds these sums to the
-// pixels near them, which it keeps in registers, and stores the pixels of one or two runs at once.
+// pixels near them, which it keeps in registers, and stores the pixels of two runs at once.
 #include "variants/fused_bloom.glsl"
 #include "variants/pixels.glsl"
 
