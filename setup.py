@@ -6,6 +6,7 @@ import os
 import shutil
 import struct
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -148,7 +149,9 @@ def compile_shader(module: Module, target: Path) -> None:
 def compile_module(module: Module) -> tuple[int, ...]:
     """Compile one module to its SPIR-V words."""
     target = SPIRV / f"{module.name}.spv"
-    compile_shader(module, target)
+    sources = [Path("setup.py"), *SHADERS.rglob("*.*")]
+    if not target.exists() or target.stat().st_mtime < max(s.stat().st_mtime for s in sources):
+        compile_shader(module, target)
     code = target.read_bytes()
     return without_contraction(struct.unpack(f"={len(code) // 4}I", code))
 
@@ -162,10 +165,11 @@ def write_spirv() -> None:
     built = [module for shader in shaders for module in modules(shader)]
     names = {module.name for module in built}
     enum = "".join(f"    VKB_SHADER_{module.name},\n" for module in built)
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        compiled = list(threads.map(compile_module, built))
     arrays = "".join(
-        f"static const uint32_t {module.name}[] = "
-        f"{{{','.join(map(str, compile_module(module)))}}};\n"
-        for module in built
+        f"static const uint32_t {module.name}[] = {{{','.join(map(str, words))}}};\n"
+        for module, words in zip(built, compiled, strict=True)
     )
     rows = ""
     for module in built:
