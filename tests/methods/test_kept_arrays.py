@@ -22,6 +22,12 @@ SPREADS: list[psf.PSF] = [
 KERNEL = 179 * 319 * 16
 
 
+@pytest.fixture(autouse=True)
+def _fixture_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide the renderers of other tests, which hold their kernels."""
+    monkeypatch.setattr(kept_arrays, "_of_renderers", lambda: None)
+
+
 @pytest.fixture(name="traced")
 def fixture_traced() -> Iterator[None]:
     gc.collect()
