@@ -81,7 +81,8 @@ def read_file(source: Source) -> OwnFile:
 def check_unique(file: OwnFile) -> None:
     """Check that no two blocks have the same name."""
     seen: dict[str, int] = {}
-    for block in (*file.params, *file.textures, *file.buffers):
+    blocks: list[Param | Texture | Buffer] = [*file.params, *file.textures, *file.buffers]
+    for block in blocks:
         if block.name in seen:
             raise file.source.fault(
                 block.line,
