@@ -184,11 +184,12 @@ def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
     """Return the sum of the ghosts: the image read at 1/2 + s (p - 1/2)."""
     x, y = _places(image)
     total = np.zeros_like(image)
-    for scale, tint in stage.ghosts:
+    tints = stage.tints if len(stage.tints) > 1 else [stage.tints[0]] * len(stage.scales)
+    for scale, tint in zip(stage.scales, tints, strict=True):
         distance = np.abs(scale) * np.hypot(x, y)
         weight = np.maximum(0, 1 - distance / stage.radius) ** stage.falloff
-        factors = np.append(tint, [np.mean(tint)] * (image.shape[2] - 3))
-        total += weight[..., np.newaxis] * factors * _seen(image, stage, scale * x, scale * y)
+        tint = np.concatenate([tint, [sum(tint) / 3] * (image.shape[2] - 3)])
+        total += weight[..., np.newaxis] * tint * _seen(image, stage, scale * x, scale * y)
     corner = np.minimum(((2 * x) ** 2 + (2 * y) ** 2) ** 2, 1)
     total *= (1 + stage.vignette * (corner - 1))[..., np.newaxis]
     return total
