@@ -3,8 +3,8 @@
 It is slow, simple and independent of the device code. Tests compare rendered images with it.
 
 `apply` returns all framebuffers of an image, `passes` and `blur` only those of the blur,
-`composite` the final image, `gain` the bloom of a flat image of 1, `shade` the light of the deferred
-system, and `vjp` derivatives.
+`composite` the final image, `gain` the bloom of a flat image of 1, `shade` the light of the
+deferred system, and `vjp` the framebuffers with their derivatives.
 """
 
 from __future__ import annotations

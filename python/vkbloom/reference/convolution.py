@@ -76,7 +76,7 @@ def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
     -------
     ndarray of float64, shape (H, W, C)
     """
-    (height, width), (rows, columns) = glow.shape[:2], kernel.shape[:2]
+    rows, columns = kernel.shape[:2]
     modes: dict[str, tuple[Any, Any]] = {
         "zero": ("constant", "constant"),
         "edge": ("edge", "edge"),
@@ -109,7 +109,7 @@ def _valid(image: Array, kernel: Array) -> Array:
 
     # From the first pixel on whose sum is complete.
     result = spread(values[0] * values[1])[-rows:, -columns:]
-    return operation(
+    valid: Array = operation(
         np.ascontiguousarray(result),
         (image, lambda d: spread(spectrum(d) * values[1].conj())),
         (
@@ -117,3 +117,4 @@ def _valid(image: Array, kernel: Array) -> Array:
             lambda d: spread(spectrum(d) * values[0].conj())[: kernel.shape[0], : kernel.shape[1]],
         ),
     )
+    return valid

@@ -89,15 +89,16 @@ def vjp(
         inputs["emission"] = Traced(source)
     if weights is not None:
         inputs["mask"] = Traced(weights)
-    traced = _TracedSettings(settings, inputs)
+    traced: Any = _TracedSettings(settings, inputs)
+    arrays: dict[str, Any] = {**inputs}
     found: dict[str, Any] = framebuffers(
-        inputs["image"],  # type: ignore[arg-type]
-        inputs.get("emission", inputs["image"]),  # type: ignore[arg-type]
-        inputs.get("mask"),  # type: ignore[arg-type]
+        arrays["image"],
+        arrays.get("emission", arrays["image"]),
         traced,
-        "rgba32float",
-        np.asarray(image).dtype,
-        0.0 if emission is not None else inputs.get("mask", 1.0),  # type: ignore[arg-type]
+        mask=arrays.get("mask"),
+        share=0.0 if emission is not None else arrays.get("mask", 1.0),
+        format="rgba32float",
+        dtype=np.asarray(image).dtype,
     )
     values: dict[str, Array] = {name: value_of(part) for name, part in found.items()}
 
@@ -123,7 +124,9 @@ def differentiable(settings: Any) -> dict[str, Any]:
     found = {
         field.name: getattr(settings, field.name)
         for field in dataclasses.fields(settings)
-        if field.name not in DISCRETE and _is_real(getattr(settings, field.name))
+        if field.name not in DISCRETE
+        and _is_real(getattr(settings, field.name))
+        and (field.name != "knee" or settings.has_knee)
     }
     for place, stage in enumerate(getattr(settings, "glare", ())):
         found |= {f"glare.{place}.{name}": value for name, value in differentiable(stage).items()}
@@ -167,7 +170,9 @@ class _TracedSettings:
 def _cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Array]) -> Array:
     """Check and return a cotangent in float64."""
     if name not in values:
-        raise ValueError(f"cotangents: unknown framebuffer {name!r}; available: {', '.join(values)}")
+        known = ", ".join(values)
+        raise ValueError(f"cotangents: unknown framebuffer {name!r}; available: {known}")
+
     array = np.asarray(cotangent, np.float64)
     if array.shape != values[name].shape:
         raise ValueError(

@@ -163,7 +163,15 @@ def apply(
     """
     scene, source, weights, format = checked(image, settings, mask, emission)
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
-    return framebuffers(scene, source, weights, settings, format, np.asarray(image).dtype, share)
+    return framebuffers(
+        scene,
+        source,
+        settings,
+        mask=weights,
+        share=share,
+        format=format,
+        dtype=np.asarray(image).dtype,
+    )
 
 
 def checked(
@@ -186,11 +194,12 @@ def checked(
 def framebuffers(
     scene: Array,
     source: Array,
-    mask: Array | None,
     settings: Settings,
+    *,
+    mask: Array | None,
+    share: float | Array,
     format: str,
     dtype: DTypeLike,
-    share: float | Array,
 ) -> dict[str, Array]:
     """Return the framebuffers of `apply`.
 

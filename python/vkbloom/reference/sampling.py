@@ -75,7 +75,7 @@ def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
         result[rows] = matrix @ source[texels]
 
     def by_image(derivative: Array) -> Array:
-        total = np.zeros_like(source)
+        total: Array = np.zeros(source.shape)
         for rows, texels, matrix in _bands(length, count, places, weights):
             total[texels] += matrix.T @ derivative[rows].reshape(len(matrix), -1)
         return total.reshape(values.shape)
@@ -119,19 +119,22 @@ def _bands(
             (output_rows * band + texels - first).ravel(),
             weights=weights.ravel(),
             minlength=(stop - start) * band,
-        ).reshape(stop - start, band)
-        yield slice(start, stop), slice(first, first + band), matrix
+        )
+        blocks = slice(start, stop), slice(first, first + band)
+        yield *blocks, matrix.reshape(stop - start, band).astype(np.float64, copy=False)
 
 
 def _slopes(image: Array, count: int, offset: float) -> Array:
     """Return the derivative of a tap by its offset: at texel centres the mean of both sides."""
     length = image.shape[0]
     positions = (np.arange(count) + 0.5) * length / count - 0.5 + offset
+    # A centre is met with roundings.
+    left, right = np.ceil(positions - 1e-9) - 1, np.floor(positions + 1e-9)
     texels = [
         image[np.clip(place, 0, length - 1).astype(np.intp)]
-        for place in (np.ceil(positions) - 1, np.floor(positions), np.ceil(positions), np.floor(positions) + 1)
+        for place in (left, left + 1, right, right + 1)
     ]
-    slopes: Array = (texels[3] - texels[1] + texels[2] - texels[0]) / 2
+    slopes: Array = (texels[1] - texels[0] + texels[3] - texels[2]) / 2
     return slopes
 
 

@@ -5,8 +5,9 @@ the formulas of the reference compute with them unchanged. Each operation has a 
 derivative with respect to its result to those with respect to its arguments.
 
 At a kink, the rules take these subgradients: a clamp passes the derivative inside and at its ends;
-a maximum or minimum passes it to the strictly larger or smaller argument, and between several equal
-channels in equal shares; a power passes nothing at a base of 0.
+a maximum or minimum passes it to the strictly larger or smaller argument, between equal arrays or
+channels in equal shares, and nothing where it equals a constant; a power passes nothing at a base
+of 0.
 """
 
 from __future__ import annotations
@@ -55,9 +56,6 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
     def __bool__(self) -> bool:
         return bool(self.value)
 
-    def __float__(self) -> float:
-        return float(self.value)
-
     def __trunc__(self) -> int:
         return math.trunc(self.value.item())
 
@@ -92,30 +90,37 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         self.value, self.node = new.value, new.node
 
     def swapaxes(self, first: int, second: int) -> Traced:
+        """Exchange two axes."""
         return _traced(
             self.value.swapaxes(first, second), (self, lambda d: d.swapaxes(first, second))
         )
 
     def reshape(self, *shape: Any) -> Traced:
+        """Give the array another shape."""
         return _traced(self.value.reshape(*shape), (self, lambda d: d.reshape(self.value.shape)))
 
     def astype(self, dtype: Any) -> Traced:
+        """Return the array itself: all are of float64."""
         return self
 
     def sum(self, axis: Any = None, keepdims: bool = False) -> Traced:
+        """Add along axes."""
         total = np.sum(self.value, axis=axis, keepdims=True)
         kept = total if keepdims else np.sum(self.value, axis=axis)
         shape = self.value.shape
         return _traced(kept, (self, lambda d: np.broadcast_to(d.reshape(total.shape), shape)))
 
     def mean(self, axis: Any = None, keepdims: bool = False) -> Traced:
+        """Average along axes."""
         total = self.sum(axis, keepdims)
         return cast("Traced", total / (self.value.size / total.value.size))
 
     def max(self, axis: int, keepdims: bool = False) -> Traced:
+        """Return the largest along an axis."""
         return self._extreme(np.max, axis, keepdims)
 
     def min(self, axis: int, keepdims: bool = False) -> Traced:
+        """Return the smallest along an axis."""
         return self._extreme(np.min, axis, keepdims)
 
     def _extreme(self, function: Callable[..., Array], axis: int, keepdims: bool) -> Traced:
@@ -138,6 +143,8 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
             if ufunc is np.matmul:
                 return _traced(result, (inputs[0], lambda d: d @ values[1].T))
             factors = _UFUNCS[ufunc](result, *values)
+            if ufunc in (np.maximum, np.minimum) and all(isinstance(x, Traced) for x in inputs):
+                factors = tuple(factor + 0.5 * np.equal(*values) for factor in factors)
         return _traced(
             result,
             *(
@@ -171,9 +178,10 @@ def operation(value: Any, *arguments: tuple[Any, Rule]) -> Any:
     return _traced(value, *arguments)
 
 
-def contiguous(array: Any) -> Any:
+def contiguous(array: Array) -> Array:
     """Return the array, traced or not, in C order."""
-    return operation(np.ascontiguousarray(value_of(array)), (array, lambda d: d))
+    same: Array = operation(np.ascontiguousarray(value_of(array)), (array, lambda d: d))
+    return same
 
 
 def _traced(value: Any, *arguments: tuple[Any, Rule]) -> Traced:
@@ -218,7 +226,8 @@ def _summed(derivative: Array, shape: tuple[int, ...]) -> Array:
     extra = derivative.ndim - len(shape)
     derivative = derivative.sum(axis=tuple(range(extra)))
     axes = tuple(i for i, side in enumerate(shape) if side == 1 and derivative.shape[i] != 1)
-    return derivative.sum(axis=axes, keepdims=True)
+    total: Array = derivative.sum(axis=axes, keepdims=True)
+    return total
 
 
 def _power(result: Array, base: Any, exponent: Any) -> tuple[Any, Any]:
@@ -226,14 +235,6 @@ def _power(result: Array, base: Any, exponent: Any) -> tuple[Any, Any]:
     zero = base == 0
     by_base = np.where(zero & (exponent != 1), 0.0, exponent * base ** (exponent - 1))
     return by_base, np.where(base > 0, result * np.log(np.where(base > 0, base, 1.0)), 0.0)
-
-
-def _larger(result: Array, one: Any, other: Any) -> tuple[Any, Any]:
-    return np.greater(one, other), np.greater(other, one)
-
-
-def _smaller(result: Array, one: Any, other: Any) -> tuple[Any, Any]:
-    return np.less(one, other), np.less(other, one)
 
 
 # Their results are counts or conditions, without a derivative.
@@ -252,8 +253,8 @@ _UFUNCS: Mapping[np.ufunc, Callable[..., tuple[Any, ...]]] = {
     np.negative: lambda r, a: (-1.0,),
     np.positive: lambda r, a: (1.0,),
     np.absolute: lambda r, a: (np.sign(a),),
-    np.maximum: _larger,
-    np.minimum: _smaller,
+    np.maximum: lambda r, a, b: (np.greater(a, b), np.greater(b, a)),
+    np.minimum: lambda r, a, b: (np.less(a, b), np.less(b, a)),
     np.power: _power,
     np.square: lambda r, a: (2 * a,),
     np.sqrt: lambda r, a: (np.divide(0.5, r),),
@@ -276,9 +277,7 @@ def _where(condition: Any, one: Any, other: Any) -> Any:
         return lambda d: _summed(np.where(mask, d, 0.0), np.shape(part))
 
     value = np.where(chosen, value_of(one), value_of(other))
-    return operation(
-        value, (one, rule(one, chosen)), (other, rule(other, np.logical_not(chosen)))
-    )
+    return operation(value, (one, rule(one, chosen)), (other, rule(other, np.logical_not(chosen))))
 
 
 def _clip(array: Any, low: Any, high: Any) -> Any:
