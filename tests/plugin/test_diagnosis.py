@@ -50,7 +50,7 @@ def with_nan(image: Image) -> Image:
 
 
 def levels(image: Image) -> Image:
-    return np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)
+    return np.asarray(np.rint(np.clip(image, 0, 1) * 255), np.uint8)
 
 
 PLANTED: dict[str, tuple[Callable[[Image], Image], Any, str]] = {
