@@ -7,9 +7,10 @@ import runpy
 import shutil
 import struct
 import subprocess
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
@@ -174,6 +175,17 @@ def write_spirv() -> None:
     )
 
 
+def in_parallel(compile_all: Callable[..., list[str]]) -> Callable[..., list[str]]:
+    """Return a compiler's method that compiles each of its sources in a thread."""
+
+    def compile_each(sources: list[str], *args: Any, **options: Any) -> list[str]:
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            objects = threads.map(lambda one: compile_all([one], *args, **options), sources)
+            return [name for names in objects for name in names]
+
+    return compile_each
+
+
 class BuildCore(build_ext):
     """build_ext with the shaders compiled first and the compiler's options set."""
 
@@ -190,6 +202,7 @@ class BuildCore(build_ext):
         # Warnings are errors in CI only: a newer compiler must not stop a user's build.
         ext.extra_compile_args += os.environ.get("VKBLOOM_CFLAGS", "").split()
         ext.extra_link_args += os.environ.get("VKBLOOM_LDFLAGS", "").split()
+        self.compiler.compile = in_parallel(self.compiler.compile)
         super().build_extension(ext)
 
 
