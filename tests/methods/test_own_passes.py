@@ -7,7 +7,7 @@ import shutil
 import struct
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -159,7 +159,7 @@ def test_own_picture_takes_the_place_of_the_frame(
 
 @pytest.mark.parametrize("shading", ["forward", "deferred"])
 def test_passes_read_a_drawn_scene(
-    renderer: Renderer, spirv: dict[str, bytes], shading: str
+    renderer: Renderer, spirv: dict[str, bytes], shading: Literal["forward", "deferred"]
 ) -> None:
     source = _core.scene_source(*scene_arguments(Scene.ufo(), (32, 20), shading, 0.0))
     frames, _ = finish(renderer, source, Own(tint(spirv, "bloom", "MAIN", 1, 1, 1, 1)))
