@@ -197,6 +197,11 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         Py_DECREF(self);
         return vkb_raise(state, &error);
     }
+    // A plan without a renderer cannot be run: it needs only the serials.
+    if (!renderer) {
+        vkb_release_kernel(&self->kernel);
+        vkb_release_kernel(&self->dirt);
+    }
     if (!choose_outputs(&self->plan, names) || !(self->outputs = describe_outputs(&self->plan))) {
         Py_DECREF(self);
         return NULL;

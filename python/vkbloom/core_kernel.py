@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
-from typing import Any, Final, NamedTuple
+import hashlib
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CoreKernel", "kernel_pixels"]
-
-_SERIALS: Final = itertools.count(1)
+__all__ = ["CoreKernel", "core_kernel"]
 
 
 class CoreKernel(NamedTuple):
@@ -21,7 +19,7 @@ class CoreKernel(NamedTuple):
     pixels : ndarray of float32, shape (h, w, 4)
         Linear RGB, and the mean of the three channels for alpha.
     serial : int
-        A number that no other kernel of this process has.
+        A hash of the pixels, so that a kernel that is made again is known to the device.
     is_grey : bool
         Whether all channels are equal.
     prefilter : (float, float, float)
@@ -33,10 +31,18 @@ class CoreKernel(NamedTuple):
     is_grey: bool = False
     prefilter: tuple[float, float, float] = (1.0, 0.0, 1.0)
 
+    @property
+    def nbytes(self) -> int:
+        """The bytes of the pixels."""
+        return self.pixels.nbytes
 
-def kernel_pixels(values: NDArray[Any]) -> tuple[NDArray[np.float32], int]:
-    """Return the pixels and a new serial number of an array, shape (h, w) or (h, w, 3)."""
+
+def core_kernel(values: NDArray[Any]) -> CoreKernel:
+    """Return the kernel of an array, shape (h, w) or (h, w, 3)."""
     pixels = np.empty((*values.shape[:2], 4), np.float32)
     pixels[..., :3] = values if values.ndim == 3 else values[..., np.newaxis]
     pixels[..., 3] = values.mean(axis=2) if values.ndim == 3 else values
-    return pixels, next(_SERIALS)
+    digest = hashlib.blake2b(pixels.data, digest_size=8, key=repr(pixels.shape).encode()).digest()
+    # 0 and the largest number are reserved.
+    serial = min(max(int.from_bytes(digest, "little"), 1), 2**64 - 2)
+    return CoreKernel(pixels, serial, bool((pixels == pixels[..., :1]).all()))

@@ -15,6 +15,7 @@ from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
 from vkbloom.image import Image
+from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings
 from vkbloom.sources import image_kind, image_source, is_image, scene_source
 from vkbloom.version import installed_version
@@ -200,6 +201,7 @@ class Renderer:
             self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
         self._planned: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
+        self._kept: KeptArrays | None = shared()
 
     @property
     def closed(self) -> bool:
@@ -225,7 +227,7 @@ class Renderer:
         >>> renderer.closed
         True
         """
-        self._planned = None
+        self._planned = self._kept = None
         self._core.close()
 
     def capture(self, path: str | os.PathLike[str]) -> contextlib.AbstractContextManager[None]:

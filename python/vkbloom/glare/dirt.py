@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_number
-from vkbloom.core_kernel import CoreKernel, kernel_pixels
+from vkbloom.core_kernel import CoreKernel, core_kernel
 from vkbloom.glare.base import Glare, stage_field
+from vkbloom.kept_arrays import kept
 
 DirtMode = Literal["multiply", "lerp"]
 
@@ -89,19 +89,19 @@ class Dirt(Glare):
 
     def core_kernel(self, frame: object, buffers: object) -> CoreKernel:
         """Return the picture as the core reads a kernel."""
-        return CoreKernel(*_core_dirt(self.replace_look()))
+        return _core_dirt(self.replace_look())
 
     def replace_look(self) -> Dirt:
         """Return the dirt with defaults in the fields that do not change its picture."""
         return Dirt(image=self.image, seed=self.seed)
 
 
-@functools.lru_cache(maxsize=4)
-def _core_dirt(dirt: Dirt) -> tuple[NDArray[np.float32], int]:
-    return kernel_pixels(dirt.pixels)
+@kept
+def _core_dirt(dirt: Dirt) -> CoreKernel:
+    return core_kernel(dirt.pixels)
 
 
-@functools.lru_cache(maxsize=4)
+@kept
 def _made_dirt(seed: int) -> NDArray[np.float32]:
     """Return soft discs and specks of 0 to 1, (270, 480)."""
     random = np.random.default_rng(seed)

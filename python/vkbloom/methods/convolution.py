@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, cast
 
@@ -11,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom.checks import check_size
-from vkbloom.core_kernel import CoreKernel, kernel_pixels
+from vkbloom.core_kernel import CoreKernel, core_kernel
 from vkbloom.fields import choice_field
+from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import PSF, check_above
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.resampling import box_resample
@@ -135,7 +135,7 @@ class Convolution(Settings):
         Returns
         -------
         ndarray of float64, shape (h, w, 3)
-            The kernel in pixels of the bloom buffers. It is cached and read-only.
+            The kernel in pixels of the bloom buffers.
 
         Raises
         ------
@@ -146,8 +146,7 @@ class Convolution(Settings):
 
     def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
         """Return the kernel as the core reads it."""
-        pixels, serial, is_grey = _core_kernel(self._shape, frame, buffers)
-        return CoreKernel(pixels, serial, is_grey, self.prefilter)
+        return _core_kernel(self._shape, frame, buffers)._replace(prefilter=self.prefilter)
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return estimates of the kernel's width and height, without the kernel."""
@@ -171,8 +170,6 @@ class Convolution(Settings):
         )
 
 
-# Kernels may be as large as four frames.
-@functools.lru_cache(maxsize=2)
 def _kernel(
     settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
 ) -> NDArray[np.float64]:
@@ -190,14 +187,11 @@ def _kernel(
                     f"psf: the sum of its {name} is {total:g}, not above 0; use normalize=False"
                 )
         kernel = kernel / sums
-    kernel.flags.writeable = False
     return kernel
 
 
-@functools.lru_cache(maxsize=8)
+@kept
 def _core_kernel(
     settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
-) -> tuple[NDArray[np.float32], int, bool]:
-    pixels, serial = kernel_pixels(_kernel(settings, frame, buffers))
-    first = pixels[..., :1]
-    return pixels, serial, bool((pixels == first).all())
+) -> CoreKernel:
+    return core_kernel(_kernel(settings, frame, buffers))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom.checks import check_floats, check_index, check_number, check_size
+from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import Array, centred, check_above
 from vkbloom.psf.sampled import SampledPSF
 from vkbloom.psf.values import ArrayValue
@@ -114,7 +114,7 @@ class iris:
         return dataclasses.asdict(self)
 
 
-@functools.lru_cache(maxsize=4)
+@kept
 def _mask(made: iris) -> NDArray[np.float32]:
     fine = 4 * made.size
     places = (np.arange(fine) + 0.5) * 2 / fine - 1
@@ -250,7 +250,7 @@ def _reach(psf: aperture) -> int:
     return max(1, math.ceil(_scale(psf, max(_lengths(psf))) * int(np.shape(psf.mask)[0]) / 2))
 
 
-@functools.lru_cache(maxsize=4)
+@kept
 def _pattern(psf: aperture, up: int, across: int) -> Array:
     """Return the sum over the wavelengths, as far as some rows and columns from the centre."""
     lengths = _lengths(psf)

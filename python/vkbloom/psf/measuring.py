@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from vkbloom.checks import check_size
+from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import Array
 from vkbloom.psf.sampled import SampledPSF
 from vkbloom.settings import Settings
@@ -68,7 +68,7 @@ class measured(SampledPSF):
         return _spread(self)
 
 
-@functools.lru_cache(maxsize=4)
+@kept
 def _spread(psf: measured) -> Array:
     from vkbloom import reference  # noqa: PLC0415  costs start-up time
 

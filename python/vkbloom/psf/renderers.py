@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vkbloom.checks import check_floats, check_index, check_number
+from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import PSF, Array, centred
 from vkbloom.psf.resampling import box_resample
 from vkbloom.psf.sampled import SampledPSF, check_values, rgb
@@ -146,7 +146,7 @@ class unreal(SampledPSF):
         return centred(_scattered(self, max(frame), (height, width)), (width, height))
 
 
-@functools.lru_cache(maxsize=2)
+@kept
 def _scattered(psf: unreal, longer_side: float, room: tuple[int, int] | None = None) -> Array:
     """Return the kernel for a frame with this longer side, of at most this height and width.
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.views.comparison import Comparison, compare
+from vkbloom.views.diagnosis import Diagnosis, diagnose
 from vkbloom.views.tolerances import Stage, Tolerances, failures, worst
 
 __all__ = ["Verdict", "first_failure", "judge", "judge_image"]
@@ -31,6 +32,8 @@ class Verdict:
         Text of a warning if the framebuffer passed but differs by more than `Tolerances.warn`.
     comparison : Comparison or None
         The figures; None if shapes or dtypes differ, or one image is missing.
+    diagnosis : Diagnosis or None
+        The cause of the difference of two images that failed.
     atol, rtol : float
         The tolerances that were used.
     """
@@ -40,6 +43,7 @@ class Verdict:
     reasons: tuple[str, ...] = ()
     warning: str | None = None
     comparison: Comparison | None = None
+    diagnosis: Diagnosis | None = None
     atol: float = 0.0
     rtol: float = 0.0
 
@@ -109,7 +113,12 @@ def judge_image(
     if expected.dtype != actual.dtype:
         reasons.append(f"its dtype is {actual.dtype}, not {expected.dtype}")
     if reasons:
-        return Verdict(name=name, failed_at="shape and dtype", reasons=tuple(reasons))
+        return Verdict(
+            name=name,
+            failed_at="shape and dtype",
+            reasons=tuple(reasons),
+            diagnosis=diagnose(expected, actual),
+        )
     atol, rtol = tolerances.of(expected.dtype)
     # Equal images pass every limit, so the slow metrics need not be computed.
     metrics = () if np.array_equal(expected, actual) else tolerances.metrics
@@ -131,6 +140,7 @@ def judge_image(
         reasons=tuple(reason for _, reason in failed),
         warning=warning,
         comparison=found,
+        diagnosis=diagnose(expected, actual) if failed else None,
         atol=atol,
         rtol=rtol,
     )
