@@ -47,7 +47,7 @@ def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
         downs.append(image)
     count, weights = len(downs), settings.level_weights
     up = partial(tent, x_step=settings.radius * scale[0], y_step=settings.radius * scale[1])
-    shares = [1.0] * count if weights is None else [float(w) for w in weights[:count]]
+    shares = [1.0] * count if weights is None else list(weights[:count])
     return combine(
         downs,
         source,

@@ -8,6 +8,7 @@ import numpy as np
 
 from .image import BlurInput
 from .sampling import Array, sample
+from .tape import contiguous
 
 __all__ = [
     "combine",
@@ -47,7 +48,7 @@ def cubic(image: Array, size: tuple[int, int]) -> Array:
     """
     rows = _cubic_rows(image, size[1])
     columns = _cubic_rows(rows.swapaxes(0, 1), size[0])
-    return np.ascontiguousarray(columns.swapaxes(0, 1))
+    return contiguous(columns.swapaxes(0, 1))
 
 
 def _cubic_rows(image: Array, count: int) -> Array:

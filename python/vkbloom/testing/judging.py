@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.views.comparison import Comparison, compare
+from vkbloom.views.diagnosis import Diagnosis, diagnose
 from vkbloom.views.tolerances import Stage, Tolerances, failures, worst
 
 __all__ = ["Verdict", "first_failure", "judge", "judge_image"]
@@ -25,6 +26,7 @@ class Verdict:
     - `warning`: Text of a warning if the framebuffer passed but differs by more than
       `Tolerances.warn`.
     - `comparison`: The figures; None if shapes or dtypes differ, or one image is missing.
+    - `diagnosis`: The cause of the difference of two images that failed.
     - `atol`, `rtol`: The tolerances that were used.
     """
 
@@ -33,6 +35,7 @@ class Verdict:
     reasons: tuple[str, ...] = ()
     warning: str | None = None
     comparison: Comparison | None = None
+    diagnosis: Diagnosis | None = None
     atol: float = 0.0
     rtol: float = 0.0
 
@@ -76,7 +79,12 @@ def judge_image(
     if expected.dtype != actual.dtype:
         reasons.append(f"its dtype is {actual.dtype}, not {expected.dtype}")
     if reasons:
-        return Verdict(name=name, failed_at="shape and dtype", reasons=tuple(reasons))
+        return Verdict(
+            name=name,
+            failed_at="shape and dtype",
+            reasons=tuple(reasons),
+            diagnosis=diagnose(expected, actual),
+        )
     atol, rtol = tolerances.of(expected.dtype)
     # Equal images pass every limit, so the slow metrics need not be computed.
     metrics = () if np.array_equal(expected, actual) else tolerances.metrics
@@ -98,6 +106,7 @@ def judge_image(
         reasons=tuple(reason for _, reason in failed),
         warning=warning,
         comparison=found,
+        diagnosis=diagnose(expected, actual) if failed else None,
         atol=atol,
         rtol=rtol,
     )

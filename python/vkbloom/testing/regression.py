@@ -481,6 +481,8 @@ def _message(
             lines.append(f"  {verdict.name}: within the tolerances")
         for reason in verdict.reasons:
             lines.append(f"  {verdict.name}: FAILED ({verdict.failed_at}): {reason}")
+        if verdict.diagnosis is not None and verdict.diagnosis.cause is not None:
+            lines.append(f"  {verdict.name}: cause: {verdict.diagnosis}")
     of_several = f" (the closest of {count})" if count and count > 1 else ""
     now = given.origin.summary
     lines.append(f"  reference{of_several}: {reference.origin.summary}; now: {now}")
