@@ -16,8 +16,10 @@ __all__ = ["brightest_of", "empty_stages", "is_without", "only", "reason", "with
 
 def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | list[str]:
     """Return the framebuffers to request: also bloom and glare, unless the bloom is off."""
-    if isinstance(names, str) or not settings.bloom:
+    if isinstance(names, str):
         return names
+    if not settings.bloom:
+        return [*names]
     noted = ["bloom", *(name for name, _ in _stages(settings))]
     return [*names, *(name for name in noted if name not in names)]
 
