@@ -362,12 +362,12 @@ class TestRefused:
         root["attributes"]["vkbloom_grid"]["format"] = 99
         (copy / "zarr.json").write_text(json.dumps(root))
         for call in (make, check_grid):
-            with pytest.raises(ValueError, match="its format version 99 is not 2"):
+            with pytest.raises(ValueError, match="its format version 99 is not 3"):
                 call(copy)
         root["attributes"]["vkbloom_grid"]["format"] = "x" * 100_000
         (copy / "zarr.json").write_text(json.dumps(root))
         for call in (make, check_grid):
-            with pytest.raises(ValueError, match=r'its format version "x+ \.\.\. x+" is not 2'):
+            with pytest.raises(ValueError, match=r'its format version "x+ \.\.\. x+" is not 3'):
                 call(copy)
 
     def test_something_else(self, tmp_path: Path) -> None:
@@ -433,7 +433,7 @@ def damage_half_root(store: Path) -> None:
 
 
 def damage_marks(store: Path) -> None:
-    (store / "done" / "c.0.0.0").write_bytes(b"x")
+    (store / "done" / "c.0.1.1").write_bytes(b"x")
 
 
 def damage_coordinate(store: Path) -> None:
@@ -454,7 +454,7 @@ class TestDamaged:
             (damage_half_metadata, "final/zarr.json is damaged, of all points"),
             (damage_root, "zarr.json is missing, which describes the grid"),
             (damage_half_root, "zarr.json is damaged, which describes the grid"),
-            (damage_marks, "the marks in done are damaged .*, of all points"),
+            (damage_marks, f"done/c.0.1.1 is damaged .*, of {NAMED}"),
             (damage_coordinate, "exposure/c.0 is missing, of all points"),
         ],
     )
@@ -492,29 +492,23 @@ def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
 
 
 CHUNK_OF_FINAL = "final/c.0.1.1.0.0.0"
-#: Frames of Zstandard that say or hold more than their chunks: 64 GiB said in 19 bytes; 256 MiB in
-#: 8 KB, in one frame that says so, and in one that does not.
-SAYS_TOO_MUCH = b"\x28\xb5\x2f\xfd\xe0" + (1 << 36).to_bytes(8, "little") + b"\x19\0\0abc"
+#: A Zstandard frame of 19 bytes that declares 64 GiB, and one of 8 KB that contains 256 MiB.
+DECLARES_TOO_MUCH = b"\x28\xb5\x2f\xfd\xe0" + (1 << 36).to_bytes(8, "little") + b"\x19\0\0abc"
 ONES = ((1 << 17 << 3) | 2).to_bytes(3, "little") + b"\1"
-HOLDS_TOO_MUCH = bytes.fromhex("28b52ffda0") + (1 << 28).to_bytes(4, "little") + ONES * 2048
-STREAMS_TOO_MUCH = bytes.fromhex("28b52ffd0058") + ONES * 2048
-LAST = b"\1\0\0"
+CONTAINS_TOO_MUCH = bytes.fromhex("28b52ffd0058") + ONES * 2048 + b"\1\0\0"
 
 
 class TestHostile:
     """Stores that fuzzing found, or would."""
 
     @pytest.mark.parametrize(
-        "frame",
-        [SAYS_TOO_MUCH, HOLDS_TOO_MUCH + LAST, STREAMS_TOO_MUCH + LAST],
-        ids=["says", "holds", "streams"],
+        "frame", [DECLARES_TOO_MUCH, CONTAINS_TOO_MUCH], ids=["declares", "contains"]
     )
     @pytest.mark.parametrize("key", [CHUNK_OF_FINAL, "done/c.0.0.0", "channel/c.0", "exposure/c.0"])
-    def test_a_chunk_takes_no_more_memory_than_its_array_needs(
+    def test_chunk_with_wrong_checksum_is_not_decompressed(
         self, copy: Path, undisturbed: Path, key: str, frame: bytes
     ) -> None:
-        has_sum = key.startswith(("final", "done"))
-        (copy / key).write_bytes(with_sum(frame) if has_sum else frame)
+        (copy / key).write_bytes(frame + b"\0\0\0\0")
         tracemalloc.start()
         try:
             (problem,) = check_grid(copy).problems
@@ -522,37 +516,33 @@ class TestHostile:
             _, most = tracemalloc.get_traced_memory()
         finally:
             tracemalloc.stop()
-        assert "damaged" in problem
+        assert problem.startswith(f"{key} is damaged (Stored and computed checksum do not match")
         assert most < 64 << 20
         assert contents(copy) == contents(undisturbed)
 
-    def test_texts_that_are_said_to_be_many(self, copy: Path, undisturbed: Path) -> None:
-        content = bytes(zstd.Zstd().encode((1 << 28).to_bytes(4, "little") + bytes(16)))
-        (copy / "channel" / "c.0").write_bytes(content)
+    @pytest.mark.parametrize("size", [0, 100, 100_000])
+    @pytest.mark.parametrize("key", [CHUNK_OF_FINAL, "done/c.0.0.0", "channel/c.0", "exposure/c.0"])
+    def test_chunk_of_another_size_is_damaged(
+        self, copy: Path, undisturbed: Path, key: str, size: int
+    ) -> None:
+        (copy / key).write_bytes(with_sum(bytes(zstd.Zstd().encode(bytes(size)))))
         (problem,) = check_grid(copy).problems
-        assert problem == "channel/c.0 is damaged, of all points"
+        assert problem.startswith(f"{key} is damaged (")
         make(copy)
         assert contents(copy) == contents(undisturbed)
 
-    def test_memory_that_is_short_is_no_damage(
+    def test_lack_of_memory_is_not_damage(
         self, copy: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         def fails(*_: object) -> None:
             raise MemoryError
 
         before = contents(copy)
-        monkeypatch.setattr(vkbloom.grid.store, "check_summed", fails)
-        with pytest.raises(MemoryError):
-            make(copy)
+        monkeypatch.setattr(zarr.Array, "__getitem__", fails)
+        for call in (make, check_grid):
+            with pytest.raises(MemoryError):
+                call(copy)
         assert contents(copy) == before
-
-    def test_a_chunk_that_holds_too_little(self, copy: Path, undisturbed: Path) -> None:
-        content = bytes(zstd.Zstd().encode(bytes(100)))
-        (copy / CHUNK_OF_FINAL).write_bytes(with_sum(content))
-        (problem,) = check_grid(copy).problems
-        assert f"{CHUNK_OF_FINAL} is damaged (it " in problem
-        make(copy)
-        assert contents(copy) == contents(undisturbed)
 
     @pytest.mark.parametrize(
         "chunk",
@@ -628,14 +618,6 @@ class TestHostile:
             deep = [deep]
         told = ["a: nested lists in the store, 1 requested"]
         assert differences({"a": deep}, {"a": 1}) == told
-
-    def test_more_points_than_memory(self, copy: Path) -> None:
-        axes = {name: list(range(10_000)) for name in AXES}
-        rewritten(
-            copy / "zarr.json", lambda root: root["attributes"]["vkbloom_grid"].update(axes=axes)
-        )
-        with pytest.raises(ValueError, match="the number of points, 1000000000000, is not within"):
-            check_grid(copy)
 
     @pytest.mark.parametrize("name", ["final", "done", "channel"])
     @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ plan                       the requested grid, and its layout: variables, shapes
 filling, reductions        render blocks of points into arrays; figures of frames
 memory                     the grid as one Dataset
 zarr_grid                  the grid as a Zarr store
-store, keys, identity      the store's arrays, its keys as bytes, and the identity of its grid
+store, chunks, keys        the store's metadata, its chunks, and its keys as bytes
+identity                   what determines the contents of a stored grid
 image_files                the grid as image files
 checking                   check a store for missing and damaged data
 rendering                  render a grid into a store or a folder

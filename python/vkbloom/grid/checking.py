@@ -2,42 +2,28 @@
 
 from __future__ import annotations
 
+import json
 import math
-import operator
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
-
-import numpy as np
+from typing import Any
 
 from vkbloom.grid.axes import Axis
-from vkbloom.grid.chunks import check_summed
-from vkbloom.grid.identity import chunk_in
+from vkbloom.grid.chunks import DONE, Chunks
+from vkbloom.grid.identity import fingerprint
 from vkbloom.grid.keys import Keys, open_keys
-from vkbloom.grid.order import Block, Index, blocks
-from vkbloom.grid.plan import Variable
+from vkbloom.grid.order import Block, blocks
 from vkbloom.grid.store import (
-    DIGESTS,
-    DONE,
-    ROOT,
+    METADATA,
     checked_identity,
-    chunk_key,
     describe,
-    digest,
+    mark_of,
+    normal,
     read_json,
-    read_marks,
-    reason,
 )
 
 __all__ = ["GridReport", "check_grid"]
-
-_PURPOSE: Final = "Grids on disk"
-# The marks take one byte of memory per point, even if the compressed file is small.
-_MOST_POINTS: Final = 1 << 28
-# Largest size of an uncompressed chunk.
-_MOST_BYTES: Final = 1 << 40
-_DAMAGE: Final = (ValueError, OSError)
 
 
 @dataclass(frozen=True)
@@ -97,7 +83,7 @@ def check_grid(store: Any) -> GridReport:
     FileNotFoundError
         The store does not exist or is empty.
     ValueError
-        The store is not a grid, has another format version, or has over 2**28 points.
+        The store is not a grid, or has another format version.
     ModuleNotFoundError
         zarr is missing.
 
@@ -120,111 +106,81 @@ def check_grid(store: Any) -> GridReport:
     held = keys.all()
     if not held:
         raise FileNotFoundError(f"{keys.name}: the store does not exist or is empty")
-    content = keys.read(ROOT)
-    root = read_json(content)
-    if root is None:
-        if not any(key.startswith(f"{DONE}/") for key in held):
-            raise ValueError(f"{keys.name}: its content is not a grid of vkbloom")
-        return GridReport(0, 0, (f"{_state_of(ROOT, content)}, which describes the grid",))
-    own = checked_identity(root, keys.name)
-    try:
-        stored = _read_stored(own, root)
-    except (KeyError, TypeError, AttributeError, ValueError):
-        return GridReport(0, 0, (f"{_state_of(ROOT, b'')}, which describes the grid",))
-    if math.prod(stored.shape) > _MOST_POINTS:
-        raise ValueError(
-            f"{keys.name}: the number of points, {math.prod(stored.shape)}, is not within "
-            f"{_MOST_POINTS}"
-        )
-    return _checked(keys, held, stored)
+    root = read_json(keys.read(METADATA))
+    if root is None and not any(key.startswith(f"{DONE}/") for key in held):
+        raise ValueError(f"{keys.name}: its content is not a grid of vkbloom")
+    own = None if root is None else checked_identity(root, keys.name)
+    arrays = _described_arrays(root or {})
+    # ``done`` names the grid, so that a changed identity is found.
+    if own is None or fingerprint(own) != mark_of(arrays.get(DONE)):
+        return GridReport(0, 0, (f"{_state_of(METADATA, held)}, which describes the grid",))
+    return _Stored(keys, held, own, arrays).report()
 
 
-def _state_of(key: str, content: bytes | None) -> str:
-    return f"{key} is {'missing' if content is None else 'damaged'}"
+def _state_of(key: str, held: set[str]) -> str:
+    return f"{key} is {'damaged' if key in held else 'missing'}"
 
 
-@dataclass(frozen=True)
+def _described_arrays(root: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the copy of the arrays' metadata in the group's; empty if it is damaged."""
+    copies = root.get("consolidated_metadata")
+    found = copies.get("metadata") if isinstance(copies, dict) else None
+    # Names become paths in a local store, so they must not leave its folder.
+    if not isinstance(found, dict) or not all(re.fullmatch(r"\w[\w.-]*", name) for name in found):
+        return {}
+    return found
+
+
 class _Stored:
-    """A grid as the group's metadata describe it: axes, chunk, variables, digests by key."""
+    """A store whose metadata describe a grid."""
 
-    axes: tuple[Axis, ...]
-    chunk: Index
-    variables: Mapping[str, Variable]
-    digests: Mapping[str, str]
+    def __init__(
+        self, keys: Keys, held: set[str], own: Mapping[str, Any], arrays: Mapping[str, Any]
+    ) -> None:
+        self._keys = keys
+        self._held = held
+        self._arrays = arrays
+        self._axes = tuple(
+            Axis(name, tuple(own["axes"][name]), "settings", "", "")
+            for name in own["order of axes"]
+        )
+        trailing = {name: len(told["shape"]) for name, told in own["variables"].items()}
+        self._chunks = Chunks(keys, trailing, tuple(own["chunk"]))
 
-    @property
-    def shape(self) -> Index:
-        return tuple(len(axis) for axis in self.axes)
+    def report(self) -> GridReport:
+        """Read everything."""
+        damaged = {name: self._array_problem(name) for name in self._arrays}
+        problems = [f"{text}, of all points" for text in damaged.values() if text]
+        variables = [name for name in self._chunks.trailing if not damaged.get(name)]
+        shape = tuple(map(len, self._axes))
+        done = 0
+        for block in blocks(shape, self._chunks.chunk, range(len(shape))):
+            if not damaged[DONE]:
+                is_done, found = self._block_problems(block, variables)
+                done += block.count * is_done
+                problems += [f"{text}, of {describe(self._axes, block)}" for text in found]
+        return GridReport(math.prod(shape), done, tuple(problems))
 
+    def _array_problem(self, name: str) -> str | None:
+        """Return what is wrong with the metadata of an array, or with a coordinate."""
+        key = f"{name}/{METADATA}"
+        copy = json.dumps(self._arrays[name]).encode()
+        if normal(key, self._keys.read(key)) != normal(key, copy):
+            return _state_of(key, self._held)
+        if name == DONE or name in self._chunks.trailing:
+            return None
+        chunks = Chunks(self._keys, {}, (1,))
+        values = Block((0,), tuple(self._arrays[name]["shape"]), (False,))
+        problem = chunks.problem(name, values, self._held)
+        return None if problem is None else f"{chunks.key(name, values)} is {problem}"
 
-def _read_stored(own: Mapping[str, Any], root: Mapping[str, Any]) -> _Stored:
-    """Parse a stored identity.
-
-    Raises
-    ------
-    KeyError, TypeError, AttributeError, ValueError
-        It is damaged.
-    """
-    axes = tuple(
-        Axis(name, tuple(own["axes"][name]), "settings", "", "") for name in own["order of axes"]
-    )
-    chunk = chunk_in(own, tuple(len(axis) for axis in axes))
-    if chunk is None:
-        raise ValueError
-    variables = {}
-    for name, told in own["variables"].items():
-        shape = tuple(operator.index(size) for size in told["shape"])
-        dtype = np.dtype(told["dtype"])
-        size = math.prod((*chunk, *shape)) * dtype.itemsize
-        if dtype.kind not in "biuf" or size > _MOST_BYTES or min(shape, default=0) < 0:
-            raise ValueError
-        variables[name] = Variable(("",) * len(shape), shape, dtype, {})
-    digests = root["attributes"][DIGESTS]
-    names = [DONE, *variables, *(axis.name for axis in axes)]
-    # Keys become paths in a local store, so they must not leave its folder.
-    if not all(re.fullmatch(r"\w[\w.-]*/[\w.]+", key) for key in digests):
-        raise ValueError
-    if not all(f"{name}/{ROOT}" in digests for name in names):
-        raise ValueError
-    return _Stored(axes, chunk, variables, digests)
-
-
-def _checked(keys: Keys, held: set[str], stored: _Stored) -> GridReport:
-    problems: list[str] = []
-    damaged = set()
-    for key, expected in stored.digests.items():
-        name, _, rest = key.partition("/")
-        # The marks change while the grid is rendered; their own checksums cover them.
-        if name == DONE and rest != ROOT:
-            continue
-        content = keys.read(key)
-        if digest(key, content) == expected:
-            continue
-        damaged.add(name)
-        problems.append(f"{_state_of(key, content)}, of all points")
-    done = np.zeros(stored.shape, np.bool_)
-    if DONE not in damaged:
-        try:
-            done = read_marks(keys, stored.shape)
-        except _DAMAGE as error:
-            problems.append(f"the marks in {DONE} are damaged ({reason(error)}), of all points")
-    sound = {name: held for name, held in stored.variables.items() if name not in damaged}
-    for block in blocks(stored.shape, stored.chunk, range(done.ndim)) if done.any() else ():
-        if done[block.slices].all():
-            found = _block_problems(keys, held, block, stored.chunk, sound)
-            problems += [f"{text}, of {describe(stored.axes, block)}" for text in found]
-    return GridReport(done.size, int(done.sum()), tuple(problems))
-
-
-def _block_problems(
-    keys: Keys, held: set[str], block: Block, chunk: Index, variables: Mapping[str, Variable]
-) -> Iterator[str]:
-    for name, variable in variables.items():
-        key = chunk_key(name, block, chunk, len(variable.shape))
-        if key not in held:
-            yield f"{key} is missing"
-            continue
-        try:
-            check_summed(keys.read(key) or b"", math.prod(chunk) * variable.size)
-        except _DAMAGE as error:
-            yield f"{key} is damaged ({reason(error)})"
+    def _block_problems(self, block: Block, variables: Iterable[str]) -> tuple[bool, list[str]]:
+        marked = self._chunks.marked(block, self._held)
+        if isinstance(marked, str):
+            return False, [f"{self._chunks.key(DONE, block)} is {marked}"]
+        found = []
+        for name in variables if marked else ():
+            problem = self._chunks.problem(name, block, self._held)
+            if problem is not None:
+                found.append(f"{self._chunks.key(name, block)} is {problem}")
+        return marked, found

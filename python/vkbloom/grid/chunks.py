@@ -1,54 +1,107 @@
-"""Check the chunks of a store before Zarr allocates the size that their headers claim."""
+"""The chunks of a stored grid: each variable has one chunk per block of points.
+
+Zarr reads and writes them. Each ends with a checksum, so that reading finds damage.
+"""
 
 from __future__ import annotations
 
-from typing import Final
+import functools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.grid.keys import Keys
+from vkbloom.grid.order import Block, Index
 
-__all__ = ["check_summed"]
+__all__ = ["DONE", "Chunks"]
 
-_PURPOSE: Final = "Grids on disk"
-_SUM_BYTES: Final = 4
-# Largest decompressed and smallest compressed size of a Zstandard block (RFC 8878, 3.1.1.2).
-_MOST_OF_BLOCK: Final = 1 << 17
-_LEAST_BLOCK: Final = 4
+DONE: Final = "done"
 
 
-def check_summed(content: bytes, size: int) -> None:
-    """Raise ValueError unless a chunk is complete and ends with its checksum.
+@dataclass
+class Chunks:
+    """Reads and writes blocks; it can be sent to the process that renders them.
 
-    Parameters
-    ----------
-    content : bytes
-        The stored bytes: Zstandard data, then its CRC-32C.
-    size : int
-        Expected size of the decompressed chunk in bytes.
+    `trailing` has the number of dimensions that are not axes, by variable; `chunk` has the number
+    of values per block, by axis.
     """
-    crc32c = import_extra("google_crc32c", "grid", _PURPOSE)
-    content, kept = content[:-_SUM_BYTES], content[-_SUM_BYTES:]
-    if crc32c.value(content).to_bytes(_SUM_BYTES, "little") != kept:
-        raise ValueError("its checksum differs")
-    if not size:
-        return
-    if size > (len(content) // _LEAST_BLOCK + 1) * _MOST_OF_BLOCK:
-        raise ValueError(f"it is too short for {size} bytes")
-    # A chunk that decompresses to fewer bytes fits into a smaller buffer too.
-    if not _fits(content, size) or _fits(content, size - 1):
-        raise ValueError(f"it does not hold {size} bytes")
 
+    keys: Keys
+    trailing: Mapping[str, int]
+    chunk: Index
 
-def _fits(content: bytes, room: int) -> bool:
-    """Return whether a chunk decompresses into a buffer of `room` bytes.
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the opened arrays."""
+        return {"keys": self.keys, "trailing": self.trailing, "chunk": self.chunk}
 
-    The buffer is given because the frame's own header would otherwise decide how much memory is
-    allocated.
-    """
-    zstd = import_extra("numcodecs.zstd", "grid", _PURPOSE)
-    try:
-        zstd.Zstd().decode(content, np.zeros(room, np.uint8))
-    except (RuntimeError, ValueError):
-        return False
-    return True
+    @functools.cached_property
+    def _opened(self) -> dict[tuple[str, str], Any]:
+        return {}
+
+    def _array(self, name: str, mode: str) -> Any:
+        if (name, mode) not in self._opened:
+            zarr = import_extra("zarr", "grid", "Grids on disk")
+            array = zarr.open_array(self.keys.store, path=name, mode=mode)
+            # Also write chunks of zeros: a missing key would look like a missing point.
+            self._opened[name, mode] = array.with_config({"write_empty_chunks": True})
+        return self._opened[name, mode]
+
+    def key(self, name: str, block: Block) -> str:
+        """Return the key of a block's chunk of a variable."""
+        places = (start // size for start, size in zip(block.start, self.chunk, strict=True))
+        # An array without dimensions has the key "c".
+        trailing = "0" * self.trailing.get(name, 0)
+        return f"{name}/" + ".".join(["c", *map(str, places), *trailing])
+
+    def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write a block's variables."""
+        for name, values in arrays.items():
+            with self.keys.named(name):
+                self._array(name, "r+")[block.slices] = values
+
+    def flush(self, written: Iterable[Block]) -> None:
+        """Flush blocks to the disk."""
+        self.keys.flush([self.key(name, block) for block in written for name in self.trailing])
+
+    def mark(self, written: Iterable[Block]) -> None:
+        """Mark blocks as done; their data must be on the disk."""
+        blocks = list(written)
+        for block in blocks:
+            self.write(block, {DONE: np.ones(block.shape, np.bool_)})
+        self.keys.flush([self.key(DONE, block) for block in blocks])
+
+    def marked(self, block: Block, held: set[str]) -> bool | str:
+        """Return whether a block is marked as done, or how its mark is damaged."""
+        if self.key(DONE, block) not in held:
+            return False
+        try:
+            return bool(self._read(DONE, block).all())
+        except ValueError as error:
+            return f"damaged ({error})"
+
+    def problem(self, name: str, block: Block, held: set[str], *, read: bool = True) -> str | None:
+        """Return what is wrong with a block's chunk of a variable: missing, or damaged if read."""
+        if self.key(name, block) not in held:
+            return "missing"
+        try:
+            if read:
+                self._read(name, block)
+        except ValueError as error:
+            return f"damaged ({error})"
+        return None
+
+    def _read(self, name: str, block: Block) -> NDArray[Any]:
+        """Read a block's chunk of a variable, or raise ValueError if it is damaged."""
+        try:
+            found: NDArray[Any] = self._array(name, "r")[block.slices]
+        except MemoryError:
+            raise
+        except Exception as error:
+            # Zarr does not document the exceptions that damaged chunks and metadata raise.
+            text = str(error).partition(". ")[0].removesuffix(".") or type(error).__name__
+            raise ValueError(text) from error
+        return np.asarray(found)

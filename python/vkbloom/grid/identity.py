@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
@@ -15,27 +16,16 @@ from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.reductions import Reduction
 from vkbloom.grid.sources import digest
 
-__all__ = ["FORMAT", "chunk_in", "differences", "identity", "short"]
+__all__ = ["FORMAT", "chunk_in", "differences", "fingerprint", "identity", "short"]
 
 #: Version of the store's layout. A store with another version cannot be read.
-FORMAT: Final = 2
+FORMAT: Final = 3
 
 _LONGEST: Final = 60  # characters of a value in a message
 
 
 def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
-    """Return everything that determines the contents of a grid's arrays, as JSON values.
-
-    Parameters
-    ----------
-    grid : Grid
-    layout : Layout
-    chunk : tuple of int
-
-    Returns
-    -------
-    dict
-    """
+    """Return everything that determines the contents of a grid's arrays, as JSON values."""
     found = {
         "format": FORMAT,
         "version": layout.version,
@@ -57,15 +47,19 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
     return plain
 
 
-def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
-    """Return the chunk that a stored identity has; None if it has no valid one.
+def fingerprint(own: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of an identity, whatever the order of its names."""
+    try:
+        text = json.dumps(own, sort_keys=True)
+    except RecursionError:
+        text = ""
+    return hashlib.sha256(text.encode()).hexdigest()
 
-    Parameters
-    ----------
-    stored : mapping
-        The identity from a store. It may be damaged, so any value is possible.
-    shape : tuple of int
-        Shape of the grid; a larger chunk is not valid.
+
+def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
+    """Return the chunk of a stored identity; None if it is not valid for the grid's shape.
+
+    The identity may be damaged, so any value is possible.
     """
     held = stored.get("chunk")
     if stored.get("format") != FORMAT or not isinstance(held, list) or len(held) != len(shape):
@@ -89,18 +83,7 @@ def _reduction(reduction: Any) -> str:
 
 
 def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
-    """List the differences between the grid in a store and the requested one.
-
-    Parameters
-    ----------
-    stored, asked : mapping
-        From `identity`.
-
-    Returns
-    -------
-    list of str
-        One phrase per difference; empty if there are none.
-    """
+    """List the differences between the grid in a store and the requested one."""
     return list(_differences("", stored, asked))
 
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
-import functools
 import os
-import threading
 from collections.abc import Coroutine, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Final
 
 from vkbloom.checks import import_extra
 
@@ -19,50 +16,22 @@ if TYPE_CHECKING:
 __all__ = ["Keys", "open_keys"]
 
 _PURPOSE: Final = "Grids on disk"
-_T = TypeVar("_T")
+
+
+def _run(coroutine: Coroutine[Any, Any, Any]) -> Any:
+    """Run a store's coroutine on zarr's own event loop, to which remote stores are bound."""
+    return import_extra("zarr.core.sync", "grid", _PURPOSE).sync(coroutine)
 
 
 def _buffers() -> Any:
     return import_extra("zarr.buffer", "grid", _PURPOSE).default_buffer_prototype()
 
 
-@functools.cache
-def _event_loop(process: int) -> asyncio.AbstractEventLoop:
-    """Return a loop that runs in a thread: in a notebook the caller's loop is already running."""
-    del process
-    loop = asyncio.new_event_loop()
-    threading.Thread(target=loop.run_forever, name="vkbloom-grid", daemon=True).start()
-    return loop
-
-
-def _run(coroutine: Coroutine[Any, Any, _T]) -> _T:
-    # One loop per process, because a forked child does not have its parent's threads.
-    return asyncio.run_coroutine_threadsafe(coroutine, _event_loop(os.getpid())).result()
-
-
-def _for_own_loop(store: Store) -> Store:
-    """Return a store whose connections may be used on this module's event loop."""
-    zarr = import_extra("zarr", "grid", _PURPOSE)
-    if not isinstance(store, zarr.storage.FsspecStore) or hasattr(store.fs, "sync_fs"):
-        return store
-    system = type(store.fs)(
-        *store.fs.storage_args, **store.fs.storage_options, skip_instance_cache=True
-    )
-    return cast("Store", zarr.storage.FsspecStore(fs=system, path=store.path))
-
-
 class Keys:
-    """A Zarr store by its keys.
-
-    Parameters
-    ----------
-    store : zarr.abc.store.Store
-    """
+    """A Zarr store by its keys."""
 
     def __init__(self, store: Store) -> None:
         self.store = store
-        # Zarr runs a store's coroutines on an event loop of its own, which is not public.
-        self._coroutines = _for_own_loop(store)
 
     @property
     def _root(self) -> Path | None:
@@ -83,13 +52,17 @@ class Keys:
 
     def read(self, key: str) -> bytes | None:
         """Return the bytes of a key; None if the key does not exist."""
-        found = _run(self._coroutines.get(key, _buffers()))
+        found = _run(self.store.get(key, _buffers()))
         return None if found is None else bytes(found.to_bytes())
 
     def write(self, key: str, content: bytes) -> None:
         """Write a key. On disk, a reader sees either the old content or the complete new one."""
         with self.named(key):
-            _run(self._coroutines.set(key, _buffers().buffer.from_bytes(content)))
+            _run(self.store.set(key, _buffers().buffer.from_bytes(content)))
+
+    def remove(self, key: str) -> None:
+        """Remove a key, which may be missing."""
+        _run(self.store.delete(key))
 
     @contextmanager
     def named(self, key: str) -> Iterator[None]:
@@ -105,26 +78,20 @@ class Keys:
         """Return all keys."""
 
         async def listed() -> set[str]:
-            return {key async for key in self._coroutines.list()}
+            return {key async for key in self.store.list()}
 
-        return _run(listed())
+        found: set[str] = _run(listed())
+        return found
 
     def flush(self, keys: Iterable[str]) -> None:
-        """Flush keys that were written to the disk.
-
-        Does nothing for stores that are not local: they are durable when the write returns.
-        """
+        """Flush written keys to the disk. Stores that are not local are durable already."""
         root = self._root
         if root is None:
             return
-        folders = {root}
-        for key in keys:
-            path = root / key
+        paths = [root / key for key in keys]
+        folders = {root, *(path.parent for path in paths)}
+        for path in [*paths, *(folders if os.name == "posix" else ())]:
             _flush(path)
-            folders.add(path.parent)
-        if os.name == "posix":
-            for folder in folders:
-                _flush(folder)
 
     def remove_leftovers(self) -> None:
         """Remove the temporary files of a process that was killed while writing."""
@@ -142,22 +109,7 @@ def _flush(path: Path) -> None:
 
 
 def open_keys(store: Any) -> Keys:
-    """Open the keys of a store.
-
-    Parameters
-    ----------
-    store : str, path-like or zarr.abc.store.Store
-        A folder, which need not exist, a URL that fsspec supports, or a store.
-
-    Returns
-    -------
-    Keys
-
-    Raises
-    ------
-    TypeError
-        The store is something else.
-    """
+    """Open a folder, which need not exist, a URL that fsspec supports, or a Zarr store."""
     zarr = import_extra("zarr", "grid", _PURPOSE)
     if isinstance(store, zarr.abc.store.Store):
         return Keys(store)

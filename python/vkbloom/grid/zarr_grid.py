@@ -17,7 +17,7 @@ from vkbloom.grid.order import Index
 from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import ImageSource
-from vkbloom.grid.store import IDENTITY, ROOT, GridStore, read_json, stored_identity
+from vkbloom.grid.store import IDENTITY, METADATA, GridStore, read_json, stored_identity
 from vkbloom.image import Image
 from vkbloom.settings import Settings, Shading
 
@@ -164,28 +164,14 @@ def grid_to_zarr(
 def _chunk(grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys) -> Index:
     """Return the grid points per chunk by axis: requested, from the store, or the default."""
     if chunks is None:
-        stored = stored_identity(read_json(keys.read(ROOT)) or {})
+        stored = stored_identity(read_json(keys.read(METADATA)) or {})
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)
 
 
 def check_chunks(grid: Grid, chunks: Mapping[str, int] | None) -> None:
-    """Check the argument `chunks` of `grid_to_zarr`.
-
-    Parameters
-    ----------
-    grid : Grid
-    chunks : mapping of str to int or None
-
-    Raises
-    ------
-    TypeError
-        It is not a mapping.
-    ValueError
-        It names something that is not an axis of the grid, or a count is not an integer of at
-        least 1.
-    """
+    """Check the argument `chunks` of `grid_to_zarr`: a mapping of axis names to counts from 1."""
     if chunks is None:
         return
     if not isinstance(chunks, Mapping):
