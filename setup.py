@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import runpy
 import shutil
 import struct
 import subprocess
@@ -14,8 +16,12 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 SHADERS = Path("shaders")
+# GLSL that users can include, too.
+LIBRARY = Path("python/vkbloom/own/glsl")
 SPIRV = Path("build/spirv")
 STAGES = (".vert", ".frag", ".comp")
+# Of the package itself, which cannot be imported before its core is built.
+without_contraction = runpy.run_path("python/vkbloom/own/spirv.py")["without_contraction"]
 
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
@@ -101,37 +107,6 @@ def modules(shader: Path) -> list[Module]:
     return [Module(name, shader)]
 
 
-# Of SPIR-V: words of a module's header; the opcodes of types and of arithmetic on floats (FNegate
-# to FMod, VectorTimesScalar to Dot); the instruction OpDecorate, of three words; NoContraction.
-HEADER_WORDS = 5
-TYPES = range(19, 40)
-FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
-DECORATE = 3 << 16 | 71
-NO_CONTRACTION = 42
-
-
-def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the module with NoContraction on the result of each operation on floats.
-
-    Else a compiler may make one operation of a product and a sum, which rounds once, in one shader
-    and not in another that has the same expression: variants of a pass would differ in the last
-    bit. GLSL's `precise` does the same for a variable, but where it is forgotten only some GPUs
-    show it.
-    """
-    decorations = []
-    first_type = 0
-    position = HEADER_WORDS
-    while position < len(words):
-        opcode, count = words[position] & 0xFFFF, words[position] >> 16
-        if opcode in TYPES and not first_type:
-            first_type = position
-        if opcode in FLOAT_ARITHMETIC:
-            decorations += [DECORATE, words[position + 2], NO_CONTRACTION]
-        position += count
-    # Decorations come before all types.
-    return (*words[:first_type], *decorations, *words[first_type:])
-
-
 def compile_shader(module: Module, target: Path) -> None:
     """Compile one module, as glslang does, to a file."""
     compiler = shutil.which("glslangValidator") or shutil.which("glslang")
@@ -139,7 +114,8 @@ def compile_shader(module: Module, target: Path) -> None:
         raise SystemExit(
             "glslangValidator is missing; on Debian or Ubuntu: apt install glslang-tools"
         )
-    command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", *module.options]
+    command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", f"-I{LIBRARY}"]
+    command += module.options
     command += ["-o", str(target), str(module.shader)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
@@ -149,7 +125,8 @@ def compile_shader(module: Module, target: Path) -> None:
 def compile_module(module: Module) -> tuple[int, ...]:
     """Compile one module to its SPIR-V words."""
     target = SPIRV / f"{module.name}.spv"
-    sources = [Path("setup.py"), *SHADERS.rglob("*.*")]
+    sources = [Path("setup.py"), Path("python/vkbloom/own/spirv.py")]
+    sources += [*SHADERS.rglob("*.*"), *LIBRARY.rglob("*.glsl")]
     if not target.exists() or target.stat().st_mtime < max(s.stat().st_mtime for s in sources):
         compile_shader(module, target)
     code = target.read_bytes()
@@ -157,45 +134,41 @@ def compile_module(module: Module) -> tuple[int, ...]:
 
 
 def write_spirv() -> None:
-    """Write spirv.h and spirv.c: an enum of the modules, and their code, one row for each."""
+    """Write spirv.h and spirv.c: a shader object for each module (csrc/graph/shader.h)."""
     SPIRV.mkdir(parents=True, exist_ok=True)
     shaders = sorted(
         (path for path in SHADERS.rglob("*.*") if path.suffix in STAGES), key=lambda path: path.name
     )
     built = [module for shader in shaders for module in modules(shader)]
     names = {module.name for module in built}
-    enum = "".join(f"    VKB_SHADER_{module.name},\n" for module in built)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         compiled = list(threads.map(compile_module, built))
     arrays = "".join(
         f"static const uint32_t {module.name}[] = {{{','.join(map(str, words))}}};\n"
         for module, words in zip(built, compiled, strict=True)
     )
-    rows = ""
-    for module in built:
-        dispatch = f"{module.shader.stem}_dispatch"
-        packed = module.name.replace("_words_", "_packed_")
-        rgb = module.name.replace("_words_", "_words_rgb_")
-        twins = ", ".join(
-            f"VKB_SHADER_{twin if twin in names else module.name}"
-            for twin in (dispatch, packed, rgb)
+    declared = objects = ""
+    for module, words in zip(built, compiled, strict=True):
+        code = struct.pack(f"={len(words)}I", *words)
+        hashed = ", ".join(map(str, hashlib.sha256(code).digest()[:16]))
+        twins = (
+            f"{module.shader.stem}_dispatch",
+            module.name.replace("_words_", "_packed_"),
+            module.name.replace("_words_", "_words_rgb_"),
         )
-        rows += f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twins}}},\n'
+        pointers = ", ".join(
+            f"&vkb_shader_{twin}" if twin in names - {module.name} else "NULL" for twin in twins
+        )
+        declared += f"extern const struct vkb_shader vkb_shader_{module.name};\n"
+        objects += (
+            f'const struct vkb_shader vkb_shader_{module.name} = {{"{module.name}", {module.name}, '
+            f"sizeof {module.name}, {{{{{hashed}}}}}, {pointers}}};\n"
+        )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
-        "#include <stddef.h>\n#include <stdint.h>\n\n"
-        f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
-        "// `dispatch`: the same pass as a compute shader; `packed`: with a target of three\n"
-        "// channels; `rgb`: with a first image of three; each is the shader itself where there\n"
-        "// is none.\n"
-        "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
-        "    enum vkb_shader dispatch, packed, rgb;\n};\n"
-        "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
+        f'#include "graph/shader.h"\n\n{declared}\n#endif\n'
     )
-    (SPIRV / "spirv.c").write_text(
-        '#include "spirv.h"\n\n'
-        f"{arrays}\nconst struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT] = {{\n{rows}}};\n"
-    )
+    (SPIRV / "spirv.c").write_text(f'#include "spirv.h"\n\n{arrays}\n{objects}')
 
 
 class BuildCore(build_ext):
@@ -253,6 +226,7 @@ setup(
             depends=[
                 *(str(path) for path in Path("csrc").rglob("*.h")),
                 *(str(path) for path in SHADERS.rglob("*.*")),
+                *(str(path) for path in LIBRARY.rglob("*.glsl")),
             ],
             include_dirs=["csrc", ".", volk_folder()],
             define_macros=[("VK_NO_PROTOTYPES", None), ("Py_LIMITED_API", "0x030b0000")],

@@ -52,27 +52,7 @@ _MODE_CURES = {
 
 
 def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
-    """Import a package that one of vkbloom's extras installs.
-
-    Parameters
-    ----------
-    package : str
-        Name of the package, such as "OpenImageIO".
-    extra : str
-        The extra that installs it, such as "images".
-    purpose : str
-        What needs the package; the subject of the error message.
-
-    Returns
-    -------
-    module
-        The package.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        The package is missing; the message gives the command that installs it.
-    """
+    """Import a package that one of vkbloom's extras installs."""
     try:
         return importlib.import_module(package)
     except ModuleNotFoundError as error:

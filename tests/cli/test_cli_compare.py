@@ -160,7 +160,14 @@ class TestCommand:
         assert found["max_error_at"] == [7, 3, 2]
         assert len(found["max_error_values"]) == 2
         fields = set(Comparison.__dataclass_fields__)
-        assert found.keys() == fields | {"a", "b", "passed", "failures", "identical", "diff_scale"}
+        assert found.keys() == fields | {
+            "a",
+            "b",
+            "passed",
+            "failures",
+            "identical",
+            "diff_scale",
+        } | {"diagnosis"}
 
     def test_json_has_no_infinity(self, files: dict[str, Path]) -> None:
         found = json.loads(

@@ -24,6 +24,7 @@ from vkbloom.views.comparison import (
     compare,
     difference,
 )
+from vkbloom.views.diagnosis import Diagnosis, diagnose
 from vkbloom.views.tolerances import Tolerances, failures
 
 
@@ -133,7 +134,9 @@ def command(
 
     Prints the largest error and its position, the mean error, the percentage of pixels that
     differ, PSNR and SSIM (scikit-image, over all channels) and the mean FLIP (OpenImageIO, of the
-    colours without alpha: LDR-FLIP of integers as sRGB, HDR-FLIP of floats as linear). Integers
+    colours without alpha: LDR-FLIP of integers as sRGB, HDR-FLIP of floats as linear). It names the
+    cause if a single one explains the difference: a gain, shift, gamma, clamp, flip, another order
+    of channels, premultiplied alpha, NaN or rounding; with the residual that remains. Integers
     are scaled to 0..1. Stored values are compared without decoding. For files with several parts,
     as vkbloom render writes them, --subimage chooses the part to compare.
 
@@ -164,6 +167,7 @@ def command(
             nits_per_unit=nits_per_unit,
             pixels_per_degree=pixels_per_degree,
         )
+        cause = diagnose(a.pixels, b.pixels)
     found = _with_windows(found, a, b)
     failed = tuple(reason for _, reason in failures(found, tolerances, tolerances.metrics))
     scale = None
@@ -172,9 +176,10 @@ def command(
     elif diff is not None:
         scale = _write_difference(a, b, diff, diff_scale)
     if as_json:
-        click.echo(json.dumps(_object(first, second, found, failed, scale), indent=2))
+        shown = _object((first, second), found, failed, scale, cause)
+        click.echo(json.dumps(shown, indent=2))
     else:
-        for line in _lines(first, second, a, found, failed):
+        for line in _lines((first, second), a, found, failed, cause):
             click.echo(line)
         if scale is not None:
             click.echo(f"wrote {diff}, differences times {scale:.6g}")
@@ -204,11 +209,11 @@ def _write_difference(a: StoredImage, b: StoredImage, path: str, scale: float | 
 
 
 def _object(
-    first: str,
-    second: str,
+    files: tuple[str, str],
     found: Comparison,
     failed: tuple[str, ...],
     scale: float | None,
+    cause: Diagnosis,
 ) -> dict[str, Any]:
     """Return the object that --json prints. JSON has no infinity, so it becomes None."""
     figures = {
@@ -216,29 +221,31 @@ def _object(
         for name, value in dataclasses.asdict(found).items()
     }
     return {
-        "a": first,
-        "b": second,
+        "a": files[0],
+        "b": files[1],
         "passed": not failed,
         "failures": failed,
         "identical": found.identical,
+        "diagnosis": dataclasses.asdict(cause),
         **figures,
         "diff_scale": scale,
     }
 
 
 def _lines(
-    first: str,
-    second: str,
+    files: tuple[str, str],
     a: StoredImage,
     found: Comparison,
     failed: tuple[str, ...],
+    cause: Diagnosis,
 ) -> list[str]:
     """Return the lines of the text report."""
     height, width = a.pixels.shape[:2]
-    lines = [f"{first} and {second}"]
+    lines = [" and ".join(files)]
     lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")
     if found.percent_over is not None:
         lines += _figures(found, a.channels)
+    lines.append(f"  cause      {cause}; residual {cause.residual:.3g}")
     for reason in failed:
         lines.append(f"FAILED: {reason}")
     if not failed:

@@ -31,9 +31,11 @@ from vkbloom.testing.scaled_scene import (
     assert_resolution_independent,
     resolution_response,
 )
+from vkbloom.views.diagnosis import Diagnosis, diagnose
 from vkbloom.views.tolerances import Tolerances
 
 __all__ = [
+    "Diagnosis",
     "FrameDifferenceWarning",
     "FrameRegression",
     "Probe",
@@ -52,6 +54,7 @@ __all__ = [
     "assert_stable",
     "assert_superposition",
     "assert_symmetric",
+    "diagnose",
     "point_spread",
     "read_frame",
     "resolution_response",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.views.comparison import Comparison, compare
+from vkbloom.views.diagnosis import Diagnosis, diagnose
 from vkbloom.views.tolerances import Stage, Tolerances, failures, worst
 
 __all__ = ["Verdict", "first_failure", "judge", "judge_image"]
@@ -19,20 +20,14 @@ __all__ = ["Verdict", "first_failure", "judge", "judge_image"]
 class Verdict:
     """The result of comparing one framebuffer.
 
-    Parameters
-    ----------
-    name : str
-        Name of the framebuffer.
-    failed_at : Stage or None
-        The first check that failed; None if all passed.
-    reasons : tuple of str
-        One reason for each failed check.
-    warning : str or None
-        Text of a warning if the framebuffer passed but differs by more than `Tolerances.warn`.
-    comparison : Comparison or None
-        The figures; None if shapes or dtypes differ, or one image is missing.
-    atol, rtol : float
-        The tolerances that were used.
+    - `name`: Name of the framebuffer.
+    - `failed_at`: The first check that failed; None if all passed.
+    - `reasons`: One reason for each failed check.
+    - `warning`: Text of a warning if the framebuffer passed but differs by more than
+      `Tolerances.warn`.
+    - `comparison`: The figures; None if shapes or dtypes differ, or one image is missing.
+    - `diagnosis`: The cause of the difference of two images that failed.
+    - `atol`, `rtol`: The tolerances that were used.
     """
 
     name: str
@@ -40,6 +35,7 @@ class Verdict:
     reasons: tuple[str, ...] = ()
     warning: str | None = None
     comparison: Comparison | None = None
+    diagnosis: Diagnosis | None = None
     atol: float = 0.0
     rtol: float = 0.0
 
@@ -59,21 +55,7 @@ def judge(
     actual: Mapping[str, NDArray[Any]],
     tolerances: Tolerances,
 ) -> tuple[Verdict, ...]:
-    """Compare framebuffers with those of a reference.
-
-    Parameters
-    ----------
-    expected, actual : mapping of str to ndarray
-        Framebuffers by name, in the order of the data flow, as arrays that
-        `vkbloom.views.comparison.compare` accepts.
-    tolerances : Tolerances
-
-    Returns
-    -------
-    tuple of Verdict
-        In the order of `actual`. A framebuffer that only the reference has comes after the
-        framebuffer that precedes it in the reference.
-    """
+    """Compare framebuffers with those of a reference."""
     return tuple(
         _of_missing(name, is_expected=name in expected)
         if name not in expected or name not in actual
@@ -90,26 +72,19 @@ def first_failure(verdicts: tuple[Verdict, ...]) -> Verdict | None:
 def judge_image(
     name: str, expected: NDArray[Any], actual: NDArray[Any], tolerances: Tolerances
 ) -> Verdict:
-    """Compare one image with its reference: shape and dtype, finiteness, values, SSIM, FLIP.
-
-    Parameters
-    ----------
-    name : str
-        Name of the framebuffer.
-    expected, actual : ndarray
-    tolerances : Tolerances
-
-    Returns
-    -------
-    Verdict
-    """
+    """Compare one image with its reference: shape and dtype, finiteness, values, SSIM, FLIP."""
     reasons = []
     if expected.shape != actual.shape:
         reasons.append(f"its shape is {actual.shape}, not {expected.shape}")
     if expected.dtype != actual.dtype:
         reasons.append(f"its dtype is {actual.dtype}, not {expected.dtype}")
     if reasons:
-        return Verdict(name=name, failed_at="shape and dtype", reasons=tuple(reasons))
+        return Verdict(
+            name=name,
+            failed_at="shape and dtype",
+            reasons=tuple(reasons),
+            diagnosis=diagnose(expected, actual),
+        )
     atol, rtol = tolerances.of(expected.dtype)
     # Equal images pass every limit, so the slow metrics need not be computed.
     metrics = () if np.array_equal(expected, actual) else tolerances.metrics
@@ -131,6 +106,7 @@ def judge_image(
         reasons=tuple(reason for _, reason in failed),
         warning=warning,
         comparison=found,
+        diagnosis=diagnose(expected, actual) if failed else None,
         atol=atol,
         rtol=rtol,
     )

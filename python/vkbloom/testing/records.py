@@ -14,6 +14,7 @@ class Figures(TypedDict):
     outcome: str  # "equal", "within" or "failed"
     failed_at: str | None
     reasons: list[str]
+    cause: str | None  # of the difference, in words
     shape: list[int] | None
     dtype: str | None
     atol: float

@@ -33,27 +33,7 @@ _POLICY: Final = (
 
 
 def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
-    """Write ``index.html`` and ``report.json``.
-
-    Parameters
-    ----------
-    folder : Path
-        Created if it does not exist; existing files of these names are replaced.
-    parts : Path
-        Folder of the files of `vkbloom.testing.report_parts.write`; removed at the end.
-    records : sequence of Record
-        Records of all checks of all processes.
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    OSError
-        A file cannot be written; the error names it.
-    """
+    """Write ``index.html`` and ``report.json``."""
     folder.mkdir(parents=True, exist_ok=True)
     ordered = sorted(records, key=lambda record: (record["test"], record["name"]))
     (folder / "report.json").write_text(
@@ -130,8 +110,12 @@ def _first(index: int, record: Record) -> str:
     )
     return (
         f"<li>{where}: <strong>{_text(record['first_failure'])}</strong>, "
-        f"{_text(figures['reasons'][0])}</li>\n"
+        f"{_text(figures['reasons'][0])}{_cause(figures)}</li>\n"
     )
+
+
+def _cause(figures: Figures) -> str:
+    return f". Cause: {_text(figures['cause'])}" if figures["cause"] else ""
 
 
 def _check(anchor: str, record: Record, parts: Path) -> Iterable[str]:
@@ -174,6 +158,8 @@ def _framebuffer(anchor: str, figures: Figures, shown: Shown | None) -> Iterable
     if figures["reasons"]:
         reasons = "".join(f"<li>{_text(reason)}</li>" for reason in figures["reasons"])
         yield f'<ul class="reasons">{reasons}</ul>\n'
+    if figures["cause"]:
+        yield f"<p>Cause: {_text(figures['cause'])}</p>\n"
     yield _figures_table(figures)
     if shown is not None:
         yield from _pictures(f"{anchor}-{name}", figures, shown)

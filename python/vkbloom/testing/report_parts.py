@@ -66,14 +66,7 @@ Part = list[Shown]
 
 
 def figures(verdict: Verdict, images: Mapping[str, NDArray[Any]]) -> Figures:
-    """Return a verdict's figures as plain values.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    images : mapping of str to ndarray
-        The actual images of the comparison.
-    """
+    """Return a verdict's figures as plain values."""
     image = images.get(verdict.name)
     found = verdict.comparison
     outcome = "within" if verdict.passed else "failed"
@@ -83,6 +76,7 @@ def figures(verdict: Verdict, images: Mapping[str, NDArray[Any]]) -> Figures:
         "outcome": "equal" if verdict.identical else outcome,
         "failed_at": verdict.failed_at,
         "reasons": list(verdict.reasons),
+        "cause": str(verdict.diagnosis) if verdict.diagnosis else None,
         "shape": list(image.shape) if image is not None else None,
         "dtype": image.dtype.name if image is not None else None,
         "atol": verdict.atol,
@@ -104,21 +98,7 @@ def write(
     expected: Mapping[str, NDArray[Any]],
     actual: Mapping[str, NDArray[Any]],
 ) -> str:
-    """Write the pictures of a check to a new file.
-
-    Parameters
-    ----------
-    folder : Path
-        Created if it does not exist.
-    verdicts : tuple of Verdict
-    expected, actual : mapping of str to ndarray
-        The images of the comparison.
-
-    Returns
-    -------
-    str
-        The file's name in the folder.
-    """
+    """Write the pictures of a check to a new file."""
     part = [
         _shown(verdict, expected.get(verdict.name), actual.get(verdict.name))
         for verdict in verdicts

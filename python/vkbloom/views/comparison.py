@@ -18,6 +18,7 @@ __all__ = [
     "USUAL_METRICS",
     "Comparison",
     "Metric",
+    "checked_image",
     "compare",
     "difference",
     "flip_map",
@@ -174,7 +175,7 @@ def compare(
             raise ValueError(f"{name}: None is not a number; the metric cvvdp needs one")
     if data_range is not None and not 0 < data_range < math.inf:
         raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
-    a, b = _checked("a", a), _checked("b", b)
+    a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
         return Comparison(
@@ -240,7 +241,7 @@ def difference(
     """
     if scale is not None and not 0 < scale < math.inf:
         raise ValueError(f"scale: {scale!r} is out of range, finite and above 0")
-    a, b = _checked("a", a), _checked("b", b)
+    a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
         raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
@@ -259,7 +260,7 @@ def difference(
     return picture.astype(np.float32), scale
 
 
-def _checked(name: str, image: NDArray[Any]) -> NDArray[Any]:
+def checked_image(name: str, image: NDArray[Any]) -> NDArray[Any]:
     """Return an image as (H, W, C)."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"{name}: an array is needed, not {type(image).__name__}")
@@ -448,7 +449,7 @@ def flip_map(
     ModuleNotFoundError
         OpenImageIO 3.2 or later is missing.
     """
-    a, b = _checked("a", a), _checked("b", b)
+    a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
         raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
