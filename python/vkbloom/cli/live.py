@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import vkbloom
-from vkbloom.settings import Settings, Shading, methods
+from vkbloom.registry import METHODS
+from vkbloom.settings import Settings, Shading
 
 __all__ = ["HELP", "Live"]
 
@@ -44,19 +45,10 @@ def _after(value: object, values: Mapping[str, Any]) -> Any:
 class Live:
     """The state of a window.
 
-    Attributes
-    ----------
-    settings : Settings
-    source : Scene or Image
-    shading : {"forward", "deferred"}
-        Of a scene.
-    framebuffer : str
-        Name of the framebuffer that is shown.
-    time : float
-        Time of the animation, in periods.
-    paused, closed : bool
-    screenshot : bool
-        Whether to write a screenshot after the next frame.
+    - `shading`: Of a scene.
+    - `framebuffer`: Name of the framebuffer that is shown.
+    - `time`: Time of the animation, in periods.
+    - `screenshot`: Whether to write a screenshot after the next frame.
     """
 
     settings: Settings
@@ -83,7 +75,7 @@ class Live:
             self.framebuffer = names[int(key) - 1]
         elif key == "m":
             shown = {name: getattr(self.settings, name) for name in ("tonemap", "encoding")}
-            self.settings = _after(type(self.settings), methods())(**shown)
+            self.settings = _after(type(self.settings), METHODS)(**shown)
         elif key == "p":
             self.settings = _after(self.settings, vkbloom.presets)
         elif key == "space":

@@ -53,23 +53,18 @@ class CommandWithFile(Command):
                 if path is None:
                     raise click.UsageError(f"{FILE_OPTION} needs the name of a file", ctx)
                 # The file's options come first, because later options override earlier ones.
-                found = [*_words(_read(Path(path)), path, self._flags()), *found]
+                found = [*_words(_read(Path(path)), path, self._flags(ctx)), *found]
         return super().parse_args(ctx, found)
 
-    def _flags(self) -> dict[str, bool]:
+    def _flags(self, ctx: click.Context) -> dict[str, bool]:
         """Return the flags by name, and whether each has a ``--no-`` form."""
-        flags = (one for one in self.params if isinstance(one, click.Option) and one.is_flag)
+        options = (one for one in self.get_params(ctx) if isinstance(one, click.Option))
+        flags = [one for one in options if one.is_flag]
         return {name: bool(flag.secondary_opts) for flag in flags for name in flag.opts}
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Read and check an option file.
-
-    Raises
-    ------
-    OSError, ValueError
-        The file cannot be read or its content is wrong; the message names the file.
-    """
+    """Read and check an option file."""
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".yaml", ".yml"):
         raise ValueError(f"{path}: its extension is not .toml, .yaml or .yml")
@@ -106,11 +101,6 @@ def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, 
 
     A YAML alias refers to a value without copying it; each value is measured once here, before
     writing it out could multiply it.
-
-    Raises
-    ------
-    ValueError
-        A limit is exceeded, or an integer is too large to be written.
     """
     if isinstance(value, str | bytes):
         return len(value), 0
