@@ -32,7 +32,8 @@
     SETTING(maximum, 3.4e38, 0.0, 65504.0) \
     SETTING(offset, 1.0, 0.0, 16.0) \
     SETTING(intensity, 1.0, 0.0, 65504.0) \
-    SETTING(exposure, 0.0, -32.0, 32.0)
+    SETTING(exposure, 0.0, -32.0, 32.0) \
+    SETTING(reference_white, 203.0, 1.0, 10000.0)
 
 // For a pass that reads an image of another size: the size of its target, and the largest value of
 // the target's format. If the images are bands of rows, target_height and source_height are those
@@ -55,6 +56,7 @@
 #define COMPOSITE_ROWS(B, READS, INPUT) \
     READS(B, intensity) \
     READS(B, exposure) \
+    READS(B, reference_white) \
     INPUT(B, float, limit) \
     INPUT(B, int, noise_seed)
 
@@ -491,7 +493,9 @@
 #define ENCODING_NAMES(NAME) \
     NAME(ENCODING_NONE, 0, none) \
     NAME(ENCODING_GAMMA22, 1, gamma22) \
-    NAME(ENCODING_SRGB, 2, srgb)
+    NAME(ENCODING_SRGB, 2, srgb) \
+    NAME(ENCODING_PQ, 3, pq) \
+    NAME(ENCODING_HLG, 4, hlg)
 
 #define ALPHA_NAMES(NAME) \
     NAME(ALPHA_KEEP, 0, keep) \

@@ -25,7 +25,7 @@ from vkbloom.registry import METHODS
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
-Encoding = Literal["none", "gamma22", "srgb"]
+Encoding = Literal["none", "gamma22", "srgb", "pq", "hlg"]
 Alpha = Literal["keep", "max", "blur"]
 BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"]
 
@@ -75,8 +75,12 @@ class Settings(Record):
         The tone curve that is applied to the composite.
     exposure : float
         In stops, -32 to 32: the composite is multiplied by 2**exposure before the curve.
-    encoding : {"none", "gamma22", "srgb"}
-        Applied to rgb after the curve.
+    encoding : {"none", "gamma22", "srgb", "pq", "hlg"}
+        Applied to rgb after the curve. "pq" and "hlg" are those of Rec. ITU-R BT.2100: the inverse
+        EOTF of c * reference_white cd/m2, clamped to 0..10000; and the OETF of
+        clamp(0.26496 c, 0, 1), without an OOTF, so that 1 gives the signal 0.75.
+    reference_white : float
+        Luminance of a value of 1 with "pq", 1 to 10000 cd/m2. 203 is that of Report ITU-R BT.2408.
     dither : bool
         Whether to add noise before ``final`` is rounded to 8 bits, so that dark gradients show
         grain instead of bands. The noise of each channel is uniform over one level, +-1/2. The
@@ -142,6 +146,7 @@ class Settings(Record):
     tonemap: ToneMap = choice_field("tonemap")
     exposure: float = number_field("exposure", unit="stop", slider=(-8, 8))
     encoding: Encoding = choice_field("encoding")
+    reference_white: float = number_field("reference_white", unit="cd/m2")
     dither: bool = flag_field("dither")
     dither_seed: int = number_field("dither_seed", slider=(0, 100))
     bloom_size: tuple[int, int] | None = value_field(None, unit="pixel")

@@ -47,7 +47,7 @@ float blend_alpha(float alpha, vec4 bloom)
 // them, and curves that mix channels would spread them. (In words finished() keeps them.)
 vec4 encoded(vec4 scene, vec4 bloom, vec3 toned, ivec2 pixel)
 {
-    vec3 result = apply_encoding(toned, ENCODING);
+    vec3 result = apply_encoding(toned, ENCODING, params.reference_white);
     if (DITHER != 0)
         result = dithered(result, pixel, params.noise_seed);
     result = storable(result);

@@ -87,8 +87,31 @@ vec3 apply_tonemap(vec3 c, int tonemap)
     return tonemap_agx(c);
 }
 
-vec3 apply_encoding(vec3 c, int encoding)
+// Rec. ITU-R BT.2100-3, table 4: the inverse EOTF of luminances of 0 to 10000 cd/m2.
+vec3 encode_pq(vec3 luminance)
 {
+    const float M1 = 2610.0 / 16384.0, M2 = 2523.0 / 32.0;
+    const float C1 = 3424.0 / 4096.0, C2 = 2413.0 / 128.0, C3 = 2392.0 / 128.0;
+    vec3 y = pow(clamp(luminance / 10000.0, 0.0, 1.0), vec3(M1));
+    return pow((C1 + C2 * y) / (1.0 + C3 * y), vec3(M2));
+}
+
+// Table 5: the OETF. A signal of 0.75 is the reference white, 1 here.
+vec3 encode_hlg(vec3 c)
+{
+    const float A = 0.17883277, B = 0.28466892, C = 0.55991073, WHITE = 0.26496;
+    vec3 e = clamp(WHITE * c, 0.0, 1.0);
+    // The logarithm is not chosen below 1/12, but its argument must be positive there, too.
+    return mix(sqrt(3.0 * e), A * log(12.0 * max(e, 1.0 / 12.0) - B) + C,
+               greaterThan(e, vec3(1.0 / 12.0)));
+}
+
+vec3 apply_encoding(vec3 c, int encoding, float reference_white)
+{
+    if (encoding == ENCODING_PQ)
+        return encode_pq(c * reference_white);
+    if (encoding == ENCODING_HLG)
+        return encode_hlg(c);
     if (encoding == ENCODING_GAMMA22)
         return pow(max(c, 0.0), vec3(1.0 / 2.2));
     if (encoding == ENCODING_SRGB) {

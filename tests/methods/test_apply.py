@@ -153,7 +153,7 @@ def test_white_is_not_above_a_threshold_of_one(renderer: Renderer) -> None:
 
 COMPOSITES = ("add", "mix", "screen")
 TONEMAPS = ("none", "reinhard", "aces", "exponential", "khronos_neutral", "agx")
-ENCODINGS = ("none", "gamma22", "srgb")
+ENCODINGS = ("none", "gamma22", "srgb", "pq", "hlg")
 
 
 def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> None:

@@ -35,6 +35,8 @@ CHOICES: tuple[Any, ...] = (
     ("exponential", "none", "mix"),
     ("khronos_neutral", "srgb", "add"),
     ("agx", "gamma22", "mix"),
+    ("none", "pq", "add"),
+    ("none", "hlg", "mix"),
 )
 CURVES = {
     f"{tonemap}-{encoding}": vkbloom.Pyramid(

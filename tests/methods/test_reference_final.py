@@ -184,3 +184,45 @@ def test_encoding_and_tone_map_leave_alpha_alone() -> None:
 def test_bloom_off_still_maps_and_encodes() -> None:
     settings = Separable(bloom=False, tonemap="reinhard", encoding="gamma22", composite="mix")
     assert_close(reference.apply(flat(1.0), settings)["final"], 0.5 ** (1 / 2.2))
+
+
+# Report ITU-R BT.2408: reference white and a grey card of 18 %, in % of the signal.
+@pytest.mark.parametrize(
+    ("encoding", "value", "percent"),
+    [("pq", 1.0, 58), ("pq", 26 / 203, 38), ("hlg", 1.0, 75), ("hlg", 0.18, 38)],
+)
+def test_hdr_encodings_have_the_signals_of_bt_2408(
+    encoding: Any, value: float, percent: int
+) -> None:
+    assert round(100 * final_of(value, encoding=encoding)[0]) == percent
+
+
+@pytest.mark.parametrize("white", [100.0, 203.0])
+def test_pq_is_that_of_opencolorio(white: float) -> None:
+    oiio = pytest.importorskip("OpenImageIO")
+    values = np.geomspace(1e-4, 9000 / white, 64)[np.newaxis, :, np.newaxis] * np.ones(3)
+    settings = Separable(bloom=False, encoding="pq", reference_white=white)
+    # There, 1 is 100 cd/m2, and the grey axis is that of D65.
+    xyz = (values * white / 100 * (0.9504559, 1.0, 1.0890578)).astype(np.float32)
+    expected = oiio.ImageBufAlgo.colorconvert(
+        oiio.ImageBuf(xyz),
+        "CIE XYZ-D65 - Display-referred",
+        "Rec.2100-PQ - Display",
+        colorconfig="ocio://default",
+    ).get_pixels()
+    assert_allclose(reference.composite(values, None, settings), expected, rtol=0, atol=1e-5)
+
+
+@given(value=st.floats(0, 3.7))
+def test_hdr_encodings_can_be_undone_to_half_a_level_of_10_bits(value: float) -> None:
+    signal = final_of(value, encoding="pq")[0]
+    m1, m2 = 2610 / 16384, 2523 / 32
+    c1, c2, c3 = 3424 / 4096, 2413 / 128, 2392 / 128
+    power = signal ** (1 / m2)
+    luminance = 10000 * (max(power - c1, 0) / (c2 - c3 * power)) ** (1 / m1)
+    again = final_of(luminance / 203, encoding="pq")[0]
+    assert abs(again - signal) < 0.5 / 1023
+    signal = final_of(value, encoding="hlg")[0]
+    a, b, c = 0.17883277, 0.28466892, 0.55991073
+    scene = signal**2 / 3 if signal <= 0.5 else (math.exp((signal - c) / a) + b) / 12
+    assert abs(final_of(scene / 0.26496, encoding="hlg")[0] - signal) < 0.5 / 1023

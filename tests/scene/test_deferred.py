@@ -385,7 +385,7 @@ def test_bloom_is_the_blurred_brightness(frames: Frames) -> None:
 @pytest.mark.parametrize(
     "tonemap", ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 )
-@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb"])
+@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb", "pq", "hlg"])
 def test_final_is_the_composite(
     renderer: Renderer, scene: Scene, composite: Any, tonemap: Any, encoding: Any
 ) -> None:

@@ -322,7 +322,7 @@ def test_final_is_scene_plus_bloom(
 
 @pytest.mark.parametrize("composite", ["add", "mix", "screen"])
 @pytest.mark.parametrize("tonemap", ["none", "reinhard", "aces", "exponential"])
-@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb"])
+@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb", "pq", "hlg"])
 def test_final_is_the_references(
     renderer: Renderer, scene: Scene, composite: Any, tonemap: Any, encoding: Any
 ) -> None:

@@ -279,7 +279,8 @@ def _describe(
     """Set the attributes that describe a file's colours, alpha and pixels."""
     to_exr = is_exr(target)
     stored, encoding = picture.stored, picture.encoding
-    space = stored.space if encoding is None else SPACES[encoding]
+    # OpenImageIO has no names for PQ and HLG with the primaries of Rec. 709.
+    space = stored.space if encoding is None else SPACES.get(encoding, "")
     # OpenEXR files are linear by definition, and another attribute has their primaries.
     if space and not (to_exr and encoding == "linear"):
         spec.attribute("oiio:ColorSpace", space)

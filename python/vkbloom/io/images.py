@@ -45,7 +45,7 @@ __all__ = [
 Colour: TypeAlias = str
 #: The colour encoding of a file to write.
 SavedColour = Literal["linear", "srgb"]
-Encoding = Literal["linear", "srgb", "gamma22"]
+Encoding = Literal["linear", "srgb", "gamma22", "pq", "hlg"]
 #: x, y, width, height in pixels.
 Window: TypeAlias = tuple[int, int, int, int]
 

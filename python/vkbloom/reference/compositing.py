@@ -35,6 +35,8 @@ class CompositeSettings(Protocol):
     @property
     def encoding(self) -> str: ...
     @property
+    def reference_white(self) -> float: ...
+    @property
     def dither(self) -> bool: ...
     @property
     def dither_seed(self) -> int: ...
@@ -146,7 +148,7 @@ def composite_checked(
         else:
             rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
         alpha = _blend_alpha(alpha, light, settings.alpha)
-    rgb = ENCODINGS[settings.encoding](rgb)
+    rgb = ENCODINGS[settings.encoding](rgb, settings.reference_white)
     stored = np.dtype(dtype)
     store = storage(format_of(np.empty(0, stored), None))
     rgb = store(rgb)

@@ -261,6 +261,7 @@ _UFUNCS: Mapping[np.ufunc, Callable[..., tuple[Any, ...]]] = {
     np.exp: lambda r, a: (r,),
     np.exp2: lambda r, a: (r * math.log(2),),
     np.expm1: lambda r, a: (r + 1,),
+    np.log: lambda r, a: (np.divide(1, a),),
     np.log2: lambda r, a: (np.divide(1 / math.log(2), a),),
     np.radians: lambda r, a: (math.pi / 180,),
     np.sin: lambda r, a: (np.cos(a),),

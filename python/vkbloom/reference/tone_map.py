@@ -110,6 +110,23 @@ def _srgb(rgb: Array) -> Array:
     return np.where(positive <= 0.0031308, 12.92 * positive, 1.055 * positive ** (1 / 2.4) - 0.055)
 
 
+def _pq(rgb: Array, reference_white: float) -> Array:
+    """Apply the inverse EOTF of Rec. ITU-R BT.2100-3, table 4, to luminances up to 10000 cd/m2."""
+    m1, m2 = 2610 / 16384, 2523 / 4096 * 128
+    c1, c2, c3 = 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
+    power = np.clip(rgb * reference_white / 10000, 0, 1) ** m1
+    signal: Array = ((c1 + c2 * power) / (1 + c3 * power)) ** m2
+    return signal
+
+
+def _hlg(rgb: Array) -> Array:
+    """Apply the OETF of Rec. ITU-R BT.2100-3, table 5; a value of 1 gives the signal 0.75."""
+    a, b, c = 0.17883277, 0.28466892, 0.55991073
+    scene = np.clip(0.26496 * rgb, 0, 1)
+    bright = a * np.log(12 * np.maximum(scene, 1 / 12) - b) + c
+    return np.where(scene <= 1 / 12, np.sqrt(3 * scene), bright)
+
+
 # By name in the settings. Each takes and returns finite rgb, (..., 3), of float64. The curves are
 # defined for values of at least 0; for negative values the formulas are used unchanged.
 TONE_MAPS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
@@ -122,6 +139,13 @@ TONE_MAPS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
         "agx": _agx,
     }
 )
-ENCODINGS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
-    {"none": _none, "gamma22": _gamma22, "srgb": _srgb}
+# With the luminance of a value of 1, which only "pq" reads.
+ENCODINGS: Mapping[str, Callable[[Array, float], Array]] = MappingProxyType(
+    {
+        "none": lambda rgb, _: rgb,
+        "gamma22": lambda rgb, _: _gamma22(rgb),
+        "srgb": lambda rgb, _: _srgb(rgb),
+        "pq": _pq,
+        "hlg": lambda rgb, _: _hlg(rgb),
+    }
 )
