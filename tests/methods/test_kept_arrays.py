@@ -47,7 +47,7 @@ def test_nothing_is_left_of_kernels_when_the_renderer_is_closed() -> None:
             for spread in spreads:
                 renderer.apply(IMAGE, settings_of(spread), attachments="final")
 
-    use(SPREADS[:1])  # imports
+    use([SPREADS[0], *SPREADS[-2:]])  # imports
     gc.collect()
     before, _ = tracemalloc.get_traced_memory()
     use(SPREADS)
