@@ -147,8 +147,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        `adapter` is empty, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_VARIANT names
-        variants that the adapter cannot run.
+        `adapter` is empty, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_VARIANT
+        names variants that the adapter cannot run.
 
     See Also
     --------

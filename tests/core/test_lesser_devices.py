@@ -194,7 +194,9 @@ def test_a_variant_that_the_device_cannot_run_is_refused(
     layer: Path, name: str, variant: str
 ) -> None:
     done = run(layer, name, "storage", VKBLOOM_VARIANT=variant)
-    words = f"ValueError: VKBLOOM_VARIANT: the compute shaders of .* cannot write .* {variant} needs"
+    words = (
+        f"ValueError: VKBLOOM_VARIANT: the compute shaders of .* cannot write .* {variant} needs"
+    )
     assert re.search(words, done.stderr), done.stderr
 
 

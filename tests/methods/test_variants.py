@@ -392,7 +392,17 @@ def test_blurs_into_other_sizes(varied: Renderer, settings: Settings) -> None:
     assert np.abs(real(alone) - expected).max() <= limit
 
 
-def test_unknown_forms_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_name_of_the_variable_works_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VKBLOOM_VARIANT", raising=False)
+    monkeypatch.setenv("VKBLOOM_FORM", "quick")
+    with (
+        pytest.warns(FutureWarning, match="set VKBLOOM_VARIANT instead"),
+        pytest.raises(ValueError, match="VKBLOOM_VARIANT: quick is not one of auto"),
+    ):
+        Renderer()
+
+
+def test_unknown_variants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_VARIANT", "quick")
     with pytest.raises(ValueError, match="VKBLOOM_VARIANT: quick is not one of auto, fragment"):
         Renderer()
