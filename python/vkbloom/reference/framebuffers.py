@@ -55,18 +55,12 @@ class Settings(CompositeSettings, Protocol):
 class _Method(NamedTuple):
     """The functions of a method's module.
 
-    Parameters
-    ----------
-    passes : callable
-        ``passes(source, settings)`` returns the framebuffers after the glow, in the order of the
-        data flow; the last one is "bloom". `source` is a `BlurInput`.
-    gain : callable
-        ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns the bloom of a flat
-        image of 1.
-    published : bool
-        Whether `passes` reduces the frame and applies the threshold itself.
-    sized : bool
-        Whether the gain depends on the size of the frame.
+    - `passes`: ``passes(source, settings)`` returns the framebuffers after the glow, in the order
+      of the data flow; the last one is "bloom". `source` is a `BlurInput`.
+    - `gain`: ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns the bloom of a
+      flat image of 1.
+    - `published`: Whether `passes` reduces the frame and applies the threshold itself.
+    - `sized`: Whether the gain depends on the size of the frame.
     """
 
     passes: Callable[[BlurInput, Any], dict[str, Array]]

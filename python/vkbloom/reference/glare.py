@@ -25,18 +25,8 @@ def stage_format(format: str) -> str:
 def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]:
     """Return the framebuffer of each stage.
 
-    Parameters
-    ----------
-    source : ndarray of float64, shape (H, W, C)
-        The thresholded and masked image, at the size of the bloom buffers.
-    glare : sequence of vkbloom.Glare
-    format : str
-        Of the bloom buffers.
-
-    Returns
-    -------
-    dict of str to ndarray of float64
-        By the stage's name, with a number if there are several stages of the same class.
+    `source`: ndarray of float64, shape (H, W, C); The thresholded and masked image, at the size of
+    the bloom buffers.
     """
     store = storage(stage_format(format))
     counts = Counter(stage.stage for stage in glare)

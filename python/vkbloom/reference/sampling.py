@@ -40,19 +40,11 @@ def sample(
     of the two nearest texels along each axis (the Vulkan specification, chapter "Image Operations",
     section "Texel Filtering", of linear filters). Outside of the image it is the value at the edge.
 
-    Parameters
-    ----------
-    image : ndarray of float64, shape (H, W, C)
-        Finite values. It is not changed.
-    size : (int, int)
-        Width and height of the result, in pixels.
-    x_taps, y_taps : sequence of (float, float)
-        Offset (in texels of `image`) and weight of each tap along the axis. The taps of both axes
-        form a grid, and their weights are multiplied.
-
-    Returns
-    -------
-    ndarray of float64, shape (height, width, C)
+    - `image`: ndarray of float64, shape (H, W, C); Finite values. It is not changed.
+    - `size`: Width and height of the result, in pixels.
+    - `x_taps`, `y_taps`: Offset (in texels of `image`) and weight of each tap along the axis. The
+      taps of both axes form a grid, and their weights are multiplied.
+    - Returns: ndarray of float64, shape (height, width, C).
     """
     width, height = size
     rows = _filter_rows(image, height, y_taps)
@@ -141,15 +133,9 @@ def _slopes(image: Array, count: int, offset: float) -> Array:
 def read_rows(image: Array, positions: Array) -> Array:
     """Sample an image along its first axis at any positions, linearly and clamped to the edge.
 
-    Parameters
-    ----------
-    image : ndarray of float64, shape (H, W, C)
-    positions : ndarray, shape (N,)
-        In texels, with texel n at n.
-
-    Returns
-    -------
-    ndarray of float64, shape (N, W, C)
+    - `image`: ndarray of float64, shape (H, W, C).
+    - `positions`: ndarray, shape (N,); In texels, with texel n at n.
+    - Returns: ndarray of float64, shape (N, W, C).
     """
     lower = np.floor(positions)
     part = (positions - lower)[:, np.newaxis, np.newaxis]
@@ -163,14 +149,9 @@ def read_rows(image: Array, positions: Array) -> Array:
 def weighted_mean(parts: Iterable[tuple[Array | float, Array]]) -> Array:
     """Return the weighted mean of images.
 
-    Parameters
-    ----------
-    parts : iterable of (float or ndarray, ndarray)
-        The weight, a number or an array of shape (H, W, 1); and the image of shape (H, W, C).
-
-    Returns
-    -------
-    ndarray of float64, shape (H, W, C)
+    - `parts`: The weight, a number or an array of shape (H, W, 1); and the image of shape (H, W,
+      C).
+    - Returns: ndarray of float64, shape (H, W, C).
     """
     total, weights = np.zeros(()), np.zeros(())
     for weight, image in parts:
