@@ -76,3 +76,9 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
              ? pass
              : NULL;
 }
+
+bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return pass->constants.upsample == UPSAMPLE_LINEAR && !pass->constants.add_own
+        && vkb_same_size(graph, pass->reads[0], pass->targets[0]);
+}
