@@ -11,25 +11,6 @@ static bool (*const methods[VKB_METHOD_COUNT])(const struct vkb_settings *,
 #undef METHOD_ROW
 };
 
-static const struct shading {
-    const char *name;
-    bool (*build)(const struct vkb_settings *, const struct vkb_scene_source *, struct vkb_graph *,
-                  struct vkb_error *);
-} shadings[] = {
-    {"forward", vkb_build_forward},
-    {"deferred", vkb_build_deferred},
-};
-
-bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
-                     const struct vkb_scene_source *source, struct vkb_graph *graph,
-                     struct vkb_error *error)
-{
-    for (size_t i = 0; i < sizeof shadings / sizeof shadings[0]; ++i)
-        if (strcmp(shadings[i].name, shading) == 0)
-            return shadings[i].build(settings, source, graph, error);
-    return vkb_fail(error, VKB_ERROR_VALUE, "shading: there is no %s", shading);
-}
-
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {

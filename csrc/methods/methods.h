@@ -26,10 +26,7 @@ struct vkb_image_source {
 bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,
                      uint32_t max_side, struct vkb_error *error);
 
-// The graph of a scene in the shading of that name.
-bool vkb_build_scene(const char *shading, const struct vkb_settings *settings,
-                     const struct vkb_scene_source *source, struct vkb_graph *graph,
-                     struct vkb_error *error);
+// The graph of each kind of source.
 bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
                        struct vkb_graph *graph, struct vkb_error *error);
 // The size of the bloom buffers of a forward scene.

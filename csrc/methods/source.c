@@ -2,6 +2,25 @@
 
 #include <string.h>
 
+static const struct shading {
+    const char *name;
+    bool (*build)(const struct vkb_settings *, const struct vkb_scene_source *, struct vkb_graph *,
+                  struct vkb_error *);
+} shadings[] = {
+    {"forward", vkb_build_forward},
+    {"deferred", vkb_build_deferred},
+};
+
+static bool build_scene(const char *shading, const struct vkb_settings *settings,
+                        const struct vkb_scene_source *source, struct vkb_graph *graph,
+                        struct vkb_error *error)
+{
+    for (size_t i = 0; i < sizeof shadings / sizeof shadings[0]; ++i)
+        if (strcmp(shadings[i].name, shading) == 0)
+            return shadings[i].build(settings, source, graph, error);
+    return vkb_fail(error, VKB_ERROR_VALUE, "shading: there is no %s", shading);
+}
+
 bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings *settings,
                       uint32_t max_side, struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -10,7 +29,7 @@ bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings
         break;
     case VKB_SOURCE_SCENE:
         return vkb_check_sizes(settings, "size", source->scene.size, max_side, error)
-            && vkb_build_scene(source->shading, settings, &source->scene, graph, error);
+            && build_scene(source->shading, settings, &source->scene, graph, error);
     case VKB_SOURCE_IMAGE:
         return vkb_check_sizes(settings, "image", source->image.size, max_side, error)
             && vkb_build_image(settings, &source->image, graph, error);

@@ -91,6 +91,11 @@ void vkb_renderer_leave(struct vkb_renderer *renderer);
 // for the next call. Called with the lock.
 bool vkb_renderer_check_messages(struct vkb_renderer *renderer, bool done, struct vkb_error *error);
 
+// Releases abandoned submissions that have finished. With the GIL.
+void vkb_renderer_release_finished(struct vkb_renderer *renderer);
+// Called between the slices of a wait, with the renderer: whether a signal handler has raised.
+bool vkb_renderer_interrupted(void *renderer);
+
 // Whether this is the process that opened the renderer.
 bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Makes the renderer the owner of a submission that nobody waits for. With the GIL.
@@ -233,6 +238,9 @@ struct vkb_plan_object {
 
 // Size in bytes of an output in the caller's array.
 size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
+
+// Sets an item of a new tuple, whose reference the tuple gets; false if it is NULL.
+bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item);
 
 // A tuple of the names of images.
 PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count);

@@ -30,11 +30,6 @@ static const struct vkb_device any_device = {
     .words = true,
 };
 
-static bool set_steal(PyObject *tuple, Py_ssize_t index, PyObject *item)
-{
-    return item && PyTuple_SetItem(tuple, index, item) == 0;
-}
-
 // Whether the image is wanted: all are where `names` is None. -1 with an exception set.
 static int is_wanted(PyObject *names, const char *name)
 {
@@ -119,7 +114,7 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
     PyObject *tuple = PyTuple_New(plan->output_count);
 
     for (uint32_t i = 0; tuple && i < plan->output_count; ++i)
-        if (!set_steal(tuple, i, describe_output(&plan->graph, plan->outputs[i])))
+        if (!vkb_set_item(tuple, i, describe_output(&plan->graph, plan->outputs[i])))
             Py_CLEAR(tuple);
     return tuple;
 }
@@ -209,16 +204,6 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         return NULL;
     }
     return (PyObject *)self;
-}
-
-PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)
-{
-    PyObject *tuple = PyTuple_New(count);
-
-    for (uint32_t i = 0; tuple && i < count; ++i)
-        if (!set_steal(tuple, i, PyUnicode_FromString(graph->images[images[i]].name)))
-            Py_CLEAR(tuple);
-    return tuple;
 }
 
 PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
@@ -315,7 +300,7 @@ static PyObject *describe_dependencies(const struct vkb_graph *graph, uint32_t f
     PyObject *tuple = PyTuple_New(count);
 
     for (uint32_t i = 0; tuple && i < count; ++i)
-        if (!set_steal(tuple, i, describe_dependency(&dependencies[i])))
+        if (!vkb_set_item(tuple, i, describe_dependency(&dependencies[i])))
             Py_CLEAR(tuple);
     return tuple;
 }

@@ -6,128 +6,6 @@ static struct vkb_module_state *state_of(PyObject *self)
     return PyType_GetModuleState(Py_TYPE(self));
 }
 
-bool vkb_renderer_is_ours(const struct vkb_renderer *self)
-{
-    return self->process == vkb_current_process();
-}
-
-static bool require_ours(const struct vkb_renderer *self, struct vkb_error *error)
-{
-    return vkb_renderer_is_ours(self)
-        || vkb_fail(error, VKB_ERROR_VALUE,
-                    "the renderer was opened in another process (%ld), from which this one (%ld) "
-                    "was forked; open one here, or, where the driver opens none after a fork, "
-                    "start processes by multiprocessing's method \"spawn\"",
-                    self->process, vkb_current_process());
-}
-
-// Called between the slices of a wait: whether a signal handler raised an exception.
-static bool interrupted(void *context)
-{
-    struct vkb_renderer *self = context;
-
-    PyEval_RestoreThread(self->thread);
-    const bool raised = PyErr_CheckSignals() < 0;
-    self->thread = PyEval_SaveThread();
-    return raised;
-}
-
-static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
-{
-    const long long slice = 50000;  // microseconds
-    PyLockStatus status = PyThread_acquire_lock_timed(self->lock, 0, 0);
-
-    while (status != PY_LOCK_ACQUIRED) {
-        Py_BEGIN_ALLOW_THREADS
-        status = PyThread_acquire_lock_timed(self->lock, slice, 0);
-        Py_END_ALLOW_THREADS
-        if (status != PY_LOCK_ACQUIRED && PyErr_CheckSignals() < 0)
-            return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
-    }
-    return true;
-}
-
-// Removes the finished submissions from the abandoned ones and returns them. With the lock and the
-// GIL, or without a device.
-static struct vkb_pending *take_over(struct vkb_renderer *self)
-{
-    struct vkb_pending **link = &self->abandoned, *over = NULL;
-
-    while (*link) {
-        struct vkb_pending *pending = *link;
-        // Without a device, all are finished. A busy device that was not destroyed keeps its own.
-        if (self->device.handle
-            && !(self->open && vkb_frame_drop(&self->device, &self->frame, pending->submission))) {
-            link = &pending->next;
-            continue;
-        }
-        *link = pending->next;
-        pending->next = over;
-        over = pending;
-    }
-    return over;
-}
-
-// Called with the GIL and without the lock: it may run Python code, which may wait for a thread
-// that waits for the renderer. A set exception is kept.
-static void release_all(struct vkb_pending *over)
-{
-    PyObject *type, *value, *traceback;
-
-    if (!over)
-        return;
-    PyErr_Fetch(&type, &value, &traceback);
-    while (over) {
-        struct vkb_pending *next = over->next;
-        vkb_pending_release(over);
-        over = next;
-    }
-    PyErr_Restore(type, value, traceback);
-}
-
-void vkb_renderer_abandon(struct vkb_renderer *self, struct vkb_pending *pending)
-{
-    pending->next = self->abandoned;
-    self->abandoned = pending;
-}
-
-bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
-{
-    if (!require_ours(self, error))
-        return false;
-    if (self->holder == PyThread_get_thread_ident())
-        return vkb_fail(error, VKB_ERROR_GENERAL,
-                        "the renderer is at work in this thread, which a signal's handler or a "
-                        "finalizer has interrupted");
-    if (!acquire_lock(self, error))
-        return false;
-    self->holder = PyThread_get_thread_ident();
-    self->thread = PyEval_SaveThread();
-    self->before = vkb_messages_begin(&self->device.messages);
-    return true;
-}
-
-void vkb_renderer_leave(struct vkb_renderer *self)
-{
-    PyEval_RestoreThread(self->thread);
-    if (self->open) {
-        self->pipeline_count = self->frame.pipelines.created;
-        self->cached = vkb_frame_cached(&self->frame);
-    }
-    struct vkb_pending *over = take_over(self);
-    vkb_messages_end(self->before);
-    self->holder = 0;
-    PyThread_release_lock(self->lock);
-    release_all(over);
-}
-
-bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vkb_error *error)
-{
-    if (!self->open || (!done && error->kind == VKB_ERROR_INTERRUPTED))
-        return done;
-    return vkb_messages_check(&self->device.messages, error) && done;
-}
-
 // create(adapter, driver, validation, variants, read_cache): read_cache(driver_uuid) returns the
 // stored pipeline cache as bytes, or None.
 static bool create(struct vkb_renderer *self, const char *adapter, const char *driver,
@@ -201,7 +79,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
              && (self->residents = vkb_residents_create(&self->device, &error)))
         self->open = create(self, adapter, driver, validation, variants, read_cache, &error);
     if (self->open) {
-        self->device.interrupted = interrupted;
+        self->device.interrupted = vkb_renderer_interrupted;
         self->device.context = self;
         self->device.frame_seconds = frame_seconds;
         return (PyObject *)self;
@@ -273,23 +151,12 @@ static void dealloc(PyObject *object)
     // the driver may still use is kept: abandoned submissions, and this object with its messages.
     if (self->device.handle)
         return;
-    release_all(take_over(self));
+    vkb_renderer_release_finished(self);
     vkb_pages_close(self->pages);
     vkb_residents_close(self->residents);
     if (self->lock)
         PyThread_free_lock(self->lock);
     vkb_free_object(object);
-}
-
-bool vkb_require_open(const struct vkb_renderer *self, struct vkb_error *error)
-{
-    if (!self->open)
-        return vkb_fail(error, VKB_ERROR_VALUE, "the renderer is closed");
-    if (!require_ours(self, error))
-        return false;
-    if (self->device.lost)
-        return vkb_fail(error, VKB_ERROR_DEVICE_LOST, "the device was lost; close the renderer");
-    return true;
 }
 
 static PyObject *close_renderer(PyObject *object, PyObject *unused)

@@ -82,42 +82,6 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     return NULL;
 }
 
-static void release_source(struct vkb_pending *pending)
-{
-    struct vkb_source_object *source = (struct vkb_source_object *)pending->source;
-
-    if (source && source->resident)
-        vkb_resident_end_use(source->residents, source->resident);
-    Py_XDECREF(pending->source);
-}
-
-static void release_views(struct vkb_pending *pending)
-{
-    while (pending->view_count > 0)
-        PyBuffer_Release(&pending->views[--pending->view_count]);
-}
-
-void vkb_pending_release(struct vkb_pending *pending)
-{
-    release_views(pending);
-    vkb_free(pending->requests);
-    vkb_free(pending->outputs);
-    vkb_free(pending->views);
-    vkb_free(pending->timings);
-    Py_XDECREF(pending->plans);
-    release_source(pending);
-    vkb_free(pending);
-}
-
-int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg)
-{
-    Py_VISIT(pending->plans);
-    Py_VISIT(pending->source);
-    for (size_t i = 0; i < pending->view_count; ++i)
-        Py_VISIT(pending->views[i].obj);
-    return 0;
-}
-
 // Rows of the outputs to read back.
 struct rows {
     uint32_t first, count;

@@ -70,3 +70,18 @@ int vkb_read_name(PyObject *value, const char *const *names, int count, const ch
     PyErr_Format(PyExc_ValueError, "%s: unknown %s %R", what, noun, value);
     return -1;
 }
+
+bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item)
+{
+    return item && PyTuple_SetItem(tuple, index, item) == 0;
+}
+
+PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)
+{
+    PyObject *tuple = PyTuple_New(count);
+
+    for (uint32_t i = 0; tuple && i < count; ++i)
+        if (!vkb_set_item(tuple, i, PyUnicode_FromString(graph->images[images[i]].name)))
+            Py_CLEAR(tuple);
+    return tuple;
+}

@@ -87,12 +87,6 @@ static void make_columns(const struct vkb_variant_choice *choice, struct vkb_pas
                    FILTER_ROWS);
 }
 
-bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
-{
-    return pass->constants.upsample == UPSAMPLE_LINEAR && !pass->constants.add_own
-        && vkb_same_size(graph, pass->reads[0], pass->targets[0]);
-}
-
 // Whether the image that the pass reads is not higher than its target, both complete if they are
 // bands (see SAMPLING_ROWS).
 static bool is_enlarged(const struct vkb_graph *graph, const struct vkb_pass_row *pass,

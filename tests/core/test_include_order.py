@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 CORE = Path(__file__).parents[2] / "csrc"
@@ -17,3 +18,39 @@ def test_folders_include_those_before_them() -> None:
         for folder in re.findall(r'#include "(\w+)/', file.read_text(encoding="utf-8")):
             if folder != "shaders":
                 assert ORDER.index(folder) <= own, (file.relative_to(CORE), folder)
+
+
+def test_headers_do_not_include_each_other_in_a_circle() -> None:
+    found = {str(file.relative_to(CORE)): file.read_text("utf-8") for file in CORE.glob("*/*.h")}
+    order_of({name: set(re.findall(r'#include "(.+)"', text)) for name, text in found.items()})
+
+
+def test_files_do_not_use_each_other_in_a_circle() -> None:
+    """By the names that a file defines for others. (faults.c is part of test builds only.)"""
+    texts = {
+        str(file.relative_to(CORE)): re.sub(
+            r'//.*|"(?:\\.|[^"\\\n])*"', "", file.read_text("utf-8")
+        )
+        for file in CORE.glob("*/*.c")
+        if file.name != "faults.c"
+    }
+    owners = {
+        name: file
+        for file, text in texts.items()
+        for name in re.findall(
+            r"^(?!static|extern|#)[A-Za-z_][\w *]*?\b(vkb_\w+)(?:\(|\s*=|\[)", text, re.MULTILINE
+        )
+    }
+    assert owners["vkb_raise"] == "python/objects.c"
+    order_of(
+        {
+            file: {owners.get(name, file) for name in re.findall(r"(?<!struct )\bvkb_\w+", text)}
+            - {file}
+            for file, text in texts.items()
+        }
+    )
+
+
+def order_of(users: dict[str, set[str]]) -> list[str]:
+    """Raises CycleError where there is no order."""
+    return list(TopologicalSorter(users).static_order())

@@ -1,0 +1,176 @@
+// The lock of a renderer, and the submissions that nobody waits for any more.
+#include "python/module.h"
+
+static void release_source(struct vkb_pending *pending)
+{
+    struct vkb_source_object *source = (struct vkb_source_object *)pending->source;
+
+    if (source && source->resident)
+        vkb_resident_end_use(source->residents, source->resident);
+    Py_XDECREF(pending->source);
+}
+
+static void release_views(struct vkb_pending *pending)
+{
+    while (pending->view_count > 0)
+        PyBuffer_Release(&pending->views[--pending->view_count]);
+}
+
+void vkb_pending_release(struct vkb_pending *pending)
+{
+    release_views(pending);
+    vkb_free(pending->requests);
+    vkb_free(pending->outputs);
+    vkb_free(pending->views);
+    vkb_free(pending->timings);
+    Py_XDECREF(pending->plans);
+    release_source(pending);
+    vkb_free(pending);
+}
+
+int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg)
+{
+    Py_VISIT(pending->plans);
+    Py_VISIT(pending->source);
+    for (size_t i = 0; i < pending->view_count; ++i)
+        Py_VISIT(pending->views[i].obj);
+    return 0;
+}
+
+bool vkb_renderer_is_ours(const struct vkb_renderer *self)
+{
+    return self->process == vkb_current_process();
+}
+
+static bool require_ours(const struct vkb_renderer *self, struct vkb_error *error)
+{
+    return vkb_renderer_is_ours(self)
+        || vkb_fail(error, VKB_ERROR_VALUE,
+                    "the renderer was opened in another process (%ld), from which this one (%ld) "
+                    "was forked; open one here, or, where the driver opens none after a fork, "
+                    "start processes by multiprocessing's method \"spawn\"",
+                    self->process, vkb_current_process());
+}
+
+// Called between the slices of a wait: whether a signal handler raised an exception.
+bool vkb_renderer_interrupted(void *context)
+{
+    struct vkb_renderer *self = context;
+
+    PyEval_RestoreThread(self->thread);
+    const bool raised = PyErr_CheckSignals() < 0;
+    self->thread = PyEval_SaveThread();
+    return raised;
+}
+
+static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
+{
+    const long long slice = 50000;  // microseconds
+    PyLockStatus status = PyThread_acquire_lock_timed(self->lock, 0, 0);
+
+    while (status != PY_LOCK_ACQUIRED) {
+        Py_BEGIN_ALLOW_THREADS
+        status = PyThread_acquire_lock_timed(self->lock, slice, 0);
+        Py_END_ALLOW_THREADS
+        if (status != PY_LOCK_ACQUIRED && PyErr_CheckSignals() < 0)
+            return vkb_fail(error, VKB_ERROR_INTERRUPTED, "interrupted");
+    }
+    return true;
+}
+
+// Removes the finished submissions from the abandoned ones and returns them. With the lock and the
+// GIL, or without a device.
+static struct vkb_pending *take_over(struct vkb_renderer *self)
+{
+    struct vkb_pending **link = &self->abandoned, *over = NULL;
+
+    while (*link) {
+        struct vkb_pending *pending = *link;
+        // Without a device, all are finished. A busy device that was not destroyed keeps its own.
+        if (self->device.handle
+            && !(self->open && vkb_frame_drop(&self->device, &self->frame, pending->submission))) {
+            link = &pending->next;
+            continue;
+        }
+        *link = pending->next;
+        pending->next = over;
+        over = pending;
+    }
+    return over;
+}
+
+// Called with the GIL and without the lock: it may run Python code, which may wait for a thread
+// that waits for the renderer. A set exception is kept.
+static void release_all(struct vkb_pending *over)
+{
+    PyObject *type, *value, *traceback;
+
+    if (!over)
+        return;
+    PyErr_Fetch(&type, &value, &traceback);
+    while (over) {
+        struct vkb_pending *next = over->next;
+        vkb_pending_release(over);
+        over = next;
+    }
+    PyErr_Restore(type, value, traceback);
+}
+
+void vkb_renderer_release_finished(struct vkb_renderer *self)
+{
+    release_all(take_over(self));
+}
+
+void vkb_renderer_abandon(struct vkb_renderer *self, struct vkb_pending *pending)
+{
+    pending->next = self->abandoned;
+    self->abandoned = pending;
+}
+
+bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
+{
+    if (!require_ours(self, error))
+        return false;
+    if (self->holder == PyThread_get_thread_ident())
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "the renderer is at work in this thread, which a signal's handler or a "
+                        "finalizer has interrupted");
+    if (!acquire_lock(self, error))
+        return false;
+    self->holder = PyThread_get_thread_ident();
+    self->thread = PyEval_SaveThread();
+    self->before = vkb_messages_begin(&self->device.messages);
+    return true;
+}
+
+void vkb_renderer_leave(struct vkb_renderer *self)
+{
+    PyEval_RestoreThread(self->thread);
+    if (self->open) {
+        self->pipeline_count = self->frame.pipelines.created;
+        self->cached = vkb_frame_cached(&self->frame);
+    }
+    struct vkb_pending *over = take_over(self);
+    vkb_messages_end(self->before);
+    self->holder = 0;
+    PyThread_release_lock(self->lock);
+    release_all(over);
+}
+
+bool vkb_renderer_check_messages(struct vkb_renderer *self, bool done, struct vkb_error *error)
+{
+    if (!self->open || (!done && error->kind == VKB_ERROR_INTERRUPTED))
+        return done;
+    return vkb_messages_check(&self->device.messages, error) && done;
+}
+
+bool vkb_require_open(const struct vkb_renderer *self, struct vkb_error *error)
+{
+    if (!self->open)
+        return vkb_fail(error, VKB_ERROR_VALUE, "the renderer is closed");
+    if (!require_ours(self, error))
+        return false;
+    if (self->device.lost)
+        return vkb_fail(error, VKB_ERROR_DEVICE_LOST, "the device was lost; close the renderer");
+    return true;
+}

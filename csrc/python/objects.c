@@ -1,0 +1,83 @@
+// What all types share: objects, the state of the module, the exceptions of errors.
+#include "python/module.h"
+
+#include <string.h>
+
+struct vkb_module_state *vkb_module_state(PyObject *module)
+{
+    return PyModule_GetState(module);
+}
+
+static bool set_steal(PyObject *object, const char *name, PyObject *value)
+{
+    if (!value)
+        return false;
+    int result = PyObject_SetAttrString(object, name, value);
+    Py_DECREF(value);
+    return result == 0;
+}
+
+PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error)
+{
+    // The exception of what interrupted is there already.
+    if (error->kind == VKB_ERROR_INTERRUPTED)
+        return NULL;
+    PyObject *type = state->errors[error->kind];
+    // Where a long message is cut, a character may be, too.
+    PyObject *message =
+        PyUnicode_DecodeUTF8(error->message, (Py_ssize_t)strlen(error->message), "replace");
+    if (error->kind == VKB_ERROR_VALUE) {
+        if (message)
+            PyErr_SetObject(type, message);
+        Py_XDECREF(message);
+        return NULL;
+    }
+    PyObject *exception = message ? PyObject_CallFunctionObjArgs(type, message, NULL) : NULL;
+    const bool from_vulkan = error->call[0] != '\0';
+    if (exception
+        && set_steal(exception, "vk_call",
+                     from_vulkan ? PyUnicode_FromString(error->call) : Py_NewRef(Py_None))
+        && set_steal(exception, "vk_result",
+                     from_vulkan ? PyLong_FromLong(error->result) : Py_NewRef(Py_None)))
+        PyErr_SetObject(type, exception);
+    Py_XDECREF(exception);
+    Py_XDECREF(message);
+    return NULL;
+}
+
+PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
+{
+    return Py_BuildValue("(ssssNy#N)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
+                         adapter->driver_info,
+                         PyUnicode_FromFormat("%u.%u.%u",
+                                              VK_API_VERSION_MAJOR(adapter->api_version),
+                                              VK_API_VERSION_MINOR(adapter->api_version),
+                                              VK_API_VERSION_PATCH(adapter->api_version)),
+                         (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE,
+                         PyBool_FromLong(adapter->bundled));
+}
+
+void *vkb_new_object(PyObject *type)
+{
+    const allocfunc allocate = (allocfunc)PyType_GetSlot((PyTypeObject *)type, Py_tp_alloc);
+
+    return allocate((PyTypeObject *)type, 0);
+}
+
+void vkb_free_object(PyObject *object)
+{
+    PyTypeObject *type = Py_TYPE(object);
+    const freefunc release = (freefunc)PyType_GetSlot(type, Py_tp_free);
+
+    release(object);
+    Py_DECREF(type);
+}
+
+void vkb_dealloc(PyObject *object)
+{
+    const inquiry clear = (inquiry)PyType_GetSlot(Py_TYPE(object), Py_tp_clear);
+
+    PyObject_GC_UnTrack(object);
+    clear(object);
+    vkb_free_object(object);
+}
