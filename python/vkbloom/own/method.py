@@ -256,7 +256,7 @@ def class_name(name: str) -> str:
 
 def field_of(file: OwnFile, param: Param) -> tuple[Any, Any]:
     """Return type and declaration of a parameter's field."""
-    if hasattr(Settings, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
+    if hasattr(OwnMethod, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
         raise file.source.fault(
             param.line, f"PARAM: {param.name!r} is a name that all settings have; rename it"
         )

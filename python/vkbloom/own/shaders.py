@@ -53,7 +53,7 @@ class Shaders:
         found = self._compiled.get(key)
         if found is None:
             shader = write_shader(self._file, one, stage, values)
-            code = compile_shader(self._file.source, one, shader)
+            code = compile_shader(self._file, one, shader)
             found = shader, _core.shader(f"{self._name}_{one.line}", code)
             self._compiled[key] = found
         return found
