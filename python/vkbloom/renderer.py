@@ -98,7 +98,7 @@ def _paired(
             one = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        work = requests.Work(image_source(image), one.in_sequence(count, state))
+        work = requests.Work(image_source(image), one._in_sequence(count, state))
         # The iterable may overwrite the array when it yields the next image.
         del image
         yield work
@@ -929,7 +929,7 @@ class Renderer:
             if last is settings and last_names == names and plan.is_of_image(source):
                 return plan
         plan = self._core.plan(source, settings, names)
-        self._planned = None if settings.has_state else (settings, names, plan)
+        self._planned = None if settings._has_state else (settings, names, plan)
         return plan
 
     def _run_many(

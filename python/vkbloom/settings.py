@@ -208,11 +208,11 @@ class Settings(Record):
         return getattr(self.glare[place], field)
 
     @property
-    def has_state(self) -> bool:
+    def _has_state(self) -> bool:
         """Whether frames depend on those before; only own methods can."""
         return False
 
-    def in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
         """Return the settings for a frame of a sequence, whose frames share the state."""
         return self
 

@@ -93,11 +93,11 @@ class OwnMethod(Settings, metaclass=OwnType):
         return planned(self.file, self.shaders, request)
 
     @property
-    def has_state(self) -> bool:
+    def _has_state(self) -> bool:
         """Whether passes change textures or buffers, so that frames depend on those before."""
         return any(block.storage for block in self.file.given.values())
 
-    def in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
         """Return a copy for a frame of a sequence, which counts the frames before it."""
         copied = copy.copy(self)
         object.__setattr__(copied, "_place", place)
