@@ -16,6 +16,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from tests.time_budget import TimeBudget
 from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
 from vkbloom.registry import METHODS
 
@@ -31,6 +32,7 @@ def pytest_configure(config: pytest.Config) -> None:
     # A slow machine must not fail a test. Where more examples find more, a test asks for them.
     hypothesis.settings.register_profile("untimed", deadline=None, max_examples=30)
     hypothesis.settings.load_profile("untimed")
+    config.pluginmanager.register(TimeBudget(), "time-budget")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
 
 

@@ -22,13 +22,9 @@ __all__ = ["Band", "BloomByBands", "ImageByBands"]
 class Band:
     """Rows of an image, and of what belongs to it.
 
-    Parameters
-    ----------
-    image : ndarray, shape (N, W, 3) or (N, W, 4)
-        As for `vkbloom.Renderer.apply`.
-    emission : ndarray, optional
-        Of the image's shape and dtype.
-    mask : ndarray of float32, shape (N, W), optional
+    - `image`: ndarray, shape (N, W, 3) or (N, W, 4); As for `vkbloom.Renderer.apply`.
+    - `emission`: Of the image's shape and dtype.
+    - `mask`: ndarray of float32, shape (N, W), optional.
     """
 
     image: NDArray[Any]
@@ -67,15 +63,8 @@ class BloomByBands:
     reduced to, and those that the result is made of. The result is the same as that of the image
     given at once, bit by bit.
 
-    Parameters
-    ----------
-    core : Renderer of the core
-    settings : Settings
-    sample : Band
-        Rows of the image, any.
-    height : int
-        Rows in all.
-    parts : _Parts
+    - `sample`: Rows of the image, any.
+    - `height`: Rows in all.
     """
 
     def __init__(
@@ -114,13 +103,7 @@ class BloomByBands:
         return cls(core, settings, sample, height, parts)
 
     def reduce(self, bands: Iterable[Band]) -> Iterator[int]:
-        """Take the image from the top to the bottom; yield how many rows were taken.
-
-        Parameters
-        ----------
-        bands : iterable of Band
-            With any number of rows each.
-        """
+        """Take the image from the top to the bottom; yield how many rows were taken."""
         head, head_height, names, _, _ = self._parts
         if head is None:
             for band in bands:
@@ -194,17 +177,10 @@ class BloomByBands:
 class _Parts(NamedTuple):
     """How an image is taken by bands: see graph/bands.h of the core.
 
-    Attributes
-    ----------
-    head : str or None
-        The smaller image that bands are reduced to.
-    head_height : int
-    levels : tuple of str
-        Those that the result is made of.
-    rows : int
-        Of the image to take at a time.
-    halo : int
-        Rows beyond a band that it depends on.
+    - `head`: The smaller image that bands are reduced to.
+    - `levels`: Those that the result is made of.
+    - `rows`: Of the image to take at a time.
+    - `halo`: Rows beyond a band that it depends on.
     """
 
     head: str | None
@@ -217,13 +193,8 @@ class _Parts(NamedTuple):
 class _Window(NamedTuple):
     """A band with what is beyond it.
 
-    Attributes
-    ----------
-    rows : Band
-    top : int
-        The place of its first row in the image.
-    first, end : int
-        The band's own rows.
+    - `top`: The place of its first row in the image.
+    - `first`, `end`: The band's own rows.
     """
 
     rows: Band
@@ -238,19 +209,8 @@ class ImageByBands:
     The device has the complete image and the complete result. The bloom is the same as for the
     image in one array.
 
-    Parameters
-    ----------
-    core : Renderer of the core
-    rows : Band
-        The first rows.
-    height : int
-        Height of the image in rows.
-    settings : Settings
-
-    Raises
-    ------
-    ValueError, OutOfMemoryError, Error
-        As `vkbloom.Renderer.upload` and `apply`.
+    - `rows`: The first rows.
+    - `height`: Height of the image in rows.
     """
 
     def __init__(self, core: _core.Renderer, rows: Band, height: int, settings: Settings) -> None:

@@ -40,12 +40,7 @@ LARGE_BYTES = 1 << 20
 class Result(NamedTuple):
     """The result of a request.
 
-    Attributes
-    ----------
-    arrays : dict of str to ndarray
-    timings : dict of str to float
-    counts : (int, int)
-        The numbers of NaNs and infinities in the input.
+    `counts`: The numbers of NaNs and infinities in the input.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -57,11 +52,6 @@ def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArr
     """Return an array for a framebuffer. Its content is undefined.
 
     A large one is in pages that its `base` owns. They are reused when the array is freed.
-
-    Raises
-    ------
-    OutOfMemoryError
-        There is not enough memory.
     """
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < LARGE_BYTES:
@@ -84,12 +74,6 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
     """Copy each image to the device before the next one is taken.
 
     Images reuse the device memory of earlier ones whose submissions have finished.
-
-    Parameters
-    ----------
-    core : Renderer of the core
-    sequence : iterable of Work
-        Its sources are images. An image that is already on the device is not copied.
     """
     kept: deque[_core.Source] = deque()
     for work in sequence:
@@ -110,13 +94,7 @@ def named(plan: _core.Plan, arrays: tuple[NDArray[Any], ...]) -> dict[str, NDArr
 
 
 class Work(NamedTuple):
-    """The source and the settings of a request.
-
-    Attributes
-    ----------
-    source : Source of the core
-    settings : Settings
-    """
+    """The source and the settings of a request."""
 
     source: _core.Source
     settings: Settings
@@ -143,18 +121,8 @@ class _Submitted(NamedTuple):
 class _Requests:
     """Divides a sequence of work into submissions, in order.
 
-    Parameters
-    ----------
-    sequence : iterable of Work
-    core : Renderer of the core
-    names : tuple of str or None
-    most : int
-        The most requests in one submission.
-
-    Attributes
-    ----------
-    failure : Exception or None
-        To be raised after the results of everything that was submitted.
+    - `most`: The most requests in one submission.
+    - `failure`: To be raised after the results of everything that was submitted.
     """
 
     def __init__(
@@ -269,19 +237,7 @@ def run(
     Work is taken before earlier results are yielded, so that the device is busy while the caller
     uses results: none before the first result, then enough for `AHEAD` submissions.
 
-    Parameters
-    ----------
-    sequence : iterable of Work
-    core : Renderer of the core
-    names : tuple of str or None
-        The requested framebuffers; None: all.
-    alone : bool
-        Each request is a submission. Fewer than `IMAGES_AHEAD` requests are taken ahead.
-
-    Raises
-    ------
-    Exception
-        The error of a request or of the sequence, after the results before it.
+    `names`: The requested framebuffers; None: all.
     """
     waiting = _Requests(sequence, core, names, 1 if alone else REQUESTS)
     submitted: deque[_Submitted] = deque()

@@ -23,13 +23,7 @@ __all__ = ["image_kind", "image_source", "is_image", "scene_arguments", "scene_s
 def image_source(
     image: object, mask: object | None = None, emission: object | None = None
 ) -> _core.Source:
-    """Return the core's Source of an image. Its arrays must not change while it is used.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `check_image`, `check_mask` and `check_emission`.
-    """
+    """Return the core's Source of an image. Its arrays must not change while it is used."""
     if isinstance(image, Image):
         for name, given in (("mask", mask), ("emission", emission)):
             if given is not None:
@@ -54,13 +48,7 @@ def is_image(source: object) -> bool:
 
 
 def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Return shape and dtype of an image, which may be on the device.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `check_image`.
-    """
+    """Return shape and dtype of an image, which may be on the device."""
     checked = image if isinstance(image, Image) else check_image(image)
     return checked.shape, checked.dtype
 
@@ -68,18 +56,7 @@ def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
 def scene_source(
     scene: Scene, size: tuple[int, int], shading: Shading, time: float
 ) -> _core.Source:
-    """Return the core's Source of a scene's frame.
-
-    Parameters
-    ----------
-    scene, size, shading, time
-        As for `vkbloom.Renderer.render`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        An argument is wrong.
-    """
+    """Return the core's Source of a scene's frame."""
     check_shading(shading)
     turns = check_time(time)
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time

@@ -85,7 +85,7 @@ def test_a_ratio_is_of_medians_and_its_spread_of_rounds() -> None:
     assert slow.minus(fast).seconds == (1.0, 6.0, 4.0, 36.0, 0.0)
 
 
-def test_a_ratio_to_nothing_is_no_number() -> None:
+def test_ratio_to_zero_is_not_a_number() -> None:
     assert math.isnan(Times((1.0, 1.0)).over(Times((0.0, 0.0))).value)
 
 
@@ -100,7 +100,7 @@ def test_a_line_is_found() -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float16, np.float32])
-def test_one_wrong_pixel_is_no_agreement(dtype: Any) -> None:
+def test_one_wrong_pixel_is_a_disagreement(dtype: Any) -> None:
     ours = pictures((40, 30), dtype)[0]
     theirs = ours.copy()
     assert agreement("", ours, theirs, 0.0, "").agrees
@@ -119,7 +119,7 @@ def test_alpha_is_not_compared() -> None:
     assert agreement("", ours, theirs[..., :3], 0.0, "").agrees
 
 
-def test_what_cannot_be_compared_does_not_agree() -> None:
+def test_images_that_cannot_be_compared_do_not_agree() -> None:
     ours = pictures((8, 8), np.float32)[0]
     nan = ours.copy()
     nan[0, 0, 0] = np.nan
@@ -283,7 +283,7 @@ def test_the_command_of_a_plan() -> None:
 # Reports
 
 
-def test_what_is_written(tmp_path: Path) -> None:
+def test_report_has_page_and_json(tmp_path: Path) -> None:
     machine = {"date": "a day", "command": "make bench", "adapter": "X", "adapter type": "cpu"}
     machine |= {"peers": {"SciPy": "1", "CuPy": None}}  # type: ignore[dict-item]
     section = Section(
@@ -356,7 +356,7 @@ def test_curves_are_drawn_by_their_kind(tmp_path: Path) -> None:
     assert "wall-clock" not in page
 
 
-def test_what_was_found_is_written_before_the_rest_fails(
+def test_results_are_written_before_a_later_failure(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def fail(*_: object) -> None:
@@ -451,7 +451,7 @@ def test_wrong_use(arguments: tuple[str, ...], message: str, tmp_path: Path) -> 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_cannot_be_written_is_told_before_anything_runs(
+def test_unwritable_report_fails_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ran: list[Plan] = []

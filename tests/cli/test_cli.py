@@ -82,7 +82,7 @@ def test_every_command_has_help(name: str) -> None:
     assert result.stderr == ""
 
 
-def test_it_tells_its_version() -> None:
+def test_version_option_prints_the_version() -> None:
     assert vkb("--version").stdout == f"program {vkbloom.__version__}\n"
 
 
@@ -139,7 +139,7 @@ def test_an_interrupt_is_status_130(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("kind", [AssertionError, OSError])
-def test_what_fails_because_of_an_interrupt_is_one(
+def test_failure_caused_by_an_interrupt_counts_as_interrupt(
     monkeypatch: pytest.MonkeyPatch, kind: type[Exception]
 ) -> None:
     def interrupt() -> None:
@@ -360,7 +360,7 @@ def test_the_help_groups_options_by_method(name: str) -> None:
         assert [one for one in sections if f"\n  {option} " in sections[one]] == [title]
 
 
-def test_none_that_is_given_is_not_the_default() -> None:
+def test_given_none_differs_from_the_default() -> None:
     @dataclasses.dataclass
     class Cut:
         level: float | None = 1.0
@@ -520,7 +520,9 @@ def test_an_animation_in_a_gif(tmp_path: Path) -> None:
         (("--fps", "10"), "--fps needs --frames and a GIF"),
     ],
 )
-def test_what_no_gif_shows(tmp_path: Path, words: tuple[str, ...], told: str) -> None:
+def test_gif_of_a_still_or_of_depth_is_refused(
+    tmp_path: Path, words: tuple[str, ...], told: str
+) -> None:
     pytest.importorskip("OpenImageIO")
     result = vkb("render", "-o", tmp_path / "a.gif", *SMALL, *words)
     assert result.exit_code == 2
@@ -561,7 +563,7 @@ def test_validation_is_handed_on(tmp_path: Path) -> None:
         (("-o", "{tmp}/out.png", "--adapter", "no such"), 1, 'no Vulkan adapter for "no such"'),
     ],
 )
-def test_what_render_cannot_do_is_one_line(
+def test_impossible_render_fails_with_one_line(
     tmp_path: Path, arguments: tuple[str, ...], status: int, message: str
 ) -> None:
     (tmp_path / "bad.gltf").write_text("{broken")

@@ -304,7 +304,7 @@ class TestColours:
         save(Picture(**{**vars(Picture.of_values(image, "float")), "grey": True}), path)
         assert "1 NaN" in run(path, tmp_path / "b.exr").stderr
 
-    def test_what_is_lost_is_told(self, tmp_path: Path) -> None:
+    def test_lost_information_is_noted(self, tmp_path: Path) -> None:
         image = light(20, 30, 4)
         path = stored(tmp_path / "a.exr", image)
         (line,) = run(path, tmp_path / "b.jpg").stderr.splitlines()

@@ -215,7 +215,7 @@ class TestCommand:
             ("a.png b.png --diff none/d.png", 1, "none/d.png: No such file or directory"),
         ],
     )
-    def test_what_cannot_be_done_is_one_line(
+    def test_impossible_comparison_fails_with_one_line(
         self,
         files: dict[str, Path],
         monkeypatch: pytest.MonkeyPatch,

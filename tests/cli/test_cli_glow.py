@@ -111,7 +111,7 @@ def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
     assert refused.exit_code == 2
 
 
-def test_what_does_not_fit(tmp_path: Path) -> None:
+def test_wrong_mask_emission_or_alpha_is_refused(tmp_path: Path) -> None:
     source = stored(tmp_path / "a.exr", picture(24, 16, 3))
     out = tmp_path / "out.exr"
     small = stored(tmp_path / "small.png", np.zeros((8, 8, 3), np.uint8))

@@ -246,9 +246,7 @@ class TestStores:
         assert "frames.exr has several parts" in result.stderr
 
     @pytest.mark.parametrize("option", ["--sheet", "--curves"])
-    def test_drawings_that_cannot_be_written(
-        self, tmp_path: Path, image_file: Path, option: str
-    ) -> None:
+    def test_unwritable_drawing_fails(self, tmp_path: Path, image_file: Path, option: str) -> None:
         """Known before anything is rendered."""
         out = tmp_path / "a.zarr"
         (tmp_path / "folder.png").mkdir()
@@ -289,7 +287,7 @@ def test_presets_as_an_axis(tmp_path: Path, image_file: Path) -> None:
         (("--glare", "dirt", "--axis", "glare.0.image=a.png"), "use Renderer.grid"),
     ],
 )
-def test_axes_that_cannot_be(
+def test_wrong_axes_are_refused(
     tmp_path: Path, image_file: Path, words: tuple[str, ...], told: str
 ) -> None:
     result = run(image_file, *words, "-o", tmp_path / "a.zarr")
@@ -378,7 +376,7 @@ class TestImageFiles:
         assert other.exit_code == 1
         assert "settings.knee" in other.stderr
 
-    def test_something_else_is_left_alone(self, tmp_path: Path, image_file: Path) -> None:
+    def test_foreign_folder_is_refused_and_kept(self, tmp_path: Path, image_file: Path) -> None:
         (tmp_path / "files").mkdir()
         (tmp_path / "files" / "letter.txt").write_text("dear")
         result = run(image_file, "--axis", "exposure=0", "-o", tmp_path / "files", "--resume")
@@ -409,7 +407,9 @@ class TestImageFiles:
         assert told in result.stderr
         assert {path: path.read_bytes() for path in out.iterdir()} == before
 
-    def test_what_is_for_stores(self, tmp_path: Path, image_file: Path) -> None:
+    def test_options_of_stores_are_refused_for_folders(
+        self, tmp_path: Path, image_file: Path
+    ) -> None:
         for words in (["--reduce", "mean"], ["--sheet", "a.png"], ["--chunk", "exposure=1"]):
             result = run(image_file, "--axis", "exposure=0", "-o", tmp_path / "files", *words)
             assert result.exit_code == 2
@@ -425,7 +425,7 @@ class TestImageFiles:
         (tmp_path / "g.exr").mkdir()
         done(*words)
 
-    def test_formats_that_are_not_there(self, tmp_path: Path, image_file: Path) -> None:
+    def test_unknown_image_format_is_refused(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "files"
         result = run(image_file, "--axis", "exposure=0", "-o", out, "--image-format", "no")
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
@@ -578,7 +578,7 @@ class TestOptionFiles:
         ],
         ids=lambda value: str(value)[:40],
     )
-    def test_files_that_do_not_load(
+    def test_option_file_that_does_not_load_is_refused(
         self, tmp_path: Path, name: str, text: str | None, status: int, told: str
     ) -> None:
         if text is not None:
@@ -587,14 +587,14 @@ class TestOptionFiles:
         assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
         assert told in result.stderr
 
-    def test_bytes_that_are_no_text(self, tmp_path: Path) -> None:
+    def test_option_file_that_is_not_text_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "a.toml").write_bytes(b"\xff")
         result = run("--from", tmp_path / "a.toml", "-o", tmp_path / "a.zarr")
         assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
         assert "a.toml: 'utf-8'" in result.stderr
 
     @pytest.mark.parametrize("sequence", ["[{}]", "!!pairs [x: {}]"])
-    def test_values_that_are_named_many_times(self, tmp_path: Path, sequence: str) -> None:
+    def test_yaml_aliases_do_not_multiply_memory(self, tmp_path: Path, sequence: str) -> None:
         # 9**12 letters, were they spelled.
         lines = ["a0: &a0 lol"]
         separator = ", x: " if "pairs" in sequence else ", "
@@ -613,7 +613,7 @@ class TestOptionFiles:
         # The file's text, and modules that the first call loads, take some MB.
         assert most < 64 << 20
 
-    def test_a_flag_that_is_off(self, tmp_path: Path, image_file: Path) -> None:
+    def test_flag_that_is_false_in_a_file_is_off(self, tmp_path: Path, image_file: Path) -> None:
         (tmp_path / "a.toml").write_text("resume = false\nraw = false\n[settings]\nbloom = false")
         words = ("--axis", "exposure=0", "-o", tmp_path / "a.zarr")
         done(image_file, "--from", tmp_path / "a.toml", *words)

@@ -234,7 +234,7 @@ def test_layers_and_parts(
         ("mask", light(50, 41, 3, "uint8"), "a mask must be grey"),
     ],
 )
-def test_what_does_not_go_with_it(
+def test_mask_or_emission_of_another_shape_is_refused(
     tmp_path: Path, by_rows: list[int], kind: str, pixels: Any, reason: str
 ) -> None:
     path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
@@ -246,7 +246,7 @@ def test_what_does_not_go_with_it(
     assert not by_rows
 
 
-def test_no_bloom_is_told(tmp_path: Path, by_rows: list[int]) -> None:
+def test_missing_bloom_is_noted(tmp_path: Path, by_rows: list[int]) -> None:
     path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
     result = run(path, tmp_path / "b.png", "--method", "pyramid", "--threshold", "1")
     assert result.exit_code == 0
@@ -256,7 +256,7 @@ def test_no_bloom_is_told(tmp_path: Path, by_rows: list[int]) -> None:
 
 @pytest.mark.parametrize("where", ["add", "final"])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, vkbloom.DeviceLostError("lost")])
-def test_what_ends_it_leaves_no_file(
+def test_failure_leaves_no_file(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     by_rows: list[int],

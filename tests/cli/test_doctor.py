@@ -79,7 +79,7 @@ def test_this_machine_can_render() -> None:
         assert chosen.startswith(renderer.info.summary)
 
 
-def test_what_is_not_ok_has_advice_or_explains_itself() -> None:
+def test_finding_that_is_not_ok_has_advice_or_an_explanation() -> None:
     status, _, findings = examined(VKBLOOM_ADAPTER="nonsense", VKBLOOM_CACHE_DIR="/dev/null/cache")
     assert status == 0
     chosen = by_topic(findings, "chosen adapter")
@@ -226,7 +226,7 @@ def test_a_validation_layer_that_does_not_open(tmp_path: Path) -> None:
     assert "version 1.3.0 is installed, but the test render fails with it" in layer.found
 
 
-def test_nothing_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_driver_without_adapters_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every process fails: the doctor still reports."""
     failed = child.Answer(None, "no answer within 60 s", ("driver says no",))
     monkeypatch.setattr(child, "ask", lambda *_, **__: failed)
@@ -336,7 +336,7 @@ def test_the_search_follows_the_loaders_order(
 
 
 @linux_only
-def test_nowhere_a_manifest(
+def test_missing_manifests_are_a_problem(
     monkeypatch: pytest.MonkeyPatch, without_variables: None, tmp_path: Path
 ) -> None:
     folder = tmp_path / "icd.d"

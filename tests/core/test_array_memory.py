@@ -154,7 +154,7 @@ def test_idle_memory_has_a_limit(own: Renderer) -> None:
     assert again == places[:1:-1]
 
 
-def test_memory_that_is_not_there(own: Renderer) -> None:
+def test_lack_of_memory_is_an_error(own: Renderer) -> None:
     with pytest.raises(
         OutOfMemoryError, match=r"memory is short: the host has no 2.199e\+12 MiB more\. Smaller"
     ):

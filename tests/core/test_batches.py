@@ -154,7 +154,7 @@ def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
     assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
 
 
-def test_settings_that_are_no_sequence(renderer: Renderer) -> None:
+def test_settings_that_are_not_a_sequence_are_refused(renderer: Renderer) -> None:
     wrong: Any = Separable()
     with pytest.raises(TypeError, match=r"^settings_seq: "):
         list(renderer.apply_many(picture(4, 4, 3, seed=5), wrong))
@@ -285,7 +285,7 @@ def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("taken", [0, 1, 2, 5])
 @pytest.mark.parametrize("end", ["close", "forget"])
-def test_frames_that_nobody_takes(renderer: Renderer, taken: int, end: str) -> None:
+def test_unread_frames_of_a_sequence_are_dropped(renderer: Renderer, taken: int, end: str) -> None:
     image = picture(40, 30, 3, seed=14)
     right = renderer.apply(image)
     for _ in range(3):
@@ -446,7 +446,7 @@ def test_a_setting_that_the_device_cannot_run(place: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [_core.ValidationError, _core.DeviceLostError, ValueError])
-def test_errors_that_no_setting_is_to_blame_for(
+def test_error_of_the_device_names_no_setting(
     kind: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Batches double up to the largest size, however slow the machine is.

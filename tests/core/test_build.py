@@ -39,7 +39,7 @@ def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
         ("compile_shader", ("module", Path("a.spv")), "glslangValidator", "glslang-tools"),
     ],
 )
-def test_what_is_missing_is_named_with_its_package(
+def test_missing_build_tool_is_named_with_its_package(
     build: ModuleType, function: str, arguments: tuple[Any, ...], missing: str, package: str
 ) -> None:
     with pytest.raises(SystemExit) as caught:

@@ -99,7 +99,9 @@ def test_a_manifest_names_its_library(
             Renderer("software")
 
 
-def test_what_is_no_driver_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_file_that_is_not_a_driver_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setenv("VKBLOOM_DRIVER", str(tmp_path / "absent.so"))
     with pytest.raises(AdapterNotFoundError, match=r"absent\.so does not open"):
         Renderer("software")

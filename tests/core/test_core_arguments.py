@@ -314,7 +314,7 @@ def test_plans_of_an_image(renderer: Renderer, scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("names", [["final"], "final", 5], ids=str)
-def test_names_that_are_no_tuple(renderer: Renderer, names: Any) -> None:
+def test_names_of_another_type_are_refused(renderer: Renderer, names: Any) -> None:
     with pytest.raises(TypeError, match="attachments: a tuple is needed"):
         renderer._core.plan(_core.image_source(IMAGE), Separable(), names)
 
@@ -334,13 +334,13 @@ def test_settings_that_close_the_renderer() -> None:
         renderer._core.plan(_core.image_source(IMAGE), Closing(), None)
 
 
-def test_variants_that_are_none() -> None:
+def test_unknown_variant_is_refused() -> None:
     with pytest.raises(ValueError, match="quick is not one of auto, fragment, cpu, gpu"):
         _core.plan(_core.image_source(IMAGE), Separable(), None, "quick")
 
 
 @pytest.mark.parametrize("size", [0, -1, 2**62])
-def test_pages_of_no_size(renderer: Renderer, size: int) -> None:
+def test_pages_of_size_0_are_refused(renderer: Renderer, size: int) -> None:
     with pytest.raises((ValueError, MemoryError)):
         renderer._core.pages(size)
 

@@ -52,7 +52,7 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
     assert created[-1] == created[499]
 
 
-def test_images_that_are_old_go(new_renderer: Callable[[], Renderer]) -> None:
+def test_unused_images_are_freed(new_renderer: Callable[[], Renderer]) -> None:
     renderer = new_renderer()
     image = noise(24, 16)
     # Twenty images of 16 MiB.
@@ -69,7 +69,7 @@ def test_images_that_are_old_go(new_renderer: Callable[[], Renderer]) -> None:
 
 
 @pytest.mark.slow
-def test_pipelines_that_are_old_go(
+def test_unused_pipelines_are_freed(
     new_renderer: Callable[[], Renderer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # In this variant each setting of the final pass has one pipeline, which drivers compile
@@ -113,7 +113,7 @@ def test_pipelines_do_not_go_under_submissions_that_wait(
     assert len(list(waiting)) == 39
 
 
-def test_a_few_sizes_in_turn_make_nothing_anew(new_renderer: Callable[[], Renderer]) -> None:
+def test_alternating_sizes_reuse_images(new_renderer: Callable[[], Renderer]) -> None:
     renderer = new_renderer()
     sizes = [(16, 16), (33, 20), (8, 50), (64, 64)]
     created = []

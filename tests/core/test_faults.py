@@ -78,7 +78,7 @@ def names(stride: int) -> list[str]:
     return [*OTHERS, *methods]
 
 
-def test_what_is_shipped_cannot_be_told_to_fail() -> None:
+def test_released_core_has_no_fault_injection() -> None:
     assert not hasattr(vkbloom._core, "arm_fault")
 
 
@@ -153,7 +153,7 @@ def test_the_driver_refuses_one_renderer_more(faulty: dict[str, str]) -> None:
         )
 
 
-def test_memory_that_python_does_not_get(
+def test_lack_of_python_memory_is_an_error(
     faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     if importlib.util.find_spec("_testcapi") is None:

@@ -108,7 +108,7 @@ class TestMapping:
             ("depth", np.zeros((2, 2), np.float16), ValueError),
         ],
     )
-    def test_refuses_what_is_no_framebuffer(
+    def test_value_that_is_not_a_framebuffer_is_refused(
         self, name: Any, array: Any, error: type[Exception]
     ) -> None:
         with pytest.raises(error, match="arrays"):

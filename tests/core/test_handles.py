@@ -184,7 +184,7 @@ def test_a_handle_is_not_copied(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("image", [np.zeros((4, 4), np.uint8), np.zeros((4, 4, 3), np.uint16)])
-def test_what_apply_refuses_is_not_uploaded(renderer: Renderer, image: NDArray[Any]) -> None:
+def test_upload_refuses_what_apply_refuses(renderer: Renderer, image: NDArray[Any]) -> None:
     kind = ValueError if image.ndim == 2 else TypeError
     with pytest.raises(kind, match="image: "):
         renderer.upload(image)
@@ -392,7 +392,7 @@ def test_a_renderer_that_closes_meanwhile(new_renderer: Callable[[], Renderer]) 
         list(results)
 
 
-def test_results_that_nobody_takes(renderer: Renderer) -> None:
+def test_unread_results_of_images_are_dropped(renderer: Renderer) -> None:
     results = renderer.apply_each(picture(300, 301, 4, "float32") for _ in range(9))
     next(results)
     del results

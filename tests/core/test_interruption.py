@@ -309,7 +309,7 @@ def test_a_handler_that_uses_the_renderer_gets_an_error(case: Case) -> None:
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "soon", "nan"])
-def test_limits_that_are_none(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+def test_wrong_wait_limit_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     monkeypatch.setenv("VKBLOOM_TIMEOUT", text)
     with pytest.raises(ValueError, match=f"VKBLOOM_TIMEOUT: '{text}' is not"):
         Renderer()

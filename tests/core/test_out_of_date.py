@@ -69,7 +69,7 @@ CHANGES: list[tuple[dict[str, Any], list[str]]] = [
 
 
 @pytest.mark.parametrize(("changes", "ran"), CHANGES, ids=str)
-def test_what_runs_after_a_change_of_settings(
+def test_change_of_settings_runs_only_dependent_passes(
     opened: Renderer,
     scene: Scene,
     default: Frames,
@@ -155,7 +155,7 @@ def test_scenes_of_the_same_camera_are_told_apart(opened: Renderer, scene: Scene
     ],
     ids=str,
 )
-def test_what_is_not_wanted_does_not_run(
+def test_passes_of_unrequested_framebuffers_do_not_run(
     new_renderer: Callable[[], Renderer],
     scene: Scene,
     default: Frames,
@@ -174,7 +174,7 @@ def test_what_is_not_wanted_does_not_run(
         np.testing.assert_array_equal(part[name], whole[name])
 
 
-def test_what_is_not_wanted_stays_as_it_was(opened: Renderer, scene: Scene) -> None:
+def test_unrequested_framebuffers_keep_their_content(opened: Renderer, scene: Scene) -> None:
     # The scene of another time is rendered, the glow's is not: each is as old as it is.
     opened.render(scene, None, SIZE, time=0.5, attachments="scene")
     frames = opened.render(scene, None, SIZE)
@@ -182,7 +182,7 @@ def test_what_is_not_wanted_stays_as_it_was(opened: Renderer, scene: Scene) -> N
     assert_same(frames, fresh(scene, None, SIZE))
 
 
-def test_what_is_not_wanted_is_not_allocated(opened: Renderer, scene: Scene) -> None:
+def test_unrequested_framebuffers_are_not_allocated(opened: Renderer, scene: Scene) -> None:
     # Bloom buffers beyond any memory are no trouble where nothing of them is wanted.
     huge = Separable(bloom_size=(16384, 16384), format="rgba32float")
     frames = opened.render(scene, huge, SIZE, attachments=["scene", "depth"])

@@ -303,7 +303,7 @@ def test_a_dry_run_of_scenes_is_what_runs(
     assert ran[1] == ["final"]
 
 
-def test_dry_runs_of_nothing_and_of_what_is_none() -> None:
+def test_dry_run_of_nothing_is_empty_and_of_wrong_values_is_refused() -> None:
     wrong: Any
     assert _core.dry_run(()) == []
     for wrong in ([], ((1, 2),), (5,)):

@@ -367,7 +367,7 @@ def test_gaussian_weights_of_another_type() -> None:
         gaussian_weights(1.0, wrong)
 
 
-def test_layers_that_are_no_pairs() -> None:
+def test_layers_that_are_not_pairs_are_refused() -> None:
     wrong: Any = (1.0, 0.5)
     with pytest.raises(TypeError, match=r"^layers: .* is not a sequence of pairs"):
         Separable(layers=wrong)

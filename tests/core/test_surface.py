@@ -141,7 +141,7 @@ def test_a_closed_surface_is_refused(surface: Surface, scene: Scene) -> None:
         ({"size": (0, 5)}, r"size: \(0, 5\) is out of range"),
     ],
 )
-def test_what_cannot_be_shown(
+def test_surface_refuses_wrong_arguments(
     arguments: dict[str, Any], message: str, surface: Surface, scene: Scene
 ) -> None:
     with pytest.raises(ValueError, match=message):
@@ -149,7 +149,7 @@ def test_what_cannot_be_shown(
     assert surface.present(scene)
 
 
-def test_what_is_no_surface(renderer: Renderer) -> None:
+def test_wrong_window_or_size_of_a_surface_is_refused(renderer: Renderer) -> None:
     pytest.importorskip("glfw")
     with pytest.raises(TypeError, match="window: 'x' is not a glfw window or None"):
         Surface(renderer, "x")

@@ -90,7 +90,7 @@ class TestControls:
                 else:
                     assert type(value) is bool
 
-    def test_whatever_is_offered_is_taken(self) -> None:
+    def test_every_offered_value_is_accepted(self) -> None:
         for name, method in controls()["methods"].items():
             for field in method["fields"]:
                 ends = [field["from"], field["to"]] if field["kind"] == "number" else [False, True]
@@ -177,7 +177,7 @@ class TestControls:
             ({"method": "kino", "composite": "mix"}, "composite"),
         ],
     )
-    def test_what_makes_no_settings(self, fields: Any, message: str) -> None:
+    def test_wrong_settings_of_a_page_are_refused(self, fields: Any, message: str) -> None:
         with pytest.raises((TypeError, ValueError), match=message):
             settings_from(fields)
 
@@ -323,7 +323,7 @@ class TestViewer:
         assert np.array_equal(viewer.frames["a"]["final"], expected)
         assert opened("image", "a.png", file)["glows"] == {}
 
-    def test_files_that_are_no_images(self, viewer: Viewer) -> None:
+    def test_file_that_is_not_an_image_is_an_error(self, viewer: Viewer) -> None:
         for name in ("words.png", "no extension", "../../x.exr", "a." + "x" * 300):
             answer, _ = viewer.answer({"kind": "open", "name": name}, [b"words"])
             assert answer["kind"] == "error"
@@ -369,7 +369,7 @@ class TestViewer:
         for name in names:
             assert frame(viewer, settings, framebuffer=name)[0]["framebuffer"] == name
 
-    def test_a_framebuffer_that_is_not_there_is_final(self, viewer: Viewer) -> None:
+    def test_missing_framebuffer_is_replaced_by_final(self, viewer: Viewer) -> None:
         assert frame(viewer, Separable(), framebuffer="down_3")[0]["framebuffer"] == "final"
 
     def test_both_sides_at_once(self, viewer: Viewer, tmp_path: Path) -> None:
@@ -452,7 +452,7 @@ class TestViewer:
             {"kind": "probe", "at": [None, 0]},
         ],
     )
-    def test_messages_without_sense(self, viewer: Viewer, message: Any) -> None:
+    def test_wrong_messages_are_refused(self, viewer: Viewer, message: Any) -> None:
         answer, buffers = viewer.answer(message)
         assert (answer["kind"], buffers) == ("error", [])
         assert answer["error"]

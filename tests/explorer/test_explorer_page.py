@@ -225,7 +225,7 @@ def test_stages_of_glare(page: Page) -> None:
     wait_for_code(page, "vkbloom.Pyramid()")
 
 
-def test_what_is_refused_is_said(page: Page) -> None:
+def test_refused_value_is_shown_with_the_reason(page: Page) -> None:
     field(page, "intensity").locator("xpath=following-sibling::input").fill("-1")
     page.get_by_role("alert").get_by_text("intensity: -1").wait_for()
     field(page, "intensity").fill("2")

@@ -215,7 +215,7 @@ def test_a_file_comes_as_bytes(serve: Any, tmp_path: Any) -> None:
 
 
 @pytest.mark.parametrize("message", ["", "{", "[]", "3", "{}", b"\xff", b"\xff\xff\xff\xff{}"])
-def test_messages_of_no_page(serve: Any, message: str | bytes) -> None:
+def test_message_without_a_page_is_refused(serve: Any, message: str | bytes) -> None:
     async def talk(server: Server) -> None:
         page = await connect(server)
         await page.write_message(message, binary=isinstance(message, bytes))
@@ -235,7 +235,7 @@ def test_long_messages_are_refused(serve: Any) -> None:
     serve(talk)
 
 
-def test_a_port_that_is_taken(serve: Any) -> None:
+def test_port_in_use_is_an_error(serve: Any) -> None:
     async def talk(server: Server) -> None:
         with pytest.raises(OSError, match="in use"):
             Server(lambda: pytest.fail("nobody asked"), server.port)

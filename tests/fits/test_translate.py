@@ -15,7 +15,7 @@ SIZE = (96, 64)
 
 
 class TestTranslate:
-    def test_a_method_into_itself(self, renderer: Renderer) -> None:
+    def test_method_is_translated_into_itself(self, renderer: Renderer) -> None:
         truth = Separable(blur_scale=1.8, blur_strength=1.2, intensity=0.4, tonemap="aces")
         found = vkbloom.translate(
             truth, Separable(encoding="srgb"), size=SIZE, renderer=renderer, max_calls=120

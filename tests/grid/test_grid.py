@@ -116,7 +116,7 @@ class TestValues:
 
 class TestPasses:
     @pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)], ids=str)
-    def test_the_fewest_whatever_the_order(
+    def test_order_of_axes_does_not_change_the_number_of_passes(
         self, new_renderer: Callable[[], Renderer], image: Any, order: tuple[int, ...]
     ) -> None:
         axes: dict[str, list[Any]] = {
@@ -128,7 +128,7 @@ class TestPasses:
         assert dataset.attrs["passes_run"] == fewest(DEPENDS, axes)
         assert dataset.attrs["passes_run"] + dataset.attrs["passes_saved"] == 4 * points
 
-    def test_no_more_where_one_framebuffer_is_wanted(
+    def test_one_requested_framebuffer_runs_no_further_pass(
         self, new_renderer: Callable[[], Renderer], image: Any
     ) -> None:
         dataset = new_renderer().grid(image, None, AXES)
@@ -294,7 +294,7 @@ class TestWholeSettings:
         with pytest.raises(kind, match=told):
             renderer.grid(np.zeros((4, 4, 3), np.uint8), settings, axes)
 
-    def test_a_framebuffer_that_some_lack(self, renderer: Renderer) -> None:
+    def test_framebuffer_that_some_points_lack_is_refused(self, renderer: Renderer) -> None:
         with pytest.raises(ValueError, match=r"blur_vertical .* along preset: .* not there at"):
             renderer.grid(
                 np.zeros((8, 8, 3), np.float32),
@@ -304,7 +304,7 @@ class TestWholeSettings:
 
 
 class TestMemory:
-    def test_a_grid_that_is_too_large(
+    def test_grid_larger_than_memory_is_refused(
         self, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(Renderer, "_run_work", None)
@@ -445,7 +445,7 @@ class TestRefusals:
         with pytest.raises(ValueError, match=told):
             renderer.grid(picture, settings, axes, attachments=names)
 
-    def test_images_of_two_sizes(self, renderer: Renderer) -> None:
+    def test_images_of_two_sizes_are_refused(self, renderer: Renderer) -> None:
         images = [noise(4, 5, 3, dtype="uint8"), noise(4, 6, 3, dtype="uint8")]
         with pytest.raises(ValueError, match=r"along image: \(4, 5, 3\).*\(4, 6, 3\)"):
             renderer.grid(images)
@@ -527,7 +527,7 @@ class TestReduce:
         ("against", "told"),
         [({"blur_scale": 3.0}, "3.0 is not a value of the axis"), ({"knee": 0}, "not an axis")],
     )
-    def test_points_that_are_not_there(
+    def test_missing_points_of_a_reference_are_refused(
         self, renderer: Renderer, image: Any, against: Any, told: str
     ) -> None:
         with pytest.raises(ValueError, match=told):
@@ -538,7 +538,7 @@ class TestReduce:
 
 class TestExtras:
     @pytest.mark.parametrize("missing", ["xarray", "zarr", "dask.array"])
-    def test_what_is_missing_is_named(
+    def test_missing_package_is_named_with_its_installation(
         self, image: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str
     ) -> None:
         monkeypatch.setitem(sys.modules, missing, None)

@@ -133,7 +133,7 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
     assert most <= 2 * (2 * 2) + 3
 
 
-def test_a_worker_that_is_killed(client: Any, tmp_path: Path, undisturbed: Path) -> None:
+def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Path) -> None:
     killed = threading.Event()
 
     def kill() -> None:
@@ -171,13 +171,13 @@ class Failing:
         return 1.0
 
 
-def test_failed_runs_are_tried_again(client: Any, tmp_path: Path) -> None:
+def test_failed_run_is_repeated(client: Any, tmp_path: Path) -> None:
     reduce = {"n": Failing(tmp_path / "tried", mends=True)}
     made = make(tmp_path / "a.zarr", client, reduce=reduce, attachments=())
     assert made["done"].values.all()
 
 
-def test_what_fails_every_time_keeps_what_is_done(client: Any, tmp_path: Path) -> None:
+def test_repeated_failure_keeps_completed_blocks(client: Any, tmp_path: Path) -> None:
     reduce = {"n": Failing(tmp_path / "mended", mends=False)}
     changes: dict[str, Any] = {"reduce": reduce, "attachments": (), "chunks": {"blur_scale": 6}}
     with pytest.raises(ZeroDivisionError, match="this point"):
@@ -197,7 +197,7 @@ def test_a_worker_without_the_adapter(
     assert not (tmp_path / "a.zarr").exists()
 
 
-def test_other_clients_and_stores(client: Any) -> None:
+def test_asynchronous_client_and_memory_store_are_refused(client: Any) -> None:
     zarr = pytest.importorskip("zarr")
     with pytest.raises(TypeError, match="client"):
         make(Path("a.zarr"), 3)

@@ -27,7 +27,7 @@ class TestMeanAndMax:
         assert reductions.Mean()(frames(final=final)) == pytest.approx((1 + 0.2) / 12)
         assert reductions.Max()(frames(final=final)) == 1.0
 
-    def test_what_is_not_finite_is_left_out(self) -> None:
+    def test_values_that_are_not_finite_are_ignored(self) -> None:
         bloom = np.full((3, 3, 3), 2.0, np.float32)
         bloom[0, 0] = np.nan
         bloom[1, 1] = np.inf
@@ -65,7 +65,7 @@ class TestEncircledEnergy:
         found = reductions.EncircledEnergy(radii=(1,), centre=(1, 2))(frames(bloom=bloom))
         np.testing.assert_allclose(found, [0.2126 / (0.2126 + 0.7152)], rtol=EXACT)
 
-    def test_what_is_no_light_counts_as_0(self) -> None:
+    def test_negative_and_infinite_light_counts_as_0(self) -> None:
         bloom = np.ones((3, 3, 3), np.float32)
         bloom[0, 0], bloom[0, 1], bloom[2, 2] = -5, np.nan, np.inf
         found = reductions.EncircledEnergy(radii=(1,), centre=(1, 1))(frames(bloom=bloom))
@@ -102,7 +102,7 @@ class TestComparing:
                 frames(final=noise(3, 4, 3, dtype="uint8"))
             )
 
-    def test_what_cannot_be_computed_is_nan(self) -> None:
+    def test_impossible_figure_is_nan(self) -> None:
         small = noise(3, 3, 3, dtype="uint8")
         assert np.isnan(reductions.SSIM(against=small)(frames(final=small)))
 

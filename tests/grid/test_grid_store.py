@@ -71,7 +71,7 @@ def copy(undisturbed: Path, tmp_path: Path) -> Path:
 
 
 class TestWhole:
-    def test_holds_what_a_grid_in_memory_holds(self, undisturbed: Path, renderer: Renderer) -> None:
+    def test_store_equals_the_grid_in_memory(self, undisturbed: Path, renderer: Renderer) -> None:
         expected = renderer.grid(
             source(), None, AXES, attachments=("final", "bloom"), reduce=REDUCE
         )
@@ -95,13 +95,15 @@ class TestWhole:
         expected = renderer.apply(source(), Separable(exposure=2, threshold=0.5))["final"]
         np.testing.assert_array_equal(chosen.compute().values, expected)
 
-    def test_is_reported_complete(self, undisturbed: Path) -> None:
+    def test_complete_store_is_reported_complete(self, undisturbed: Path) -> None:
         report = check_grid(undisturbed)
         assert report.complete
         assert str(report) == f"{POINTS} of {POINTS} points are done"
 
     @pytest.mark.parametrize("url", ["file://{}/a.zarr", "memory://{}/a.zarr"])
-    def test_in_the_store_of_an_url(self, tmp_path: Path, undisturbed: Path, url: str) -> None:
+    def test_store_of_an_url_has_the_same_content(
+        self, tmp_path: Path, undisturbed: Path, url: str
+    ) -> None:
         store = url.format(tmp_path)
         make(store)
         assert check_grid(store).complete
@@ -109,7 +111,7 @@ class TestWhole:
         if store.startswith("file:"):
             assert contents(tmp_path / "a.zarr") == contents(undisturbed)
 
-    def test_counts_are_of_this_call(self, copy: Path) -> None:
+    def test_passes_are_counted_per_call(self, copy: Path) -> None:
         mended: list[str] = []
         again = make(copy, on_mended=mended.append)
         assert again.attrs["passes_run"] == 0
@@ -251,7 +253,7 @@ def stop_after(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, bool], None]:
 
 class TestResumed:
     @pytest.mark.parametrize("commits", [True, False])
-    def test_only_what_is_missing_is_rendered(
+    def test_resume_renders_only_missing_points(
         self,
         tmp_path: Path,
         undisturbed: Path,
@@ -287,7 +289,7 @@ class TestResumed:
         assert made["done"].values.all()
         assert contents(store) == contents(undisturbed)
 
-    def test_a_process_that_is_killed(self, tmp_path: Path) -> None:
+    def test_killed_process_is_resumed_with_the_same_bytes(self, tmp_path: Path) -> None:
         script = Path(__file__).with_name("grid_to_kill.py")
         whole, store = tmp_path / "whole.zarr", tmp_path / "killed.zarr"
         for seconds in (0.0, 0.2):
@@ -306,18 +308,18 @@ class TestResumed:
         output(script, whole)
         assert contents(store) == contents(whole)
 
-    def test_resume_can_be_declined(self, copy: Path) -> None:
+    def test_resume_false_refuses_an_existing_store(self, copy: Path) -> None:
         before = contents(copy)
         with pytest.raises(FileExistsError, match="already has a grid"):
             make(copy, resume=False)
         assert contents(copy) == before
 
-    def test_marks_can_be_trusted(self, copy: Path) -> None:
+    def test_verify_false_trusts_the_marks(self, copy: Path) -> None:
         (copy / "mean" / "c.0.0.0").write_bytes(b"")
         make(copy, verify=False)
         assert (copy / "mean" / "c.0.0.0").read_bytes() == b""
 
-    def test_chunks_are_those_of_the_store(self, copy: Path, undisturbed: Path) -> None:
+    def test_default_chunks_are_those_of_the_store(self, copy: Path, undisturbed: Path) -> None:
         make(copy, chunks=None)
         assert contents(copy) == contents(undisturbed)
 
@@ -346,18 +348,20 @@ class TestRefused:
         ],
         ids=str,
     )
-    def test_other_grids(self, copy: Path, changes: Any, told: str) -> None:
+    def test_another_grid_is_refused_with_its_differences(
+        self, copy: Path, changes: Any, told: str
+    ) -> None:
         before = contents(copy)
         with pytest.raises(ValueError, match=f"contains another grid; .*{told}"):
             make(copy, **changes)
         assert contents(copy) == before
 
-    def test_another_version(self, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_another_version_is_refused(self, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(vkbloom.grid.plan, "installed_version", lambda: "9.9")
         with pytest.raises(ValueError, match=r'version: "0.1.0" in the store, "9.9" requested'):
             make(copy)
 
-    def test_another_format(self, copy: Path) -> None:
+    def test_another_format_version_is_refused(self, copy: Path) -> None:
         root = json.loads((copy / "zarr.json").read_text())
         root["attributes"]["vkbloom_grid"]["format"] = 99
         (copy / "zarr.json").write_text(json.dumps(root))
@@ -385,7 +389,7 @@ class TestRefused:
         with pytest.raises(FileNotFoundError):
             check_grid(tmp_path / "a.zarr")
 
-    def test_a_store_of_another_kind(self) -> None:
+    def test_store_of_a_wrong_type_is_refused(self) -> None:
         with pytest.raises(TypeError, match="store"):
             make(3)
 
@@ -458,7 +462,7 @@ class TestDamaged:
             (damage_coordinate, "exposure/c.0 is missing, of all points"),
         ],
     )
-    def test_is_reported_and_mended(
+    def test_damage_is_reported_and_mended(
         self, copy: Path, undisturbed: Path, damage: Callable[[Path], None], told: str
     ) -> None:
         damage(copy)
@@ -474,7 +478,9 @@ class TestDamaged:
         assert contents(copy) == contents(undisturbed)
         assert check_grid(copy).complete
 
-    def test_leftovers_of_a_killed_writer_go(self, copy: Path, undisturbed: Path) -> None:
+    def test_temporary_files_of_a_killed_writer_are_removed(
+        self, copy: Path, undisturbed: Path
+    ) -> None:
         (copy / "final" / "c.0.0.0.0.0.5c5c.partial").write_bytes(b"half")
         make(copy)
         assert contents(copy) == contents(undisturbed)
@@ -549,7 +555,7 @@ class TestHostile:
         [[0, 1, 1], [-1, 1, 1], [10**9, 10**9, 10**9], [1.0, 1, 1], [True, 1, 1], "abc", 3, [[]]],
         ids=str,
     )
-    def test_a_block_that_is_none(self, copy: Path, chunk: Any) -> None:
+    def test_wrong_chunk_in_the_identity_is_refused(self, copy: Path, chunk: Any) -> None:
         rewritten(
             copy / "zarr.json",
             lambda root: root["attributes"]["vkbloom_grid"].update(chunk=chunk),
@@ -560,7 +566,7 @@ class TestHostile:
             make(copy, chunks=None)
         assert contents(copy) == before
 
-    def test_a_block_that_is_not_the_arrays(self, copy: Path) -> None:
+    def test_chunk_of_other_arrays_is_refused(self, copy: Path) -> None:
         # Taken over, all that is there would be rendered again.
         rewritten(
             copy / "zarr.json",
@@ -573,7 +579,9 @@ class TestHostile:
 
     @pytest.mark.parametrize("identity", [3, [], "x", None], ids=str)
     @pytest.mark.parametrize("place", ["vkbloom_grid", "attributes"])
-    def test_metadata_of_other_types(self, copy: Path, place: str, identity: Any) -> None:
+    def test_identity_of_a_wrong_type_is_refused(
+        self, copy: Path, place: str, identity: Any
+    ) -> None:
         rewritten(
             copy / "zarr.json",
             lambda root: (root if place in root else root["attributes"]).update({place: identity}),
@@ -600,7 +608,9 @@ class TestHostile:
         ],
         ids=str,
     )
-    def test_an_identity_that_is_none(self, copy: Path, change: dict[str, Any]) -> None:
+    def test_damaged_identity_is_reported_and_refused(
+        self, copy: Path, change: dict[str, Any]
+    ) -> None:
         rewritten(
             copy / "zarr.json", lambda root: root["attributes"]["vkbloom_grid"].update(change)
         )
@@ -612,7 +622,7 @@ class TestHostile:
             make(copy)
         assert contents(copy) == before
 
-    def test_values_of_any_depth_are_told(self) -> None:
+    def test_deeply_nested_values_are_named_in_differences(self) -> None:
         deep: list[Any] = []
         for _ in range(100_000):
             deep = [deep]
@@ -635,7 +645,7 @@ class TestHostile:
         ],
         ids=str,
     )
-    def test_an_arrays_metadata(
+    def test_changed_array_metadata_are_reported_and_mended(
         self, copy: Path, undisturbed: Path, name: str, change: dict[str, Any]
     ) -> None:
         rewritten(copy / name / "zarr.json", lambda metadata: metadata.update(change))
@@ -654,7 +664,9 @@ class TestHostile:
         assert contents(copy) == contents(undisturbed)
 
     @pytest.mark.parametrize("key", ["zarr.json", "final/zarr.json", "mean/zarr.json"])
-    def test_lists_in_lists_without_an_end(self, copy: Path, undisturbed: Path, key: str) -> None:
+    def test_endlessly_nested_metadata_are_reported_and_mended(
+        self, copy: Path, undisturbed: Path, key: str
+    ) -> None:
         (copy / key).write_text('{"attributes": ' + "[" * 100_000)
         (problem,) = check_grid(copy).problems
         assert problem.startswith(f"{key} is damaged")
@@ -684,7 +696,7 @@ def test_a_full_disk_keeps_what_is_done(tmp_path: Path, undisturbed: Path, room:
     assert contents(tmp_path / "a.zarr") == contents(undisturbed)
 
 
-def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
+def test_file_size_limit_leaves_no_partial_file(tmp_path: Path) -> None:
     # Files may not grow beyond a limit, which stops a write in its middle as a full disk does.
     code = (
         "import resource, signal, sys\n"

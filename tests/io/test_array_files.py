@@ -345,7 +345,7 @@ class TestWrite:
             assert inner[0x9003] == "2020:01:02 03:04:05"
             assert float(inner[33434]) == 0.5
 
-    def test_what_formats_refuse(self, tmp_path: Path) -> None:
+    def test_format_refuses_pixels_that_it_cannot_hold(self, tmp_path: Path) -> None:
         rgba = RNG.random((4, 5, 4), dtype=np.float32)
         for name in ("b.jpg", "b.hdr"):
             with pytest.raises(ValueError, match=r"no alpha; write array\[\.\.\., :3\]"):

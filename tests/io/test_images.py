@@ -213,7 +213,9 @@ class TestLoad:
 
     @pytest.mark.parametrize("content", [b"", b"hello\n", b"\x89PNG\r\n\x1a\n", bytes(300)])
     @pytest.mark.parametrize("suffix", ["png", "exr", "jpg", "unknown"])
-    def test_no_images(self, tmp_path: Path, content: bytes, suffix: str) -> None:
+    def test_file_that_is_not_an_image_is_refused(
+        self, tmp_path: Path, content: bytes, suffix: str
+    ) -> None:
         path = tmp_path / f"a.{suffix}"
         path.write_bytes(content)
         with pytest.raises(ValueError, match=f"a.{suffix}: "):
@@ -222,7 +224,7 @@ class TestLoad:
     @pytest.mark.parametrize(
         "suffix", ["png", "jpg", "exr", "hdr", "tif", "bmp", "tga", "webp", "gif"]
     )
-    def test_files_that_end_early(self, tmp_path: Path, suffix: str) -> None:
+    def test_truncated_file_is_refused(self, tmp_path: Path, suffix: str) -> None:
         numbers = {"exr": "half", "hdr": "float"}.get(suffix, "uint8")
         pixels = np.abs(noise(60, 80, 3, numbers=numbers))
         path = store(tmp_path / f"a.{suffix}", pixels, numbers)
@@ -232,7 +234,7 @@ class TestLoad:
         with pytest.raises(ValueError, match=f"a.{suffix}: "):
             load(path)
 
-    def test_a_size_that_cannot_be_true(self, tmp_path: Path) -> None:
+    def test_size_larger_than_the_file_allows_is_refused(self, tmp_path: Path) -> None:
         path = tmp_path / "a.exr"
         for width, height in ((100_000, 1), (20_000, 20_000)):
             fields = {"full_width": width, "full_height": height}
@@ -256,7 +258,7 @@ class TestLoad:
                 call()
         assert other.read_bytes() == path.read_bytes()
 
-    def test_damage_whose_message_is_no_text(self, tmp_path: Path) -> None:
+    def test_damage_with_an_undecodable_message_is_an_error(self, tmp_path: Path) -> None:
         path = store(tmp_path / "a.exr", noise(4, 4, 3, numbers="half"), "half")
         # OpenEXR's message holds the type of the attribute.
         content = path.read_bytes()
@@ -595,7 +597,7 @@ class TestSave:
         assert (spec["Software"], spec["vkbloom:x"]) == ("vkbloom 9", "y")
 
     @pytest.mark.parametrize("name", ["b.unknown", "b", "b.null", "b.term", "b.heic"])
-    def test_extensions_that_cannot_be_written(self, tmp_path: Path, name: str) -> None:
+    def test_unknown_extension_is_refused(self, tmp_path: Path, name: str) -> None:
         made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         for write in (lambda: save(made, tmp_path / name), lambda: check_writable(name)):
             with pytest.raises(ValueError, match="is not the extension of a writable image format"):
@@ -603,21 +605,21 @@ class TestSave:
         assert only_in(tmp_path) == []
         check_writable("b.PNG")
 
-    def test_pictures_that_no_format_holds(self, tmp_path: Path) -> None:
+    def test_picture_that_no_format_holds_is_refused(self, tmp_path: Path) -> None:
         made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         # Of depth only.
         with pytest.raises(ValueError, match=r"b\.zfile: zfile cannot hold this picture"):
             save(made, tmp_path / "b.zfile")
         assert only_in(tmp_path) == []
 
-    def test_folders_that_are_not_there(self, tmp_path: Path) -> None:
+    def test_missing_folder_is_an_error(self, tmp_path: Path) -> None:
         made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
         with pytest.raises(FileNotFoundError) as caught:
             save(made, tmp_path / "no" / "b.png")
         assert caught.value.filename == str(tmp_path / "no" / "b.png")
 
     @pytest.mark.parametrize("name", ["b.png", "b.exr"])
-    def test_what_is_there_stays_until_all_is_written(
+    def test_old_file_stays_until_the_new_one_is_complete(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
     ) -> None:
         target = tmp_path / name

@@ -147,7 +147,7 @@ def test_images_of_all_kinds_by_turns(renderer: Renderer) -> None:
             assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
-def test_only_what_a_setting_changes_runs_again(renderer: Renderer) -> None:
+def test_change_of_a_setting_runs_only_dependent_passes(renderer: Renderer) -> None:
     image = picture(31, 20, 3, "float32", seed=3)
     whole = set(renderer.apply(image, Separable()).timings)
     last = set(renderer.apply(image, Separable(exposure=1.0)).timings)
@@ -158,7 +158,7 @@ def test_only_what_a_setting_changes_runs_again(renderer: Renderer) -> None:
     assert any("glow" in name for name in whole)
 
 
-def test_what_is_not_wanted_does_not_run(renderer: Renderer) -> None:
+def test_passes_of_unrequested_framebuffers_do_not_run(renderer: Renderer) -> None:
     image = picture(31, 20, 3, "float32", seed=4)
     frames = renderer.apply(image, attachments=("glow",))
     assert list(frames) == ["glow"]
@@ -634,7 +634,7 @@ def test_closed_renderer() -> None:
         next(frames)
 
 
-def test_a_failed_call_leaves_what_was_there(renderer: Renderer) -> None:
+def test_failed_call_keeps_the_previous_framebuffers(renderer: Renderer) -> None:
     image = picture(8, 8, 3, "uint8", seed=18)
     renderer.apply(image)
     with pytest.raises(ValueError, match="attachments"):

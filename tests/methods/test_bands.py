@@ -80,7 +80,9 @@ def test_bands_are_the_whole(renderer: Renderer, name: str, height: int, glows: 
         (vkbloom.PygfxBloom(filter_radius=1.0, intensity=0.5), 64),
     ],
 )
-def test_what_needs_the_whole_image(renderer: Renderer, settings: Settings, height: int) -> None:
+def test_methods_that_need_the_complete_image_have_no_bands(
+    renderer: Renderer, settings: Settings, height: int
+) -> None:
     image = band("uint8" if settings.dither else "float32", glows=False, height=height)
     assert BloomByBands.of(renderer._core, settings, image, height, 16) is None
 

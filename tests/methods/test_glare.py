@@ -272,7 +272,7 @@ def test_a_flat_image_keeps_its_value(renderer: Renderer) -> None:
     assert light[32, 32, 0] == pytest.approx(0.5, rel=1e-5)
 
 
-def test_only_what_changed_runs(new_renderer: Callable[[], Renderer]) -> None:
+def test_change_of_glare_runs_only_dependent_passes(new_renderer: Callable[[], Renderer]) -> None:
     """A stage's intensity runs only the sum; a field of it only the stage."""
     own = new_renderer()
     image = hdr_picture(64, 48, 3, "float32")
@@ -287,7 +287,7 @@ def test_only_what_changed_runs(new_renderer: Callable[[], Renderer]) -> None:
     assert list(own.apply(image, turned.replace(exposure=1)).timings) == ["final"]
 
 
-def test_only_what_dirt_changes_runs(new_renderer: Callable[[], Renderer]) -> None:
+def test_change_of_dirt_runs_only_dependent_passes(new_renderer: Callable[[], Renderer]) -> None:
     """A picture is sent to the device once; in a batch each request has its own."""
     own = new_renderer()
     image = hdr_picture(64, 48, 3, "float32")

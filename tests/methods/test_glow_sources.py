@@ -264,7 +264,7 @@ def test_masks_of_other_types(renderer: Renderer) -> None:
     assert_array_equal(glow(memoryview(singles.data)), glow(singles))
 
 
-def test_what_is_given_again_is_not_sent_again(renderer: Renderer) -> None:
+def test_unchanged_mask_and_emission_run_no_pass(renderer: Renderer) -> None:
     image, emission = picture(24, 16, 4, seed=8), picture(24, 16, 4, seed=9)
     mask = np.random.default_rng(1).random((16, 24), dtype=np.float32)
     settings = Separable(composite="mix")
@@ -300,7 +300,7 @@ def test_nan_and_infinity_of_an_emission_count(renderer: Renderer) -> None:
 # --- Plans, grids, the explorer ---
 
 
-def test_plans_of_what_is_given(renderer: Renderer) -> None:
+def test_plans_know_mask_and_emission(renderer: Renderer) -> None:
     image, settings = picture(16, 12, 4), Separable(composite="mix")
     mask = np.ones((12, 16), np.float32)
     plain = renderer.plan(image, settings)
@@ -393,7 +393,7 @@ IMAGE = np.zeros((6, 8, 4), np.float32)
         ({"emission": 1}, TypeError, "emission: an array is needed, not int"),
     ],
 )
-def test_what_does_not_fit(
+def test_wrong_mask_emission_or_alpha_is_refused(
     renderer: Renderer, kwargs: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):
@@ -403,7 +403,7 @@ def test_what_does_not_fit(
 
 @pytest.mark.parametrize("alpha", ["max", "blur"])
 @pytest.mark.parametrize("bloom", [True, False])
-def test_an_alpha_that_is_not_there(renderer: Renderer, alpha: Any, bloom: bool) -> None:
+def test_missing_alpha_is_refused(renderer: Renderer, alpha: Any, bloom: bool) -> None:
     settings = Separable(alpha=alpha, bloom=bloom)
     with pytest.raises(ValueError, match=f"alpha: '{alpha}' needs an image of 4 channels"):
         renderer.apply(IMAGE[..., :3], settings)

@@ -152,13 +152,13 @@ def test_levels_after_the_last_weight_are_not_made(renderer: Renderer) -> None:
         ({"composite": "under"}, "composite: 'under' is not one of screen, soft_light"),
     ],
 )
-def test_what_godot_refuses(changes: dict[str, Any], message: str) -> None:
+def test_godot_refuses_wrong_fields(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         GodotBloom(**changes)
 
 
 @pytest.mark.parametrize("composite", ["soft_light", "replace", "under"])
-def test_others_lack_its_composites(composite: Any) -> None:
+def test_other_methods_refuse_godots_composites(composite: Any) -> None:
     with pytest.raises(ValueError, match=r"composite: .* is not one of add, mix, screen, which"):
         Separable(composite=composite)
 

@@ -97,7 +97,9 @@ def test_the_gain_of_a_whole_chain() -> None:
         (3.0, TypeError, "is not a sequence of numbers"),
     ],
 )
-def test_what_are_no_weights(weights: Any, error: type[Exception], message: str) -> None:
+def test_wrong_level_weights_are_refused(
+    weights: Any, error: type[Exception], message: str
+) -> None:
     with pytest.raises(error, match=message):
         Pyramid(level_weights=weights)
 

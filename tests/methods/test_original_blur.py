@@ -39,7 +39,9 @@ def blurred(renderer: Renderer, glow: NDArray[Any], settings: Separable) -> NDAr
     return frames["blur_vertical"][REACH:-REACH, :, :3].astype(int)
 
 
-def test_the_device(renderer: Renderer, original: dict[str, NDArray[Any]]) -> None:
+def test_device_equals_the_original_blur(
+    renderer: Renderer, original: dict[str, NDArray[Any]]
+) -> None:
     expected = original["blur_vertical"][REACH:-REACH].astype(int)
     assert expected.max() > 200
     apart = np.abs(blurred(renderer, original["glow"], SETTINGS) - expected)
@@ -48,7 +50,7 @@ def test_the_device(renderer: Renderer, original: dict[str, NDArray[Any]]) -> No
     assert (apart == 0).mean() >= 0.99
 
 
-def test_the_reference(original: dict[str, NDArray[Any]]) -> None:
+def test_reference_equals_the_original_blur(original: dict[str, NDArray[Any]]) -> None:
     frames = reference.apply(original["glow"], SETTINGS)
     values = 255 * np.clip(frames["blur_vertical"][REACH:-REACH, :, :3], 0, 1)
     # Half a level for the rounding of the original, and what single precision adds.
@@ -60,7 +62,7 @@ def test_the_reference(original: dict[str, NDArray[Any]]) -> None:
     [{"blur_strength": 1.4}, {"blur_scale": 1.2}, {"first_tap": 0}],
     ids=lambda changes: next(iter(changes)),
 )
-def test_another_blur_is_told_apart(
+def test_another_blur_differs_from_the_original(
     renderer: Renderer, original: dict[str, NDArray[Any]], changes: dict[str, Any]
 ) -> None:
     wrong = blurred(renderer, original["glow"], SETTINGS.replace(**changes))

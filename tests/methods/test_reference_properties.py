@@ -1,8 +1,6 @@
-"""Properties of the NumPy reference, with generated images and settings."""
+"""Properties of the NumPy reference alone; test_properties has those of the device too."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,76 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.methods.reference_cases import (
-    FIREFLY,
-    METHODS,
-    impulse,
-    random_image,
-)
+from tests.methods.reference_cases import impulse, random_image
 from vkbloom import DualKawase, Pyramid, Separable, reference
 
 SIZES = st.tuples(st.integers(1, 24), st.integers(1, 24))
-
-
-@pytest.mark.parametrize("settings", METHODS)
-@given(size=SIZES, target=SIZES, factors=st.tuples(st.floats(-3, 3), st.floats(-3, 3)))
-def test_blur_is_linear(
-    settings: Any, size: tuple[int, int], target: tuple[int, int], factors: tuple[float, float]
-) -> None:
-    a, b = random_image(*size, seed=2), random_image(*size, seed=3)
-    mixed = reference.blur(factors[0] * a + factors[1] * b, settings, target)
-    blurred_a, blurred_b = (reference.blur(image, settings, target) for image in (a, b))
-    # The gain of loops and layers makes values of up to about 60 out of 0..1.
-    assert_allclose(mixed, factors[0] * blurred_a + factors[1] * blurred_b, rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("settings", [*METHODS, FIREFLY])
-@given(size=SIZES, target=SIZES)
-def test_blur_has_no_favourite_side(
-    settings: Any, size: tuple[int, int], target: tuple[int, int]
-) -> None:
-    glow = random_image(*size)
-    bloom = reference.blur(glow, settings, target)
-    for flip in (np.fliplr, np.flipud):
-        # A flip reverses the order of the sums, and positions round differently.
-        flipped = reference.blur(flip(glow), settings, target)
-        assert_allclose(flipped, flip(bloom), rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("settings", [p for p in [*METHODS, FIREFLY] if p.id != "outline"])
-@given(size=SIZES)
-def test_blur_has_no_favourite_axis(settings: Any, size: tuple[int, int]) -> None:
-    glow = random_image(*size)
-    transposed = reference.blur(glow.swapaxes(0, 1), settings)
-    assert_allclose(transposed, reference.blur(glow, settings).swapaxes(0, 1), rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("settings", [*METHODS, FIREFLY])
-@given(size=SIZES, target=SIZES)
-def test_bloom_lies_between_the_extremes_times_the_gain(
-    settings: Any, size: tuple[int, int], target: tuple[int, int]
-) -> None:
-    glow = random_image(*size)
-    bloom = reference.blur(glow, settings, target) / reference.gain(settings)
-    assert bloom.min() >= glow.min() - 1e-12
-    assert bloom.max() <= glow.max() + 1e-12
-
-
-@pytest.mark.parametrize("settings", METHODS)
-@given(x=st.integers(56, 72), y=st.integers(56, 72))
-def test_energy_of_an_impulse_is_the_gain(settings: Any, x: int, y: int) -> None:
-    if settings.method == "pyramid" and settings.levels > 3:
-        settings = Pyramid(levels=3)  # deeper levels reach the edge of this image
-    if getattr(settings, "radius", 1.0) != 1.0 or getattr(settings, "offset", 1.0) != 1.0:
-        # Taps off the grid of half texels weigh the texels of a level unequally: only the
-        # energy of a whole block of pixels that share a place in the levels is kept.
-        glow = np.zeros((128, 128, 1))
-        glow[y - y % 8 : y - y % 8 + 8, x - x % 8 : x - x % 8 + 8] = 1 / 64
-    else:
-        glow = impulse(128, 128, y, x)
-    assert reference.blur(glow, settings).sum() == pytest.approx(
-        reference.gain(settings), rel=1e-12
-    )
 
 
 @given(size=SIZES, scale=st.floats(0, 16), strength=st.floats(0, 4))

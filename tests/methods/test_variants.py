@@ -288,7 +288,7 @@ def test_one_pass_stands_for_all_of_a_final(variant: str, varied: Renderer) -> N
     assert list(again.timings) == []
 
 
-def test_what_is_there_is_not_made_again(varied: Renderer) -> None:
+def test_cached_framebuffers_run_no_pass(varied: Renderer) -> None:
     image = hdr_picture(33, 44, 4, "float32", seed=6)
     frames = varied.apply(image, Separable())
     # Everything is cached, so a part of it runs nothing, and a change runs only the composite.
@@ -303,7 +303,7 @@ def ran(frames: Iterable[Frames]) -> list[list[str]]:
     return [list(one.timings) for one in frames]
 
 
-def test_a_sequence_makes_once_what_its_settings_share(variant: str, varied: Renderer) -> None:
+def test_sequence_runs_shared_passes_once(variant: str, varied: Renderer) -> None:
     image = hdr_picture(37, 52, 4, "float32", seed=7)
     whole = ["glow", "blur_vertical", "bloom", "final"]
     alone = ["final"] if is_fused(variant, varied) else whole
@@ -321,7 +321,7 @@ def test_a_sequence_makes_once_what_its_settings_share(variant: str, varied: Ren
     assert ran(singly) == [alone, rest, ["final"], ["final"]]
 
 
-def test_a_sequence_makes_nothing_for_others(variant: str, varied: Renderer) -> None:
+def test_sequence_runs_no_pass_of_other_settings(variant: str, varied: Renderer) -> None:
     image = hdr_picture(37, 52, 4, "float32", seed=8)
     fused = is_fused(variant, varied)
     alone = ["final"] if fused else ["blur_vertical", "bloom", "final"]

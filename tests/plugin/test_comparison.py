@@ -385,7 +385,7 @@ class TestArguments:
             (np.zeros((0, 4, 3), np.uint8), ValueError, r"a: shape \(0, 4, 3\) is not"),
         ],
     )
-    def test_what_is_no_image(self, a: Any, error: type[Exception], message: str) -> None:
+    def test_wrong_image_is_refused(self, a: Any, error: type[Exception], message: str) -> None:
         for function in (compare, difference):
             with pytest.raises(error, match=message):
                 function(a, noise_image(8, 8, 3))

@@ -415,7 +415,9 @@ class TestProbe:
             (lambda image: image.sum(), ValueError, "it returns shape"),
         ],
     )
-    def test_what_is_no_bloom(self, bloom: Any, error: type[Exception], message: str) -> None:
+    def test_callable_that_is_not_a_bloom_is_refused(
+        self, bloom: Any, error: type[Exception], message: str
+    ) -> None:
         with pytest.raises(error, match=f"bloom: {message}"):
             testing.assert_gain(bloom, 1.0, SMALL)
 

@@ -155,7 +155,7 @@ def test_image(frame_regression):
             ("{'a': [[1.0]]}", "*TypeError: frames: a: list is not a NumPy array*"),
         ],
     )
-    def test_what_cannot_be_a_reference(
+    def test_wrong_reference_is_refused(
         self, project: pytest.Pytester, image: str, message: str
     ) -> None:
         write(

@@ -213,7 +213,7 @@ class TestSequences:
         np.testing.assert_allclose(found(4).shift, found(0).shift, atol=1e-5)
         fails(testing.assert_stable, self.history(0.25), texel=3, temporal=True, probe=SMALL)
 
-    def test_images_that_are_missing(self) -> None:
+    def test_missing_images_are_refused(self) -> None:
         with pytest.raises(ValueError, match="bloom: it returns 0 images for 1"):
             testing.stability(lambda images: [], temporal=True, probe=SMALL)
 

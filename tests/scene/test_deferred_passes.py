@@ -54,14 +54,14 @@ CHANGES: list[tuple[dict[str, Any], list[str]]] = [
 
 
 @pytest.mark.parametrize(("changes", "ran"), CHANGES)
-def test_what_runs_after_a_change(
+def test_change_runs_only_dependent_passes(
     renderer: Renderer, scene: Scene, changes: dict[str, Any], ran: list[str]
 ) -> None:
     deferred(renderer, scene)
     assert list(deferred(renderer, scene, Separable(**changes)).timings) == ran
 
 
-def test_what_is_not_wanted_does_not_run(
+def test_passes_of_unrequested_framebuffers_do_not_run(
     new_renderer: Callable[[], Renderer], scene: Scene
 ) -> None:
     renderer = new_renderer()

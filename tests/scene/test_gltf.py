@@ -535,7 +535,7 @@ def test_a_small_file_cannot_ask_for_any_amount_of_memory(
     "content",
     [b"", b"{", b"[]", b"null", b"5", b'{"asset": 3}', b"\xff\xfe", b"[" * 100000, b"glTF"],
 )
-def test_what_is_no_gltf(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_not_gltf_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "mesh.gltf"
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"mesh\.gltf: "):

@@ -179,7 +179,7 @@ def test_other_sources(source: Any) -> None:
         skybox.load(source)
 
 
-def test_levels_that_are_no_mip_chain() -> None:
+def test_levels_that_are_not_a_mip_chain_are_refused() -> None:
     four, two, one = skybox.load(faces_of(4)).levels
     assert len(Cubemap((four, two)).levels) == 2
     for levels in ((), (four, one), (four, two.astype("f4")), (one, one), (four[..., :3],)):
@@ -296,7 +296,7 @@ def test_ktx_headers_that_are_refused(tmp_path: Path, header: dict[str, int], me
 
 
 @pytest.mark.parametrize("content", [b"", b"\xabKTX", b"\xabKTX 20\xbb\r\n\x1a\n", b"PNG"])
-def test_what_is_no_ktx(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_not_ktx_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "sky.ktx"
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"sky\.ktx: "):

@@ -23,14 +23,7 @@ Read = TypeVar("Read")
 
 
 def read_ahead(read: Callable[[str], Read], sources: Iterable[str]) -> Iterator[Read]:
-    """Read each source and yield the result; a thread reads the next source at the same time.
-
-    Parameters
-    ----------
-    read : callable
-        Takes a source. Its exceptions are raised when the result would be yielded.
-    sources : iterable of str
-    """
+    """Read each source and yield the result; a thread reads the next source at the same time."""
     context = click.get_current_context()
 
     def read_in_context(source: str) -> Read:

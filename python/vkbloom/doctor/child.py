@@ -25,14 +25,9 @@ _OPEN_DRIVER: Final = "import ctypes, sys; ctypes.CDLL(sys.argv[1]).vk_icdGetIns
 class Answer:
     """The answer of a child process.
 
-    Attributes
-    ----------
-    value : mapping or None
-        The findings; None if the process failed.
-    failure : str
-        Why the process failed, in one sentence; "" if it did not.
-    messages : tuple of str
-        The lines that the process wrote to standard error.
+    - `value`: The findings; None if the process failed.
+    - `failure`: Why the process failed, in one sentence; "" if it did not.
+    - `messages`: The lines that the process wrote to standard error.
     """
 
     value: Mapping[str, Any] | None
@@ -41,19 +36,7 @@ class Answer:
 
 
 def ask(*question: str, environment: Mapping[str, str] | None = None) -> Answer:
-    """Run `vkbloom.doctor.probe` with arguments and return its answer.
-
-    Parameters
-    ----------
-    *question : str
-        The arguments.
-    environment : mapping of str to str, optional
-        Environment variables to add to those of this process.
-
-    Returns
-    -------
-    Answer
-    """
+    """Run `vkbloom.doctor.probe` with arguments and return its answer."""
     ended = _run(["-m", "vkbloom.doctor.probe", *question], environment)
     if isinstance(ended, str):
         return Answer(None, ended)
@@ -70,18 +53,7 @@ def ask(*question: str, environment: Mapping[str, str] | None = None) -> Answer:
 
 
 def why_driver_does_not_open(library: str) -> str:
-    """Open a driver's library as the Vulkan loader would.
-
-    Parameters
-    ----------
-    library : str
-        A path, or a file name that the system's search finds.
-
-    Returns
-    -------
-    str
-        Why it cannot be used, in one sentence; "" if it can.
-    """
+    """Open a driver's library as the Vulkan loader would."""
     ended = _run(["-c", _OPEN_DRIVER, library], None)
     if isinstance(ended, str):
         return ended

@@ -94,18 +94,7 @@ def _listed(replacing: str | None) -> list[_Listed]:
 
 
 def examine(loader_version: tuple[int, ...] | None) -> list[Finding]:
-    """Examine every driver manifest, in the loader's order.
-
-    Parameters
-    ----------
-    loader_version : tuple of int or None
-        Version of the Vulkan loader; None if it is not known.
-
-    Returns
-    -------
-    list of Finding
-        A finding about the search, then one for each manifest.
-    """
+    """Examine every driver manifest, in the loader's order."""
     if sys.platform == "win32":
         return [
             Finding("drivers", "note", "not examined: on Windows the registry lists the drivers")
@@ -194,15 +183,7 @@ def _manifest(entry: _Listed) -> Finding:
 
 
 def _read(path: Path) -> tuple[str, str]:
-    """Return the library, as a path or name to open, and the architecture of a manifest.
-
-    Raises
-    ------
-    OSError
-        The file does not exist or cannot be read.
-    ValueError
-        The file is not a manifest; the message says why.
-    """
+    """Return the library, as a path or name to open, and the architecture of a manifest."""
     try:
         content: Any = json.loads(path.read_bytes())
     except UnicodeDecodeError:

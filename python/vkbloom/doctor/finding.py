@@ -12,16 +12,10 @@ Status = Literal["ok", "note", "problem"]
 class Finding:
     """The result of one check.
 
-    Attributes
-    ----------
-    topic : str
-        What was checked, in one or two words.
-    status : {"ok", "note", "problem"}
-        "ok": correct; "note": information, nothing is broken; "problem": must be repaired.
-    found : str
-        What was found, and what it means.
-    advice : str
-        What to do; "" if nothing has to be done.
+    - `topic`: What was checked, in one or two words.
+    - `status`: "ok": correct; "note": information, nothing is broken; "problem": must be repaired.
+    - `found`: What was found, and what it means.
+    - `advice`: What to do; "" if nothing has to be done.
     """
 
     topic: str

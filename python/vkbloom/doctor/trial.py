@@ -54,14 +54,7 @@ def _rectangle(
 def render(renderer: Renderer) -> Frames:
     """Render the test scene: a body in the upper half, a glow in the left half.
 
-    Parameters
-    ----------
-    renderer : Renderer
-
-    Returns
-    -------
-    Frames
-        `SIZE` pixels with the bloom of `SETTINGS`.
+    Returns: `SIZE` pixels with the bloom of `SETTINGS`.
     """
     scene = Scene(
         body=_rectangle((-_BEYOND, _BEYOND), (-_BEYOND, _LIFT), _BODY),
@@ -76,15 +69,6 @@ def differences(frames: Frames) -> list[str]:
 
     The expected values of `glow` and `depth` follow from the geometry, those of `blur_vertical`,
     `bloom` and `final` come from `vkbloom.reference`.
-
-    Parameters
-    ----------
-    frames : Frames
-
-    Returns
-    -------
-    list of str
-        A sentence for each wrong framebuffer; empty if all are right.
     """
     glow = np.zeros_like(frames["glow"])
     glow[:, : glow.shape[1] // 2, :3] = np.round(255 * np.array(_GLOW))

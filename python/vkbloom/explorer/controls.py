@@ -31,18 +31,15 @@ _STEPS: Final = 200
 def controls() -> dict[str, Any]:
     """Describe methods, point-spread functions, stages and presets.
 
-    Returns
-    -------
-    dict
-        "methods": for each method its "defaults", and for each field with a control its "name",
-        "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
-        "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
-        range from "low" to "high", and "integer"; choices have "choices", and may have a name for
-        "none" of them. "functions": the same for the point-spread functions of a convolution; the
-        name of a field of the mask begins with "mask.". "glare": "stages", the same for the stages
-        of glare, and "presets", for each name of `glares` its stages. "presets": settings by name,
-        as from `Settings.to_dict`. "look": the fields that keep their values when another preset
-        or method is selected.
+    Returns: "methods": for each method its "defaults", and for each field with a control its
+    "name", "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
+    "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
+    range from "low" to "high", and "integer"; choices have "choices", and may have a name for
+    "none" of them. "functions": the same for the point-spread functions of a convolution; the name
+    of a field of the mask begins with "mask.". "glare": "stages", the same for the stages of glare,
+    and "presets", for each name of `glares` its stages. "presets": settings by name, as from
+    `Settings.to_dict`. "look": the fields that keep their values when another preset or method is
+    selected.
     """
     return {
         "methods": {
@@ -142,35 +139,13 @@ def _step(start: float, end: float) -> float:
 
 
 def settings_from(fields: object) -> Settings:
-    """Return the settings that a page sent.
-
-    Parameters
-    ----------
-    fields : mapping of str to object
-        As from `Settings.to_dict`, after JSON. Missing fields have their defaults.
-
-    Raises
-    ------
-    TypeError, ValueError
-        There is no such method or field, or a value has another type or is out of range.
-    """
+    """Return the settings that a page sent."""
     made: Settings = Settings.from_dict(fields)  # type: ignore[arg-type]
     return made
 
 
 def as_code(settings: Settings) -> str:
-    """Return Python code that makes the settings, after ``import vkbloom``.
-
-    Parameters
-    ----------
-    settings : Settings
-
-    Returns
-    -------
-    str
-        A preset by its name, with changed fields if needed; otherwise the method with the fields
-        that are not the default.
-    """
+    """Return Python code that makes the settings, after ``import vkbloom``."""
     look = {name: getattr(settings, name) for name in _LOOK}
     for name, preset in presets.items():
         if preset != type(preset)() and type(preset) is type(settings):

@@ -28,15 +28,7 @@ _MOST_PIXELS: Final = 2**13
 class Measure:
     """A loss against one target.
 
-    Parameters
-    ----------
-    target : ndarray of float64, shape (H, W, 3)
-    loss : str or callable
-
-    Raises
-    ------
-    ValueError
-        The loss needs light in the target, and there is none.
+    `target`: ndarray of float64, shape (H, W, 3).
     """
 
     target: NDArray[np.float64]

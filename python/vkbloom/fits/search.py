@@ -43,18 +43,10 @@ class _Spent(Exception):
 class Search:
     """A search in one space, at one size of the image.
 
-    Parameters
-    ----------
-    space : Space
-    measure : Measure
-    render : callable
-        Takes settings, returns the framebuffer as float64 (H, W, 3).
-    max_calls : int
-        How often it may be called.
-    costs : sequence of int
-        Passes that run after a change of each varied field alone.
-    told : callable
-        Is called with the loss of each call.
+    - `render`: Takes settings, returns the framebuffer as float64 (H, W, 3).
+    - `max_calls`: How often it may be called.
+    - `costs`: Passes that run after a change of each varied field alone.
+    - `told`: Is called with the loss of each call.
     """
 
     def __init__(

@@ -32,17 +32,10 @@ _FEW: Final = 16
 class Axis:
     """One varied field.
 
-    Parameters
-    ----------
-    name : str
-    kind : {"number", "integer", "choice"}
-    low, high : float
-        Of a number.
-    scale : float or None
-        A number x is at log(1 + (x - low) / scale), so that steps are relative to x above the
-        scale; None: at x.
-    choices : tuple
-        Of a choice or a flag.
+    - `low`, `high`: Of a number.
+    - `scale`: A number x is at log(1 + (x - low) / scale), so that steps are relative to x above
+      the scale; None: at x.
+    - `choices`: Of a choice or a flag.
     """
 
     name: str
@@ -94,11 +87,7 @@ class Axis:
 class Space:
     """The varied fields of one candidate.
 
-    Parameters
-    ----------
-    start : Settings
-        Its other fields stay as they are.
-    axes : tuple of Axis
+    `start`: Its other fields stay as they are.
     """
 
     start: Settings
@@ -128,23 +117,7 @@ def space_of(
 ) -> Space:
     """Return the space of the varied fields of some settings.
 
-    Parameters
-    ----------
-    settings : Settings
-    vary : sequence of str
-    bounds : mapping of str to sequence
-        Narrower bounds of some of them; the others have their declared ranges.
-    brightest : float
-        Thresholds above it let nothing through and are left out.
-    height : int
-        Of the image in pixels. Buffers with more rows take long, and add nothing.
-
-    Raises
-    ------
-    ValueError
-        The method has no such field, it cannot vary, or a bound is out of its range.
-    TypeError
-        A bound is not a pair of numbers.
+    `height`: Of the image in pixels. Buffers with more rows take long, and add nothing.
     """
     fields = fields_of(type(settings))
     axes = []

@@ -137,14 +137,8 @@ def translate(
 def lights(size: tuple[int, int]) -> NDArray[np.float32]:
     """Return the picture of four lights.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-
-    Returns
-    -------
-    ndarray of float32, shape (H, W, 3)
+    - `size`: Width and height in pixels.
+    - Returns: ndarray of float32, shape (H, W, 3).
     """
     width, height = size
     image = np.zeros((height, width, 3), np.float32)

@@ -39,33 +39,20 @@ USUAL_METRICS: Final[tuple[Metric, ...]] = ("ssim", "psnr", "flip")
 class Comparison:
     """The result of comparing two images.
 
-    Parameters
-    ----------
-    mismatches : tuple of str
-        Reasons why the images do not match at any limits: another shape, integers against floats,
-        NaN or infinity. If shape or kind differ, the figures are None.
-    max_error : float or None
-        Largest absolute difference of two finite values; integers are scaled to 0..1.
-    max_error_at : (int, int, int) or None
-        Its x, y and channel. None if there is no error.
-    max_error_values : (float, float) or None
-        The two values at that position.
-    mean_error : float or None
-        Mean absolute difference of all finite values.
-    percent_over : float or None
-        Percentage of pixels that have a channel which differs by more than `threshold` and
-        `relative` allow, or which is not finite in only one image.
-    threshold, relative : float
-        The arguments of `compare`.
-    data_range : float or None
-        The data range for SSIM and PSNR.
-    ssim, psnr, flip : float or None
-        Structural similarity, peak signal-to-noise ratio in dB (inf if nothing differs) and mean
-        FLIP.
-    cvvdp : float or None
-        ColorVideoVDP in just-objectionable differences: 10 where no difference is visible.
-    not_computed : mapping of str to str
-        Why one of these is None, by its name; also "not asked for".
+    - `mismatches`: Reasons why the images do not match at any limits: another shape, integers
+      against floats, NaN or infinity. If shape or kind differ, the figures are None.
+    - `max_error`: Largest absolute difference of two finite values; integers are scaled to 0..1.
+    - `max_error_at`: Its x, y and channel. None if there is no error.
+    - `max_error_values`: The two values at that position.
+    - `mean_error`: Mean absolute difference of all finite values.
+    - `percent_over`: Percentage of pixels that have a channel which differs by more than
+      `threshold` and `relative` allow, or which is not finite in only one image.
+    - `threshold`, `relative`: The arguments of `compare`.
+    - `data_range`: The data range for SSIM and PSNR.
+    - `ssim`, `psnr`, `flip`: Structural similarity, peak signal-to-noise ratio in dB (inf if
+      nothing differs) and mean FLIP.
+    - `cvvdp`: ColorVideoVDP in just-objectionable differences: 10 where no difference is visible.
+    - `not_computed`: Why one of these is None, by its name; also "not asked for".
     """
 
     mismatches: tuple[str, ...]
@@ -218,26 +205,10 @@ def difference(
 ) -> tuple[NDArray[np.float32], float]:
     """Make a picture of the differences of two images.
 
-    Parameters
-    ----------
-    a, b : ndarray
-        As for `compare`, of one shape, both integers or both floats.
-    scale : float, optional
-        Factor of the differences, above 0. Default: makes the largest 1.
-
-    Returns
-    -------
-    picture : ndarray, shape (H, W, 3)
-        Absolute differences of red, green and blue in 0..1, or of one channel in grey; differences
-        of further channels, such as alpha, brighten all three. Pixels that are not finite in only
-        one image are magenta.
-    scale : float
-        The factor that was used; 1 if nothing differs.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As for `compare`; also if the images do not match.
+    - `a`, `b`: As for `compare`, of one shape, both integers or both floats.
+    - Returns: `picture`, ndarray, shape (H, W, 3): absolute differences of red, green and blue in
+      0..1, or of one channel in grey; differences of further channels, such as alpha, brighten all
+      three. Pixels that are not finite in only one image are magenta.
     """
     if scale is not None and not 0 < scale < math.inf:
         raise ValueError(f"scale: {scale!r} is out of range, finite and above 0")
@@ -430,24 +401,8 @@ def flip_map(
 ) -> NDArray[np.float32]:
     """Return FLIP of every pixel; its mean is the figure of `compare`.
 
-    Parameters
-    ----------
-    a, b : ndarray
-        As for `compare`, of one shape, both integers or both floats.
-    pixels_per_degree : float, optional
-        As for `compare`.
-
-    Returns
-    -------
-    ndarray, shape (H, W)
-        0 (no visible difference) to 1.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As for `compare`; also if the images do not match.
-    ModuleNotFoundError
-        OpenImageIO 3.2 or later is missing.
+    - `a`, `b`: As for `compare`, of one shape, both integers or both floats.
+    - Returns: ndarray, shape (H, W): 0 (no visible difference) to 1.
     """
     a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)

@@ -10,17 +10,7 @@ __all__ = ["described_parameters"]
 
 
 def described_parameters(kind: type) -> dict[str, str]:
-    """Return the first sentence about each parameter from a class's numpydoc docstring.
-
-    Parameters
-    ----------
-    kind : type
-
-    Returns
-    -------
-    dict of str to str
-        Empty if there is no docstring, as with ``python -OO``.
-    """
+    """Return the first sentence about each parameter from a class's numpydoc docstring."""
     lines = inspect.cleandoc(kind.__doc__ or "").splitlines()
     texts: dict[str, list[str]] = {}
     names: list[str] = []

@@ -33,16 +33,7 @@ _CROSS: Final = ("2 / 3", "2 / 1", "3 / 2", "1 / 2", "2 / 2", "2 / 4")
 
 
 def fields_html(settings: DataclassInstance) -> str:
-    """Return settings as a table: changed fields, then the others in a collapsed section.
-
-    Parameters
-    ----------
-    settings : dataclass instance
-
-    Returns
-    -------
-    str
-    """
+    """Return settings as a table: changed fields, then the others in a collapsed section."""
     changed, unchanged = [], []
     for field in dataclasses.fields(settings):
         value = getattr(settings, field.name)
@@ -60,34 +51,13 @@ def fields_html(settings: DataclassInstance) -> str:
 def scene_html(rows: Iterable[tuple[str, str]], faces: NDArray[Any] | None) -> str:
     """Return a scene as a table, with the faces of its sky as a cross.
 
-    Parameters
-    ----------
-    rows : iterable of (str, str)
-        Names and descriptions of the scene's parts.
-    faces : ndarray, shape (6, N, N, C), or None
-        Faces of the sky: +x, -x, +y, -y, +z, -z.
-
-    Returns
-    -------
-    str
+    `faces`: ndarray, shape (6, N, N, C), or None; Faces of the sky: +x, -x, +y, -y, +z, -z.
     """
     return _block("Scene", _table(rows) + ("" if faces is None else _cross(faces)))
 
 
 def renderer_html(info: AdapterInfo, *, closed: bool) -> str:
-    """Return a renderer's adapter as a table.
-
-    Parameters
-    ----------
-    info : AdapterInfo
-        The renderer's adapter.
-    closed : bool
-        Whether the renderer is closed.
-
-    Returns
-    -------
-    str
-    """
+    """Return a renderer's adapter as a table."""
     driver = " ".join(part for part in (info.driver, info.driver_info) if part)
     rows = [
         ("adapter", info.name),

@@ -39,16 +39,6 @@ def leading_png(frames: Framebuffers) -> bytes:
     the sRGB curve, unless the settings' encoding was already applied to them; `normal`
     is shown as (n + 1) / 2, `position` with each axis stretched to 0..1, depth from
     white (nearest) to black (farthest). NaN counts as 0.
-
-    Parameters
-    ----------
-    frames : Framebuffers
-        At least one framebuffer.
-
-    Returns
-    -------
-    bytes
-        An 8-bit PNG file of 1, 3 or 4 channels, of the framebuffer's size.
     """
     return png(_picture(frames, leading(frames)))
 
@@ -60,16 +50,6 @@ def contact_sheet_html(frames: Framebuffers) -> str:
     averaging. Linear floats with more than one pixel in a hundred above 1 are shown with less
     exposure; the caption gives the exposure, and the range of all floats. Text inherits the
     page's colours.
-
-    Parameters
-    ----------
-    frames : Framebuffers
-        Any number of framebuffers.
-
-    Returns
-    -------
-    str
-        One ``div`` without script, with the pictures in it, and all texts escaped.
     """
     page = ['<div style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em">']
     page.append(
@@ -135,26 +115,7 @@ def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) 
     `final`; small ones are enlarged by repeating pixels. OpenImageIO draws the labels; if it or
     its fonts are missing, they are left out with a warning.
 
-    Parameters
-    ----------
-    frames : Framebuffers
-        At least one framebuffer.
-    columns : int, default 3
-        Pictures in a row, 1 to 32.
-    width : int, default 320
-        Width of a picture in pixels, 128 to 4096.
-
-    Returns
-    -------
-    bytes
-        An 8-bit RGB PNG file.
-
-    Raises
-    ------
-    TypeError
-        If `columns` or `width` is not an integer.
-    ValueError
-        If `columns` or `width` is out of range, or `frames` is empty.
+    `width`: Width of a picture in pixels, 128 to 4096.
     """
     columns = check_index("columns", columns, 1, 32)
     width = check_index("width", width, 128, 4096)
@@ -196,12 +157,8 @@ def labelled(
 ) -> NDArray[np.uint8]:
     """Draw light grey texts at (x, baseline y); leave them out if there is no font.
 
-    Parameters
-    ----------
-    sheet : ndarray, shape (H, W, 3)
-    labels : iterable of (int, int, str)
-    size : int
-        Font size in pixels.
+    - `sheet`: ndarray, shape (H, W, 3).
+    - `size`: Font size in pixels.
     """
     try:
         oiio = import_extra("OpenImageIO", "images", "A labelled contact sheet")
@@ -236,24 +193,10 @@ def picture(
 ) -> NDArray[np.uint8]:
     """Convert an image to a viewable 8-bit picture, as `leading_png` documents.
 
-    Parameters
-    ----------
-    array : ndarray, shape (H, W) or (H, W, C)
-    name : str
-        Name of the framebuffer; "normal" and "position" have their own mappings.
-    encoded : bool, default False
-        Whether floats are already encoded.
-    size : (int, int), optional
-        Width and height of the picture: pixels are averaged or repeated.
-    range_of : ndarray, optional
-        Depth and position are stretched by this array's range, so that two pictures can be
-        compared.
-    stops : float, default 0
-        Exposure of float colours in stops; other values do not change.
-
-    Returns
-    -------
-    ndarray of uint8, shape (H, W, C)
+    - `array`: ndarray, shape (H, W) or (H, W, C).
+    - `size`: Width and height of the picture: pixels are averaged or repeated.
+    - `stops`: Exposure of float colours in stops; other values do not change.
+    - Returns: ndarray of uint8, shape (H, W, C).
     """
     values = np.atleast_3d(array).astype(np.float32)
     ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)
@@ -360,17 +303,7 @@ def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
     It lets notebooks show pictures with only NumPy installed; OpenImageIO writes the files that
     users save.
 
-    Parameters
-    ----------
-    pixels : ndarray of uint8, shape (H, W, C)
-        1, 3 or 4 channels.
-    level : int, default -1
-        Compression level of zlib: 1 (fast) to 9 (small); -1 is its default.
-
-    Returns
-    -------
-    bytes
-        A complete PNG file.
+    `pixels`: ndarray of uint8, shape (H, W, C); 1, 3 or 4 channels.
     """
     height, width, channels = pixels.shape
     rows = pixels.reshape(height, width * channels)

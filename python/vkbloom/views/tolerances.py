@@ -131,21 +131,7 @@ class Tolerances:
 def failures(
     found: Comparison, tolerances: Tolerances, metrics: Collection[Metric]
 ) -> list[tuple[Stage, str]]:
-    """List the limits that a comparison exceeds.
-
-    Parameters
-    ----------
-    found : Comparison
-        Made with the `atol` and `rtol` of the tolerances as `threshold` and `relative`.
-    tolerances : Tolerances
-    metrics : collection of {"ssim", "psnr", "flip"}
-        The metrics whose limits are checked; a metric that could not be computed fails.
-
-    Returns
-    -------
-    list of (Stage, str)
-        The failed checks and reasons, in the order of the checks; empty if the images pass.
-    """
+    """List the limits that a comparison exceeds."""
     failed: list[tuple[Stage, str]] = [("finiteness", reason) for reason in found.mismatches]
     over = found.percent_over or 0.0
     limits = (found.threshold, found.relative)

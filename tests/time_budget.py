@@ -1,0 +1,66 @@
+"""Prints the processor time of the test files that take the most, and of those over their budget.
+
+The seconds are those of the test's process and of its children, so that other work on the machine
+hardly changes them. A file over its budget is a warning and no failure, because machines differ:
+make its tests smaller, or raise the budget with a reason.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Generator
+from typing import Final
+
+import pytest
+
+#: Processor seconds of a file without an entry of its own.
+USUAL: Final = 15
+#: Processor seconds of files that need more: kills, walks over all faults, many methods.
+BUDGET: Final[dict[str, int]] = {"methods/test_properties.py": 60}
+
+_PROPERTY: Final = "processor seconds"
+_SHOWN: Final = 10
+
+
+def _spent() -> float:
+    return sum(os.times()[:4])
+
+
+class TimeBudget:
+    """Measures each test where it runs, and adds the seconds up by file where they are printed."""
+
+    def __init__(self) -> None:
+        self.began = 0.0
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+
+    def pytest_runtest_logstart(self) -> None:
+        self.began = _spent()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(
+        self, call: pytest.CallInfo[None]
+    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        report = yield
+        if call.when == "teardown":
+            report.user_properties.append((_PROPERTY, _spent() - self.began))
+        return report
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        # Names such as "tests/core/test_plans.py::test_defaults", also from xdist's workers.
+        name = report.nodeid.partition("::")[0].removeprefix("tests/")
+        for key, value in report.user_properties:
+            if key == _PROPERTY:
+                assert isinstance(value, float)
+                self.seconds[name] += value
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        terminalreporter.section(f"processor seconds, {sum(self.seconds.values()):.0f} in all")
+        slowest = sorted(self.seconds.items(), key=lambda item: -item[1])
+        for place, (name, seconds) in enumerate(slowest):
+            budget = BUDGET.get(name, USUAL)
+            line = f"{seconds:7.1f} of {budget:3d}  {name}"
+            if seconds > budget:
+                terminalreporter.write_line(f"{line}  WARNING: over its budget", yellow=True)
+            elif place < _SHOWN:
+                terminalreporter.write_line(line)
