@@ -113,6 +113,9 @@ class StoredImage:
         Whether the file's format says that colours are multiplied by alpha.
     space : str
         OpenImageIO's name of the file's colour space; "" if the file has none.
+    gamma : float or None
+        The exponent that decodes colours to light, if the file states one. It is more exact than
+        `space`, and has precedence unless `is_signalled`.
     attributes : mapping of str to (OpenImageIO.TypeDesc, value)
         Those of which `is_kept` is true, by OpenImageIO's names.
     parts : tuple of str
@@ -136,6 +139,7 @@ class StoredImage:
     parts: tuple[str, ...] = ("",)
     profile_name: str = ""
     is_signalled: bool = False
+    gamma: float | None = None
 
     @property
     def profile(self) -> bytes | None:
