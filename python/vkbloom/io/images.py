@@ -104,6 +104,8 @@ class StoredImage:
     - `display`: The display window (x, y, width, height), in the file's coordinates.
     - `associated`: Whether the file's format says that colours are multiplied by alpha.
     - `space`: OpenImageIO's name of the file's colour space; "" if the file has none.
+    - `gamma`: The exponent that decodes colours to light, if the file states one. It is more exact
+      than `space`, and has precedence unless `is_signalled`.
     - `attributes`: Those of which `is_kept` is true, by OpenImageIO's names.
     - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
       part without a name.
@@ -123,6 +125,7 @@ class StoredImage:
     parts: tuple[str, ...] = ("",)
     profile_name: str = ""
     is_signalled: bool = False
+    gamma: float | None = None
 
     @property
     def profile(self) -> bytes | None:
