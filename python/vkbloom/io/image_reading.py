@@ -56,8 +56,7 @@ _MOST_PARTS: Final = 100
 def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
     """Open an image file; the context closes it."""
     oiio = import_extra("OpenImageIO", "images", purpose)
-    name = os.fspath(path)
-    check_name(name)
+    name = check_name(path)
     # OpenImageIO reports missing and damaged files alike; this raises the system's own reason.
     with open(name, "rb"):
         pass

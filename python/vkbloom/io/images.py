@@ -188,15 +188,20 @@ class Picture:
         return self.pixels[:, :, [0, *range(3, self.pixels.shape[2])] if self.grey else slice(None)]
 
 
-def check_name(path: str | os.PathLike[str]) -> None:
-    """Raise ValueError for a file name that is not UTF-8, which OpenImageIO does not accept."""
-    name = os.fspath(path)
+def check_name(path: str | os.PathLike[str]) -> str:
+    """Return a file name, which must be text in UTF-8 for OpenImageIO."""
+    if not isinstance(path, str | os.PathLike) or isinstance(name := os.fspath(path), bytes):
+        raise TypeError(
+            f"path: {path!r} is not a str or a path"
+            + "; use os.fsdecode(path)" * isinstance(path, bytes)
+        )
     try:
         name.encode()
     except UnicodeEncodeError:
         raise ValueError(
             f"path: {name!r} is not UTF-8; rename the image file or its folder"
         ) from None
+    return name
 
 
 def is_exr(path: Path) -> bool:

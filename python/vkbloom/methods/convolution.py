@@ -95,6 +95,11 @@ class Convolution(Settings):
         psf: Any = self.psf
         if isinstance(psf, Mapping):
             psf = PSF.from_dict(psf)
+        elif isinstance(psf, str):
+            raise TypeError(
+                f"psf: {psf!r} is not a function or an array; call one of vkbloom.psf, such as "
+                "vkbloom.psf.spencer()"
+            )
         elif not isinstance(psf, PSF):
             try:
                 psf = samples(psf)
