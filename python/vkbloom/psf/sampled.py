@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import functools
 import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from vkbloom.fields import value_field
 from vkbloom.psf.base import PSF, Array, centred, check_radii
 from vkbloom.psf.values import ArrayValue
 
@@ -85,46 +87,6 @@ class SampledPSF(PSF):
         return np.asarray(np.abs(waves @ lines) / lines.sum(axis=0))
 
 
-@dataclasses.dataclass(frozen=True)
-class samples(SampledPSF):
-    """An array as a point-spread function.
-
-    Parameters
-    ----------
-    values : array-like, shape (h, w) or (h, w, 3)
-        Energies per pixel, which must be finite. The point is at [h // 2, w // 2]. The array is
-        copied to float32.
-
-    See Also
-    --------
-    unreal : A kernel image for Unreal Engine's convolution bloom.
-
-    Examples
-    --------
-    >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).energy()
-    array([8., 8., 8.])
-    """
-
-    values: Any
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", check_values("values", self.values))
-
-    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        return np.array(self.values.array, dtype=dtype, copy=copy)
-
-    def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
-        return rgb(self.values)
-
-    def kernel(  # noqa: D102  as of PSF
-        self,
-        frame: tuple[int, int],
-        size: tuple[int, int] | None = None,
-        pixels_per_degree: float | None = None,
-    ) -> Array:
-        return self.own_array() if size is None else centred(self.own_array(), size)
-
-
 def check_values(name: str, values: Any) -> ArrayValue:
     """Return an array (h, w) or (h, w, 3) of finite numbers, or raise TypeError or ValueError."""
     if isinstance(values, str | bytes | os.PathLike):
@@ -147,6 +109,43 @@ def check_values(name: str, values: Any) -> ArrayValue:
     if not np.isfinite(array).all():
         raise ValueError(f"{name}: some numbers are not finite as float32")
     return held
+
+
+@dataclasses.dataclass(frozen=True)
+class samples(SampledPSF):
+    """An array as a point-spread function.
+
+    Parameters
+    ----------
+    values : array-like, shape (h, w) or (h, w, 3)
+        Energies per pixel, which must be finite. The point is at [h // 2, w // 2]. The array is
+        copied to float32.
+
+    See Also
+    --------
+    unreal : A kernel image for Unreal Engine's convolution bloom.
+
+    Examples
+    --------
+    >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).energy()
+    array([8., 8., 8.])
+    """
+
+    values: Any = value_field(read=functools.partial(check_values, "values"))
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.values.array, dtype=dtype, copy=copy)
+
+    def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
+        return rgb(self.values)
+
+    def kernel(  # noqa: D102  as of PSF
+        self,
+        frame: tuple[int, int],
+        size: tuple[int, int] | None = None,
+        pixels_per_degree: float | None = None,
+    ) -> Array:
+        return self.own_array() if size is None else centred(self.own_array(), size)
 
 
 def rgb(values: ArrayValue) -> Array:
