@@ -15,6 +15,7 @@ from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
+from vkbloom.free_memory import check_for_driver
 from vkbloom.image import Image
 from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings
@@ -188,6 +189,7 @@ class Renderer:
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         variants = os.environ.get("VKBLOOM_FORM") or "auto"
+        check_for_driver()
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(

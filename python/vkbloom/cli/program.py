@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 import vkbloom
+from vkbloom.free_memory import ADVICE, memory_left
 
 #: Names of the modules of this package that have a click command called `command`.
 COMMANDS: Final = (
@@ -66,6 +67,9 @@ class Program(click.Group):
         except Exception as error:
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
+            if isinstance(error, RuntimeError) and "start new thread" in str(error):
+                # How Python reports that there is no memory for a thread's stack.
+                _exit(1, _described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))
             raise
@@ -82,7 +86,12 @@ def _is_from_interrupt(error: BaseException | None) -> bool:
 def _described(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    return str(error) or type(error).__name__
+    text = str(error) or type(error).__name__
+    if isinstance(error, MemoryError) and "memory is short" not in text:
+        left = memory_left()
+        free = "" if left is None else f" ({left >> 20} MiB are free)"
+        return f"memory is short{free}: {text}; {ADVICE}"
+    return text
 
 
 def _exit(status: int, message: str) -> NoReturn:
