@@ -33,6 +33,10 @@ INTERRUPTED: Final = 130
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
 
+# How Python and OpenImageIO report that there is no memory for a thread's stack.
+_NO_THREAD: Final = ("start new thread", "Resource temporarily unavailable")
+
+
 class Program(click.Group):
     """A group that imports a command when it is called, and prints an error as one line.
 
@@ -67,8 +71,7 @@ class Program(click.Group):
         except Exception as error:
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
-            if isinstance(error, RuntimeError) and "start new thread" in str(error):
-                # How Python reports that there is no memory for a thread's stack.
+            if isinstance(error, RuntimeError) and any(one in str(error) for one in _NO_THREAD):
                 _exit(1, _described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))
