@@ -44,6 +44,8 @@ _DTYPE_CURES = {
     "bool": "; convert it: image.astype(np.float32)",
     np.dtype(np.longdouble).name: "; convert it: image.astype(np.float32)",
 }
+# The device type kDLCPU of DLPack.
+_DLPACK_CPU = 1
 #: Modes of PIL whose arrays are not red, green and blue, and the mode to convert them to.
 _MODE_CURES = {
     **dict.fromkeys(("1", "L", "P", "CMYK", "YCbCr", "HSV", "RGBX"), "RGB"),
@@ -251,10 +253,26 @@ def _viewed(
             return np.asarray(image)
         return np.asarray(memoryview(image))  # type: ignore[arg-type]
     except (TypeError, ValueError, RuntimeError, BufferError) as error:
+        if _is_on_device(image):
+            raise TypeError(
+                f"{name}: {type(image).__name__} is on another device; copy it to the CPU: "
+                f"{name}.cpu() for PyTorch, {name}.get() for CuPy"
+            ) from None
         raise TypeError(
             f"{name}: an array is needed, not {type(image).__name__}"
             + (f"; NumPy: {error}" if is_viewed else "")
         ) from None
+
+
+def _is_on_device(image: object) -> bool:
+    """Return whether an array that NumPy cannot view is in the memory of another device."""
+    if hasattr(image, "__cuda_array_interface__"):
+        return True
+    try:
+        kind, _ = image.__dlpack_device__()  # type: ignore[attr-defined]
+    except Exception:  # whatever a foreign object raises
+        return False
+    return bool(kind != _DLPACK_CPU)
 
 
 def _pil_mode(image: object) -> str:

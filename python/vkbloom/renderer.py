@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import re
 import warnings
 from collections import abc
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast
@@ -15,6 +16,7 @@ from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
+from vkbloom.free_memory import check_for_driver
 from vkbloom.image import Image
 from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings
@@ -31,6 +33,10 @@ if TYPE_CHECKING:
     from vkbloom.scene import Scene
 
 _SCENE_SIZE = (1280, 720)
+# Stands for images that are not known yet. Larger ones have more levels, of the same names but for
+# the number.
+_ANY_IMAGE = np.zeros((64, 64, 4), np.float32)
+_NUMBER = re.compile(r"\d+")
 
 
 def _variants() -> str:
@@ -196,6 +202,7 @@ class Renderer:
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         variants = _variants()
+        check_for_driver()
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(
@@ -516,7 +523,8 @@ class Renderer:
         -----
         The device works on the next settings while the caller uses a frame. So after the first
         frame, settings are taken from the iterable before earlier frames are yielded. An error in
-        settings is raised after the frames of all earlier settings.
+        settings is raised after the frames of all earlier settings. Wrong types in a sequence, and
+        names of framebuffers that its settings do not have, are raised by the call.
 
         Examples
         --------
@@ -526,8 +534,7 @@ class Renderer:
         ...     [frames["final"].max().item() for frames in renderer.apply_many(image, settings)]
         [0.5, 1.0]
         """
-        names = check_attachments(attachments)
-        return self._run_many(image_source(image), settings_seq, names)
+        return self._run_many(image_source(image), settings_seq, check_attachments(attachments))
 
     def apply_each(
         self,
@@ -601,6 +608,7 @@ class Renderer:
                 )
         if self.closed:
             raise ValueError("the renderer is closed")
+        self._check_names(image_source(_ANY_IMAGE), settings or check_settings(None), names)
         work = requests.uploaded(self._core, _paired(images, settings or check_settings(None)))
         results = requests.run(work, self._core, names, alone=True)
         return (self._frames_of(one, result) for one, result in results)
@@ -953,9 +961,37 @@ class Renderer:
         # Not a generator, so that arguments are checked at the call and not with the first frame.
         if not isinstance(settings_seq, abc.Iterable):
             raise TypeError(f"settings_seq: {settings_seq!r} is not an iterable of Settings")
+        if self.closed:
+            raise ValueError("the renderer is closed")
+        if isinstance(settings_seq, abc.Sequence):
+            settings_seq = tuple(map(check_settings, settings_seq))
+            self._check_names(source, settings_seq, names)
         return self._run_work(
             (requests.Work(source, check_settings(one)) for one in settings_seq), names
         )
+
+    def _check_names(
+        self,
+        source: _core.Source,
+        settings: Settings | Sequence[Settings],
+        names: tuple[str, ...] | None,
+    ) -> None:
+        """Raise ValueError for attachments that no image of this kind has, of whatever size."""
+        if not names:
+            return
+        for one in {settings} if isinstance(settings, Settings) else dict.fromkeys(settings):
+            try:
+                plan = self._core.plan(source, one, None)
+            except (_core.Error, ValueError):
+                # An error of these settings is raised after the frames of earlier ones.
+                continue
+            known = [name for name, _, _ in plan.outputs]
+            kinds = {_NUMBER.sub("#", name) for name in known}
+            for name in names:
+                if _NUMBER.sub("#", name) not in kinds:
+                    raise ValueError(
+                        f"attachments: unknown framebuffer {name!r}; available: {', '.join(known)}"
+                    )
 
     def _run_work(
         self, sequence: Iterable[requests.Work], names: tuple[str, ...] | None

@@ -499,3 +499,54 @@ def test_real_frames_come_back(shared_data: Path, tmp_path: Path) -> None:
     path = shared_data / "seed_frames" / "final.png"
     done(path, tmp_path / "b.png", "--no-bloom")
     assert np.array_equal(pixels(tmp_path / "b.png"), pixels(path))
+
+
+def picture(path: Path) -> Path:
+    return png(path, light(16, 24, 3, dtype="uint8"))
+
+
+def test_a_file_that_is_read_needs_overwrite(tmp_path: Path) -> None:
+    file = picture(tmp_path / "a.png")
+    before = file.read_bytes()
+    link = tmp_path / "link.png"
+    link.symlink_to(file)
+    for target in (file, link, f"{tmp_path}/"):
+        refused = run(file, target)
+        assert refused.exit_code == 2
+        assert "use --overwrite" in refused.stderr
+    assert file.read_bytes() == before
+    done(file, file, "--overwrite")
+    assert file.read_bytes() != before
+
+
+def test_no_picture_is_written_to_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vkbloom.cli.sequences.is_terminal", lambda: True)
+    refused = run(picture(tmp_path / "a.png"), "-")
+    assert (refused.exit_code, refused.stdout) == (2, "")
+    assert "standard output is a terminal" in refused.stderr
+
+
+def test_folders_are_made_for_one_picture_and_checked_before(tmp_path: Path) -> None:
+    file = picture(tmp_path / "a.png")
+    done(file, f"{tmp_path}/new/")
+    assert (tmp_path / "new/a.png").is_file()
+    for target in ("no/b.png", "no/folder/", "a.png/"):
+        failed = run(file, f"{tmp_path}/{target}")
+        assert failed.exit_code == 1
+        # Nothing was rendered.
+        assert failed.stdout == ""
+        assert "directory" in failed.stderr
+    assert not (tmp_path / "no").exists()
+
+
+def test_hashes_are_digits(tmp_path: Path) -> None:
+    for number in (3, 12):
+        picture(tmp_path / f"f.{number:04d}.png")
+    done(tmp_path / "f.####.png", tmp_path / "g.##.png")
+    assert sorted(file.name for file in tmp_path.glob("g*")) == ["g.03.png", "g.12.png"]
+    # A file with this name is meant.
+    picture(tmp_path / "f.####.png")
+    done(tmp_path / "f.####.png", tmp_path / "one.png")
+    assert (tmp_path / "one.png").is_file()

@@ -509,6 +509,14 @@ def test_a_cache_folder_that_cannot_be(
     assert "VKBLOOM_CACHE_DIR" in finding.advice
 
 
+def test_a_cache_folder_of_the_system_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VKBLOOM_CACHE_DIR", raising=False)
+    # Permissions do not stop root, but no folder can be made here.
+    monkeypatch.setenv("XDG_CACHE_HOME", "/proc/self")
+    finding = installation.cache([])
+    assert (finding.status, "not writable" in finding.found) == ("note", True)
+
+
 def test_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
     finding = installation.cache([])

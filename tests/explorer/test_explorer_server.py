@@ -123,6 +123,11 @@ def test_the_token_and_the_host_are_needed(serve: Any) -> None:
         root = f"http://127.0.0.1:{server.port}/"
         for path in ("", "x/", server.token[:-1] + "/", server.token + "x/page.js", "x/socket"):
             assert (await get(root + path)).code in (403, 404), path
+        # The page says what to do.
+        refused = await get(root + "x/")
+        assert refused.code == 403
+        assert refused.headers["Content-Type"].startswith("text/html")
+        assert b"start <code>vkbloom explore" in refused.body
         # A foreign name that was made to point here.
         for host in ("example.org", f"example.org:{server.port}", "127.0.0.1", "127.0.0.1:1"):
             assert (await get(server.url, Host=host)).code == 403, host

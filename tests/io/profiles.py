@@ -29,17 +29,27 @@ def to_xyz(primaries: Any) -> NDArray[np.float64]:
     return matrix
 
 
-def profile(name: str, primaries: Any, gamma: float | None = None) -> bytes:
-    """Return an RGB profile of a matrix and the curve of sRGB, or a power."""
+def curv(*entries: int) -> bytes:
+    """Return a curve with a table of 16-bit integers."""
+    count = len(entries)
+    return b"curv\0\0\0\0" + struct.pack(f">I{count}H", count, *entries)
+
+
+def para(kind: int, *parameters: float) -> bytes:
+    """Return a parametric curve."""
+    return b"para\0\0\0\0" + struct.pack(">HH", kind, 0) + b"".join(map(_fixed, parameters))
+
+
+def profile(
+    name: str, primaries: Any, gamma: float | None = None, curve: bytes | None = None
+) -> bytes:
+    """Return an RGB profile of a matrix and a curve: that of sRGB, a power or the given one."""
     x, y = _D65
     white = _BRADFORD @ np.array([x / y, 1, (1 - x - y) / y])
     adapt = np.linalg.inv(_BRADFORD) @ np.diag(_BRADFORD @ _D50 / white) @ _BRADFORD
     columns = (adapt @ to_xyz(primaries)).T
-    curve = (
-        b"para\0\0\0\0" + struct.pack(">HH", 3, 0) + b"".join(map(_fixed, SRGB_CURVE))
-        if gamma is None
-        else b"para\0\0\0\0" + struct.pack(">HH", 0, 0) + _fixed(gamma)
-    )
+    if curve is None:
+        curve = para(3, *SRGB_CURVE) if gamma is None else para(0, gamma)
     tags = {
         b"desc": _text(name),
         b"cprt": _text("none"),
@@ -55,8 +65,12 @@ def profile(name: str, primaries: Any, gamma: float | None = None) -> bytes:
 
 def grey_profile(name: str, gamma: float) -> bytes:
     """Return a profile of one channel."""
-    curve = b"para\0\0\0\0" + struct.pack(">HH", 0, 0) + _fixed(gamma)
-    tags = {b"desc": _text(name), b"cprt": _text("none"), b"wtpt": _xyz(_D50), b"kTRC": curve}
+    tags = {
+        b"desc": _text(name),
+        b"cprt": _text("none"),
+        b"wtpt": _xyz(_D50),
+        b"kTRC": para(0, gamma),
+    }
     return _icc(tags, b"GRAY")
 
 

@@ -15,8 +15,10 @@ from tests.io.parts import store_parts
 from tests.io.profiles import (
     DISPLAY_P3,
     REC_709,
+    curv,
     gamma_chunk,
     grey_profile,
+    para,
     png_chunk,
     profile,
     profile_chunk,
@@ -30,6 +32,8 @@ oiio = pytest.importorskip("OpenImageIO")
 RNG = np.random.default_rng(5)
 # OpenColorIO's own accuracy, of values of 0..1.
 CLOSE: dict[str, Any] = {"rtol": 1e-3, "atol": 2e-4}
+# The table of a profile's curve.
+LISTED = np.rint(np.linspace(0, 1, 1024) ** 2.4 * 65535).astype(int)
 
 
 def levels(*shape: int, dtype: str = "uint8") -> NDArray[Any]:
@@ -76,14 +80,38 @@ class TestRead:
         made = vkbloom.read(store_png(tmp_path / "a.png", index, palette=palette))
         assert np.allclose(made, decode_srgb(palette[index] / 255), rtol=1e-6, atol=0)
 
-    @pytest.mark.parametrize("gamma", [1.0, 1.8, 2.2])
-    def test_gamma(self, tmp_path: Path, gamma: float) -> None:
-        pixels = levels(5, 7, 4)
+    @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+    @pytest.mark.parametrize("gamma", [1 / 2.2, 0.8, 1.0, 1.25, 1.8, 2.0, 2.2, 2.6, 5.0])
+    def test_gamma(self, tmp_path: Path, gamma: float, dtype: str) -> None:
+        pixels = levels(5, 7, 4, dtype=dtype)
         path = store_png(tmp_path / "a.png", pixels, gamma_chunk(gamma))
         made, facts = vkbloom.read(path, metadata=True)
-        assert np.allclose(made[..., :3], (pixels[..., :3] / 255) ** gamma, **CLOSE)
-        assert np.allclose(made[..., 3], pixels[..., 3] / 255, rtol=1e-6, atol=0)
+        plain = pixels / np.iinfo(dtype).max
+        stated = 1e5 / round(1e5 / gamma)
+        assert np.allclose(made[..., :3], plain[..., :3] ** stated, rtol=1e-6, atol=0)
+        assert np.allclose(made[..., 3], plain[..., 3], rtol=1e-6, atol=0)
         assert bool(facts["notes"]) is (gamma != 1)
+
+    @pytest.mark.parametrize(
+        ("chunks", "is_srgb"),
+        [
+            (gamma_chunk(2.0) + png_chunk(b"sRGB", b"\0"), True),
+            (png_chunk(b"sRGB", b"\0") + gamma_chunk(2.0), True),
+            (gamma_chunk(2.0) + gamma_chunk(1.0), False),
+            (png_chunk(b"gAMA", bytes(4)), True),
+            (png_chunk(b"gAMA", b"\xff" * 4), True),
+            (gamma_chunk(2.0)[:-1] + b"x", True),
+            (profile_chunk(b"no profile") + gamma_chunk(2.0), False),
+            (gamma_chunk(2.0) + profile_chunk(profile("my screen", REC_709)), True),
+            (gamma_chunk(2.0) + png_chunk(b"cICP", bytes([1, 13, 0, 1])), True),
+        ],
+    )
+    def test_precedence_of_gamma(self, tmp_path: Path, chunks: bytes, is_srgb: bool) -> None:
+        pixels = levels(5, 7, 3)
+        made = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunks))
+        plain = pixels / 255
+        expected = decode_srgb(plain) if is_srgb else plain**2
+        assert np.allclose(made, expected, rtol=1e-6, atol=0)
 
     @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
     def test_display_p3(self, tmp_path: Path, dtype: str) -> None:
@@ -105,6 +133,51 @@ class TestRead:
         chunk = profile_chunk(profile("Linear", REC_709, 1.0))
         made = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunk))
         assert np.allclose(made, pixels / 255, **CLOSE)
+
+    @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+    @pytest.mark.parametrize(
+        ("curve", "expected"),
+        [
+            (curv(), lambda x: x),
+            (curv(256), lambda x: x),
+            (curv(563), lambda x: x ** (563 / 256)),
+            (curv(0, 65535), lambda x: x),
+            (curv(0, 9000, 65535), lambda x: np.interp(x, (0, 0.5, 1), (0, 9000 / 65535, 1))),
+            (curv(*LISTED), lambda x: np.interp(x, np.linspace(0, 1, 1024), LISTED / 65535)),
+            (para(0, 2.5), lambda x: x**2.5),
+            (para(1, 2, 1.25, -0.25), lambda x: np.where(x < 0.2, 0, (1.25 * x - 0.25) ** 2)),
+            (
+                para(2, 2, 1.25, -0.25, 0.125),
+                lambda x: np.minimum(np.where(x < 0.2, 0, (1.25 * x - 0.25) ** 2) + 0.125, 1),
+            ),
+            (
+                para(3, 3, 0.875, 0.125, 0.25, 0.5),
+                lambda x: np.where(x < 0.5, x / 4, (0.875 * x + 0.125) ** 3),
+            ),
+            (
+                para(4, 3, 0.75, 0.125, 0.5, 0.25, 0.25, 0.0625),
+                lambda x: np.where(x < 0.25, x / 2 + 0.0625, (0.75 * x + 0.125) ** 3 + 0.25),
+            ),
+        ],
+    )
+    def test_curves_of_profiles(
+        self, tmp_path: Path, curve: bytes, expected: Any, dtype: str
+    ) -> None:
+        pixels = levels(6, 7, 3, dtype=dtype)
+        chunk = profile_chunk(profile("x", REC_709, curve=curve))
+        made = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunk))
+        # Profiles have 16 fractional bits.
+        assert np.allclose(made, expected(pixels / np.iinfo(dtype).max), rtol=1e-4, atol=1e-4)
+
+    def test_curves_differ_between_channels(self, tmp_path: Path) -> None:
+        pixels = levels(6, 7, 3)
+        content = profile("x", REC_709, curve=curv()).replace(b"bTRC", b"tmpC")
+        content = content.replace(b"rTRC", b"bTRC").replace(b"tmpC", b"rTRC")
+        assert np.allclose(
+            vkbloom.read(store_png(tmp_path / "a.png", pixels, profile_chunk(content))),
+            pixels / 255,
+            **CLOSE,
+        )
 
     def test_srgb_profile_changes_nothing(self, tmp_path: Path) -> None:
         cms = pytest.importorskip("PIL.ImageCms")

@@ -43,7 +43,7 @@ from vkbloom.cli.image_files import (
 from vkbloom.cli.in_a_row import read_ahead, rendered, written_behind
 from vkbloom.cli.large import Large, apply_by_rows, is_large
 from vkbloom.cli.program import as_wrong_use
-from vkbloom.cli.sequences import PIPE, pairs
+from vkbloom.cli.sequences import PIPE, check_targets, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
@@ -98,6 +98,7 @@ from vkbloom.settings import Encoding
     help="Hold large pictures in half floats, which need half the memory [default for 8-bit files "
     "of at least 64 million pixels]",
 )
+@click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
 @subimage_option
 @layer_option
 @glow_options
@@ -114,6 +115,7 @@ def command(  # noqa: PLR0915  one step after the other
     output_colour: SavedColour | None,
     raw: bool,
     half: bool | None,
+    overwrite: bool,
     subimage: int,
     layer: str | None,
     mask: str | None,
@@ -124,10 +126,10 @@ def command(  # noqa: PLR0915  one step after the other
 ) -> None:
     """Add bloom to the image IN and write the result to OUT.
 
-    OpenImageIO reads and writes the files; the extension selects the format: OpenEXR, Radiance
-    HDR, PNG, JPEG, TIFF and others. IN and OUT may be folders; the names of the files are kept.
-    They may be printf patterns (f.%04d.exr) or - for a pipe. IN may also be a glob, or several
-    files.
+    OpenImageIO reads and writes the files; the extension selects the format: OpenEXR, Radiance HDR,
+    PNG, JPEG, TIFF and others. IN and OUT may be folders; the names of the files are kept. They may
+    be patterns of numbers (f.%04d.exr, f.####.exr) or - for a pipe. IN may also be a glob, or
+    several files.
 
     The settings are those of the preset bevy_natural, unless --preset or --method selects others.
     Further options change them.
@@ -164,6 +166,7 @@ def command(  # noqa: PLR0915  one step after the other
     if out == PIPE and attachments != "final":
         raise click.UsageError("standard output takes only final; leave out --attachments")
     work = pairs(given, out)
+    check_targets(work, out, overwrite=overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():
             checked = f"image.{pipe_format}" if out == PIPE else target
@@ -185,7 +188,7 @@ def command(  # noqa: PLR0915  one step after the other
             return premultiplied(picture) if is_blended else picture
 
         def write(picture: Picture, frames: vkbloom.Frames, target: str) -> None:
-            if several:
+            if target != out:
                 Path(target).parent.mkdir(exist_ok=True)
             file = Path(folder, f"output.{pipe_format}") if out == PIPE else Path(target)
             written = _written(picture, frames, file, output_colour, quality)
@@ -202,7 +205,7 @@ def command(  # noqa: PLR0915  one step after the other
             return attachments == "final" and not is_piped and is_large(name, subimage, layer)
 
         def write_large(renderer: vkbloom.Renderer, name: str, target: str) -> None:
-            if several:
+            if target != out:
                 Path(target).parent.mkdir(exist_ok=True)
             apply_by_rows(
                 renderer,

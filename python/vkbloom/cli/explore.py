@@ -18,7 +18,7 @@ from vkbloom.checks import import_extra
 from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.live_options import live_options
-from vkbloom.cli.program import as_wrong_use, given
+from vkbloom.cli.program import INTERRUPTED, as_wrong_use, given
 from vkbloom.explorer.viewer import GLOW, Viewer
 from vkbloom.settings import SHADINGS, Shading
 
@@ -57,7 +57,7 @@ def command(
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
-) -> None:
+) -> int:
     """Explore the bloom of IMAGE, or of a scene, in a browser with controls for all settings.
 
     The page is served on 127.0.0.1 until Ctrl-C, to every program that knows its address. IMAGE
@@ -88,24 +88,32 @@ def command(
             # Checks the arguments, so that an error appears here and not on the page.
             new_viewer()
         click.echo(f"Rendering on {renderer.info.summary}")
-        with contextlib.suppress(KeyboardInterrupt):
-            asyncio.run(_serve(new_viewer, port, opens))
+        try:
+            return asyncio.run(_serve(new_viewer, port, opens))
+        except KeyboardInterrupt:
+            return INTERRUPTED
 
 
-async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> None:
+async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> int:
+    """Serve the page until a signal comes, and return the exit status."""
     # Imported here because it needs tornado; `command` has checked that it is installed.
     from vkbloom.explorer.server import Server  # noqa: PLC0415
 
     server = Server(new_viewer, port)
-    stopped = asyncio.Event()
+    stopped: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
+    def stop(status: int) -> None:
+        if not stopped.done():
+            stopped.set_result(status)
+
     # Without a handler, KeyboardInterrupt could be raised inside the event loop's own code.
     with contextlib.suppress(NotImplementedError):
-        for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+        for number, status in ((signal.SIGINT, INTERRUPTED), (signal.SIGTERM, 0)):
+            asyncio.get_running_loop().add_signal_handler(number, stop, status)
     click.echo(f"{server.url}\nPress Ctrl-C to stop.")
     if opens:
         webbrowser.open(server.url)
     try:
-        await stopped.wait()
+        return await stopped
     finally:
         await server.stop()

@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 import vkbloom
+from vkbloom.free_memory import ADVICE, memory_left
 from vkbloom.registry import METHODS
 
 #: Names of the modules of this package that have a click command called `command`.
@@ -32,6 +33,10 @@ COMMANDS: Final = (
 INTERRUPTED: Final = 130
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
+
+
+# How Python and OpenImageIO report that there is no memory for a thread's stack.
+_NO_THREAD: Final = ("start new thread", "Resource temporarily unavailable")
 
 
 class Program(click.Group):
@@ -69,6 +74,8 @@ class Program(click.Group):
         except Exception as error:
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
+            if isinstance(error, RuntimeError) and any(one in str(error) for one in _NO_THREAD):
+                _exit(1, _described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))
             raise
@@ -105,7 +112,12 @@ def _is_from_interrupt(error: BaseException | None) -> bool:
 def _described(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    return str(error) or type(error).__name__
+    text = str(error) or type(error).__name__
+    if isinstance(error, MemoryError) and "memory is short" not in text:
+        left = memory_left()
+        free = "" if left is None else f" ({left >> 20} MiB are free)"
+        return f"memory is short{free}: {text}; {ADVICE}"
+    return text
 
 
 def _exit(status: int, message: str) -> NoReturn:

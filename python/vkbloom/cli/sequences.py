@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import glob
 import os
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -14,7 +16,7 @@ import click
 from vkbloom.cli.image_files import note
 from vkbloom.io.image_reading import readable_extensions
 
-__all__ = ["PIPE", "pairs"]
+__all__ = ["PIPE", "check_targets", "is_terminal", "pairs"]
 
 #: Stands for standard input and standard output.
 PIPE: Final = "-"
@@ -23,10 +25,13 @@ PIPE: Final = "-"
 _MOST_NAMES: Final = 5
 
 _NUMBER: Final = re.compile(r"%(0?)(\d*)d")
+# Digits of a number as OpenImageIO and Houdini write them: f.####.exr.
+_HASHES: Final = re.compile(r"#{2,}|(?<=[._])#(?=\.)")
 
 
 def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     """Return the files to read, each with the file to write."""
+    target = _with_number(target)
     found = [pair for source in sources for pair in _expanded(source)]
     is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
     is_pattern = _NUMBER.search(os.path.basename(target)) is not None
@@ -51,11 +56,55 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     return [(name, file) for (name, _), file in zip(found, written, strict=True)]
 
 
+def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool) -> None:
+    """Raise an error for files of `pairs` that cannot be written, or that are also read.
+
+    - `out`: The target that the files were made of.
+    """
+    read = [source for source, _ in work if os.path.isfile(source)]
+    for _, target in work:
+        if target == PIPE:
+            if is_terminal():
+                raise click.UsageError(
+                    "standard output is a terminal; redirect it to a file or a program"
+                )
+            continue
+        _check_folder(target, makes=target != out)
+        for source in read if os.path.exists(target) and not overwrite else ():
+            if os.path.samefile(source, target):
+                raise click.UsageError(f"{target}: is read as IN; use --overwrite to replace it")
+
+
+def is_terminal() -> bool:
+    """Return whether standard output is a terminal."""
+    return sys.stdout is not None and sys.stdout.isatty()
+
+
+def _check_folder(target: str, *, makes: bool) -> None:
+    folder = os.path.dirname(target) or "."
+    # A missing folder is made with its first file.
+    existing = folder if os.path.lexists(folder) or not makes else os.path.dirname(folder) or "."
+    if not os.path.isdir(existing):
+        code = errno.ENOTDIR if os.path.lexists(existing) else errno.ENOENT
+        raise OSError(code, os.strerror(code), existing)
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES), existing)
+
+
+def _with_number(name: str) -> str:
+    """Return a name with %0Nd instead of N hashes, unless a file has the name."""
+    if os.path.exists(name):
+        return name
+    folder, base = os.path.split(name)
+    return os.path.join(folder, _HASHES.sub(lambda run: f"%0{len(run[0])}d", base, count=1))
+
+
 def _expanded(source: str) -> list[tuple[str, int | None]]:
     """Return the files of a word, with their numbers if the word is a pattern."""
     # The name of an existing file may look like a pattern.
     if source == PIPE or os.path.isfile(source):
         return [(source, None)]
+    source = _with_number(source)
     folder, name = os.path.split(source)
     found: list[tuple[str, int | None]] = []
     if os.path.isdir(source):

@@ -84,6 +84,7 @@ def examine() -> Report:
     has_problem = any(finding.status == "problem" for finding in foundation)
     findings = [
         installation.package(),
+        *installation.memory(),
         *foundation,
         *installation.environment(),
         _adapters(listed, has_problem),
@@ -138,7 +139,9 @@ def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
         "adapters",
         "problem",
         f"none: {reason}{said}",
-        "Solve the problems above first." if has_problem else drivers.INSTALL_DRIVER,
+        "Solve the problems above first."
+        if has_problem or installation.memory()
+        else drivers.INSTALL_DRIVER,
     )
 
 
@@ -190,7 +193,9 @@ def _test_render(name: str, answer: child.Answer) -> Finding:
             topic,
             "problem",
             f"{name} fails: {answer.failure}",
-            "Update its driver, or use another adapter.",
+            "Raise the limit of memory first (ulimit -v)."
+            if installation.memory()
+            else "Update its driver, or use another adapter.",
         )
     if answer.value["differences"]:
         return Finding(

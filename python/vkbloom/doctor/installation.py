@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from vkbloom.doctor.finding import Finding, Status
+from vkbloom.free_memory import ADVICE, address_space_left
 from vkbloom.io import pipeline_cache
 
 # Purpose of each extra; the distributions that it needs are read from the metadata.
@@ -31,6 +32,8 @@ _EXTRAS: Final = {
     "pytest": "frame_regression in tests",
     "window": "vkbloom view, a window with live controls",
 }
+# Address space of a render of a small image on lavapipe, with the interpreter.
+_AMPLE: Final = 1 << 30
 # Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
 _RELEVANT_VARIABLES: Final = re.compile(
     r"(VK|VKBLOOM|LP|MESA|GALLIVM|LIBGL|NODEVICE|DISABLE_LAYER|ENABLE_LAYER)_\w+"
@@ -45,6 +48,22 @@ def package() -> Finding:
         f"version {metadata.version('vkbloom')}, Python {platform.python_version()}, "
         f"NumPy {np.__version__}, {platform.platform()}",
     )
+
+
+def memory() -> list[Finding]:
+    """Report a limit of address space under which drivers fail or crash."""
+    left = address_space_left()
+    if left is None or left >= _AMPLE:
+        return []
+    return [
+        Finding(
+            "memory",
+            "problem",
+            f"memory is short: a limit leaves {left >> 20} MiB of address space to each process; "
+            f"a driver and a test render need up to {_AMPLE >> 20} MiB, and may crash with less",
+            f"To render: {ADVICE}.",
+        )
+    ]
 
 
 def environment() -> list[Finding]:
@@ -72,14 +91,12 @@ def _why_not_writable(folder: Path) -> str:
         existing = existing.parent
     if not existing.is_dir():
         return f"{existing} is not a folder"
-    if existing != folder:
-        # The folder is created with its first file; creating it here would leave it behind.
-        return "" if os.access(existing, os.W_OK | os.X_OK) else f"{existing} is not writable"
     try:
-        with tempfile.TemporaryFile(dir=folder):
+        # The folder is created with its first file; creating it here would leave it behind.
+        with tempfile.TemporaryDirectory(dir=existing):
             return ""
     except OSError as error:
-        return error.strerror or str(error)
+        return f"{existing}: {error.strerror or error}"
 
 
 def cache(driver_uuids: Collection[str]) -> Finding:

@@ -41,6 +41,11 @@ _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+_REFUSED: Final = (
+    "<!doctype html><title>vkbloom explore</title><p>This address is not that of the explorer. It "
+    "changes with each start. Open the complete address that the running <code>vkbloom explore"
+    "</code> or the notebook printed, or start <code>vkbloom explore</code> again.</p>"
+)
 # The longest text message in bytes. Settings are shorter. Files are sent as binary messages.
 _LARGEST_MESSAGE: Final = 1 << 16
 _LARGEST_FILE: Final = 1 << 30
@@ -113,6 +118,10 @@ class _File(RequestHandler):
         self.set_header("X-Content-Type-Options", "nosniff")
         self.set_header("Cache-Control", "no-store")
         self.clear_header("Server")
+
+    def write_error(self, status_code: int, **_: Any) -> None:
+        self.set_header("Content-Type", "text/html; charset=utf-8")
+        self.finish(_REFUSED if status_code == 403 else f"{status_code}: there is no such file.")
 
     def get(self, token: str, name: str) -> None:
         if not self._server.allows(self.request, token):

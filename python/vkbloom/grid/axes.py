@@ -156,6 +156,9 @@ def read_axes(
     """
     if not isinstance(axes, Mapping):
         raise TypeError(f"axes: {axes!r} is not a mapping of field names to values")
+    for name in axes:
+        if not isinstance(name, str):
+            raise TypeError(f"axes: {name!r} is not the name of a field")
     whole = {name: _whole_axis(name, axes[name]) for name in WHOLE if name in axes}
     if len(whole) > 1:
         raise ValueError("axes: preset and settings exclude each other; give one of them")

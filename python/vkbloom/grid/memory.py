@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vkbloom.checks import import_extra
+from vkbloom.free_memory import memory_left
 from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.order import blocks, default_chunk
 from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of, lay_out
@@ -28,6 +27,8 @@ BLOCK_BYTES = 1 << 20
 BLOCK_POINTS = 1024
 # Reference frames may need more memory than the stored variables of a point.
 _REFERENCE_BYTES = 64 << 20
+# A grid may take all free memory but this part of its own size.
+_MARGIN = 10
 
 
 def chunk_of(grid: Grid, layout: Layout) -> tuple[int, ...]:
@@ -45,39 +46,18 @@ def check_fits(grid: Grid, variables: Mapping[str, Variable]) -> None:
     """Raise MemoryError for a grid that does not fit into the free memory."""
     points = math.prod(grid.shape)
     size = points * sum(variable.size for variable in variables.values())
-    left = _memory_left()
-    if left is not None and size > left:
+    left = memory_left()
+    # NumPy, the device and the results that are reduced need memory, too.
+    if left is not None and size + size // _MARGIN > left:
         raise MemoryError(
             f"a grid of {points} points with {', '.join(variables)} needs {_gigabytes(size)} of "
-            f"memory, but {_gigabytes(left)} are free; write a store with grid_to_zarr, or keep "
-            "only the figures of reduce with attachments=()"
+            f"memory and a tenth as reserve, but {_gigabytes(left)} are free; write a store with "
+            "grid_to_zarr, or keep only the figures of reduce with attachments=()"
         )
 
 
 def _gigabytes(size: int) -> str:
     return f"{size / 1e9:,.1f} GB"
-
-
-def _memory_left() -> int | None:
-    """Return the bytes that this process can still allocate; None if this is not known."""
-    left = []
-    try:
-        for line in Path("/proc/meminfo").read_text("ascii").splitlines():
-            if line.startswith("MemAvailable:"):
-                left.append(int(line.split()[1]) << 10)
-    except OSError:
-        if "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ()):
-            left.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    try:
-        # The limits of a container.
-        most, used = (
-            int(Path(f"/sys/fs/cgroup/memory.{name}").read_text("ascii"))
-            for name in ("max", "current")
-        )
-        left.append(max(most - used, 0))
-    except (OSError, ValueError):
-        pass
-    return min(left, default=None)
 
 
 def in_memory(grid: Grid, renderer: FrameRenderer, progress: bool | None) -> xarray.Dataset:

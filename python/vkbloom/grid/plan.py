@@ -169,6 +169,8 @@ def ask(
     if checked.labels:
         found = (image_axis(checked.labels), *found)
     names = check_attachments(attachments)
+    if reduce is not None and not isinstance(reduce, Mapping):
+        raise TypeError(f"reduce: {reduce!r} is not a mapping of names to callables")
     reductions = {} if reduce is None else dict(reduce)
     taken = {"y", "x", "channel", "done", *(axis.name for axis in found), *(names or ())}
     for name, reduction in reductions.items():

@@ -11,10 +11,10 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import import_extra
+from vkbloom.checks import check_index, import_extra
 from vkbloom.io import image_reading, safe_writing
 from vkbloom.io.image_writing import as_numbers, check_quality, encoded, put
-from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, is_exr
+from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, check_name, is_exr
 
 __all__ = ["divided", "multiplied", "read", "write"]
 
@@ -119,6 +119,8 @@ def read(
     ...     final = renderer.apply(photo, vkbloom.presets["bevy_natural"])["final"]
     >>> vkbloom.write("bloom.jpg", final, quality=95)                       # doctest: +SKIP
     """
+    check_name(path)
+    subimage = check_index("subimage", subimage, -(2**31), 2**31 - 1)
     stored = image_reading.load(path, subimage, layer)
     try:
         picture = image_reading.decode(stored)
@@ -215,7 +217,9 @@ def write(
     ...               .reshape(64, 256, 3), bits=16)                        # doctest: +SKIP
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
-    target = Path(path)
+    target = Path(check_name(path))
+    if metadata is not None and not isinstance(metadata, Mapping):
+        raise TypeError(f"metadata: {metadata!r} is not a mapping of names to values")
     values = _checked(array)
     is_float = values.dtype.kind == "f"
     if encoding is not None and (encoding not in _ENCODINGS or not is_float):
@@ -224,7 +228,7 @@ def write(
             if is_float
             else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
         )
-    if bits is not None and (bits not in _FLOATS or not is_float):
+    if bits is not None and (bits not in tuple(_FLOATS) or not is_float):
         own = 8 * values.dtype.itemsize
         if bits != own or is_float:
             raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
@@ -252,7 +256,10 @@ def write(
 
 def _checked(array: NDArray[Any]) -> NDArray[Any]:
     """Return the array as (H, W, C), after a check of its shape and dtype."""
-    values = np.asarray(array)
+    try:
+        values = np.asarray(array)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"array: an array is needed; NumPy: {error}") from None
     if values.dtype == np.float64:
         values = values.astype(np.float32)
     if values.dtype.name not in PIXEL_TYPES:

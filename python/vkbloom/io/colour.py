@@ -1,28 +1,33 @@
-"""Convert colours of image files to linear Rec. 709, with the OpenColorIO that is in OpenImageIO.
+"""Convert colours of image files to linear Rec. 709.
 
-The colour spaces are those of OpenColorIO's built-in configuration, so that results do not depend
-on the machine's configuration.
+sRGB, exponents and ICC profiles are computed here. Other colour spaces are those of OpenColorIO's
+built-in configuration, which is in OpenImageIO, so that results do not depend on the machine's
+configuration.
 """
 
 from __future__ import annotations
 
-import tempfile
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.io.icc import Profile, read_profile
+from vkbloom.io.images import SPACES, Colour, StoredImage
 from vkbloom.io.srgb import decode_srgb
 
-__all__ = ["check_space", "from_profile", "from_space", "is_srgb_profile"]
+__all__ = ["check_space", "linear"]
 
 _CONFIGURATION: Final = "ocio://default"
-_LINEAR: Final = "lin_rec709_scene"
-# The colour space to which OpenColorIO converts from an ICC profile.
-_CONNECTION: Final = "CIE XYZ-D65 - Scene-referred"
+_LINEAR: Final = SPACES["linear"]
+# Spaces of an exponent. OpenColorIO's own powers are off by 2e-5.
+_EXPONENTS: Final[Mapping[str, float]] = {SPACES["gamma22"]: 2.2, "g18_rec709_scene": 1.8}
 # Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
 _SAME: Final = 0.5 / 255
+# Red, green, blue, white.
+_REC_709: Final = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
 def check_space(name: str) -> None:
@@ -36,11 +41,135 @@ def check_space(name: str) -> None:
         )
 
 
-def from_space(colours: NDArray[np.float32], space: str) -> NDArray[np.float32]:
-    """Convert colours of a named space to linear Rec. 709.
+def linear(
+    values: NDArray[Any], stored: StoredImage, colour: Colour | None
+) -> tuple[str, NDArray[Any], list[str]]:
+    """Return the assumed colour space, the linear floats, and notes; alpha is only scaled.
 
-    - `colours`: ndarray of float32, shape (H, W, 3).
-    - Returns: ndarray of float32, shape (H, W, 3): not clipped.
+    - `values`: The numbers in the file, (H, W, 3) or (H, W, 4).
+    - `stored`: What the file says of its colours.
+    - `colour`: The colour space, whatever the file says.
+    """
+    if colour is not None:
+        if colour not in ("linear", "srgb"):
+            check_space(colour)
+        return colour, _decoded(values, colour), []
+    if values.dtype.kind == "f":
+        return "linear", values, _notes_of_floats(stored)
+    notes = []
+    if stored.profile is not None and not stored.is_signalled:
+        said = f"its ICC profile {stored.profile_name!r}"
+        try:
+            profile = read_profile(stored.profile)
+        except ValueError:
+            notes = [f"{said} is not one of RGB by a matrix and curves"]
+        else:
+            if _is_srgb(profile):
+                return "srgb", _decoded(values, "srgb"), []
+            made = _scaled(values)
+            made[:, :, :3] = profile.decode(values[:, :, :3])
+            name = stored.profile_name or "ICC profile"
+            return name, made, [f"converted to linear Rec. 709 by {said}"]
+    space, made, said_of_space = _by_space(values, stored)
+    if notes:
+        return space, made, [f"{notes[0]}; taken as {space}"]
+    return space, made, said_of_space
+
+
+def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[Any], list[str]]:
+    """As `linear`, of an image of integers without a profile."""
+    if stored.gamma is not None and not stored.is_signalled:
+        if stored.gamma == 1:
+            return "linear", _decoded(values, "linear"), []
+        is_known = stored.space in _EXPONENTS
+        space = stored.space if is_known else f"gamma {stored.gamma:.4g}"
+        made = _decoded(values, space, stored.gamma)
+        return space, made, [f"the file says {space} of its colours; converted to linear Rec. 709"]
+    space = {name: plain for plain, name in SPACES.items()}.get(stored.space, stored.space)
+    if space in ("", "srgb", "linear"):
+        return space or "srgb", _decoded(values, space or "srgb"), []
+    said = f"the file says {stored.space} of its colours"
+    try:
+        made = _decoded(values, stored.space)
+    except ValueError:
+        return "srgb", _decoded(values, "srgb"), [f"{said}, which is not known; taken as srgb"]
+    return stored.space, made, [f"{said}; converted to linear Rec. 709"]
+
+
+def _is_srgb(profile: Profile) -> bool:
+    """Tell whether a profile means sRGB, within half a level of 8 bits."""
+    levels = np.arange(0, 256, 51, dtype=np.uint8)
+    probe = np.stack(np.meshgrid(levels, levels, levels), -1).reshape(6, 36, 3)
+    plain = probe / 255
+    expected = decode_srgb(plain)
+    # Where the curve is flat, the same encoded difference is a smaller linear one.
+    slope = np.maximum((decode_srgb(plain + 0.01) - expected) / 0.01, 1 / 12.92)
+    return bool((np.abs(profile.decode(probe) - expected) <= _SAME * slope).all())
+
+
+def _notes_of_floats(stored: StoredImage) -> list[str]:
+    """Return notes about the colour space of a file of floats, which is not converted."""
+    notes: list[str] = []
+    if stored.space == SPACES["srgb"]:
+        notes.append("the file says srgb of its colours, which as floats are taken as linear")
+    elif stored.space not in ("", SPACES["linear"]):
+        notes.append(f"the file says {stored.space} of its colours; values are taken as they are")
+    _, primaries = stored.attributes.get("chromaticities", (None, None))
+    if primaries is not None and not np.allclose(primaries, _REC_709, atol=2e-3):
+        listed = ", ".join(f"{x:.4g} {y:.4g}" for x, y in zip(*[iter(primaries)] * 2, strict=True))
+        notes.append(
+            f"the file's chromaticities (red, green, blue, white: {listed}) are not those of Rec. "
+            "709; values are taken as they are"
+        )
+    return notes
+
+
+def _decoded(values: NDArray[Any], space: str, exponent: float | None = None) -> NDArray[Any]:
+    """Return linear floats from colours of a space; alpha is only scaled.
+
+    `exponent` replaces that of the space.
+    """
+    exponent = exponent or _EXPONENTS.get(space)
+    if values.dtype.kind == "f":
+        if space == "linear":
+            return values
+        made = values.astype(np.float32)
+        with np.errstate(over="ignore"):
+            made[:, :, :3] = _to_light(made[:, :, :3], space, exponent)
+            return made.astype(values.dtype)
+    made = _scaled(values)
+    if space == "srgb" or exponent is not None:
+        # A table with one entry per integer value, computed in float64.
+        scale = np.iinfo(values.dtype).max
+        table = _to_light(np.arange(scale + 1) / scale, space, exponent).astype(np.float32)
+        made[:, :, :3] = table[values[:, :, :3]]
+    elif space != "linear":
+        made[:, :, :3] = _to_light(made[:, :, :3], space, None)
+    return made
+
+
+def _scaled(values: NDArray[Any]) -> NDArray[np.float32]:
+    """Return integers as floats of 0..1."""
+    scale = np.iinfo(values.dtype).max
+    made: NDArray[np.float32] = (np.arange(scale + 1) / scale).astype(np.float32)[values]
+    return made
+
+
+def _to_light(colours: NDArray[Any], space: str, exponent: float | None) -> NDArray[Any]:
+    """Return linear colours from floats of a space."""
+    if space == "srgb":
+        return decode_srgb(colours)
+    if exponent is not None:
+        # Negative values are not changed, as OpenColorIO has it.
+        made: NDArray[Any] = np.where(colours > 0, np.maximum(colours, 0) ** exponent, colours)
+        return made
+    return _from_space(colours, space)
+
+
+def _from_space(colours: NDArray[np.float32], space: str) -> NDArray[np.float32]:
+    """Convert colours (H, W, 3) of a space of the built-in configuration to linear Rec. 709.
+
+    They are not clipped. Raises ValueError if there is no such space.
     """
     oiio = import_extra("OpenImageIO", "images", "Converting colours")
     check_space(space)
@@ -51,47 +180,7 @@ def from_space(colours: NDArray[np.float32], space: str) -> NDArray[np.float32]:
         unpremult=False,
         colorconfig=_CONFIGURATION,
     )
-    return _pixels(converted)
-
-
-def from_profile(colours: NDArray[np.float32], profile: bytes) -> NDArray[np.float32]:
-    """Convert colours that an ICC profile describes to linear Rec. 709.
-
-    - `colours`: ndarray of float32, shape (H, W, 3); 0..1.
-    - `profile`: An RGB profile of a matrix and curves, such as those of sRGB, Display P3 and Adobe
-      RGB.
-    - Returns: ndarray of float32, shape (H, W, 3): not clipped: colours outside of Rec. 709 have
-      negative components.
-    """
-    oiio = import_extra("OpenImageIO", "images", "Converting colours")
-    # A new name each time, since OpenColorIO caches files by name.
-    with tempfile.NamedTemporaryFile(suffix=".icc") as file:
-        file.write(profile)
-        file.flush()
-        converted = oiio.ImageBufAlgo.ociofiletransform(
-            oiio.ImageBuf(np.ascontiguousarray(colours)),
-            file.name,
-            unpremult=False,
-            # The other direction is from XYZ to the device.
-            inverse=True,
-            colorconfig=_CONFIGURATION,
-        )
-    return from_space(_pixels(converted), _CONNECTION)
-
-
-def is_srgb_profile(profile: bytes) -> bool:
-    """Tell whether an ICC profile means sRGB, within half a level of 8 bits."""
-    levels = np.linspace(0, 1, 6, dtype=np.float32)
-    probe = np.stack(np.meshgrid(levels, levels, levels), -1).reshape(6, 36, 3)
-    expected = decode_srgb(probe)
-    # Where the curve is flat, the same encoded difference is a smaller linear one.
-    slope = np.maximum((decode_srgb(probe + np.float32(0.01)) - expected) / 0.01, 1 / 12.92)
-    difference = np.abs(from_profile(probe, profile) - expected)
-    return bool((difference <= _SAME * slope).all())
-
-
-def _pixels(buffer: Any) -> NDArray[np.float32]:
-    if buffer.has_error:
-        raise ValueError(" ".join(buffer.geterror().split()))
-    pixels: NDArray[np.float32] = buffer.get_pixels()
+    if converted.has_error:
+        raise ValueError(" ".join(converted.geterror().split()))
+    pixels: NDArray[np.float32] = converted.get_pixels()
     return pixels

@@ -37,11 +37,11 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
     if not frames:
         raise ValueError("frames: there is no framebuffer to save")
     oiio = import_extra("OpenImageIO", "images", "Frames.save")
+    check_name(path)
     if os.fspath(path) == "":
         # An empty name is usually an unset shell variable, and must not mean the current folder.
         raise ValueError("path: '' is not the name of a file or a folder; use '.' for this folder")
     target = Path(path)
-    check_name(target)
     plan: dict[Path, list[str]]
     if target.is_dir() or not target.suffix or os.fspath(path).endswith(("/", os.sep)):
         target.mkdir(parents=True, exist_ok=True)
@@ -79,7 +79,7 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     """Read framebuffers from files that `save` wrote, as `Frames.load` documents."""
     found: dict[str, tuple[int, NDArray[Any], Path]] = {}
     facts: dict[str, Any] = {}
-    target = Path(path)
+    target = Path(check_name(path))
     # In a folder, files without the attributes of `save` are ignored.
     is_one = target.is_file()
     for file in _files_of(target):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
-from vkbloom.io import colour as colours_of
+from vkbloom.io.colour import linear
 from vkbloom.io.images import (
     DTYPES,
     SPACES,
@@ -24,7 +24,7 @@ from vkbloom.io.images import (
     failure_of,
     is_kept,
 )
-from vkbloom.io.srgb import decode_srgb
+from vkbloom.io.png_gamma import png_gamma
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -48,8 +48,6 @@ _LARGEST_AREA: Final = 1 << 28
 # PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
-# Red, green, blue, white.
-_REC_709: Final = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 # The most parts that are listed. Some files have thousands, and each takes time.
 _MOST_PARTS: Final = 100
 
@@ -58,8 +56,7 @@ _MOST_PARTS: Final = 100
 def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
     """Open an image file; the context closes it."""
     oiio = import_extra("OpenImageIO", "images", purpose)
-    name = os.fspath(path)
-    check_name(name)
+    name = check_name(path)
     # OpenImageIO reports missing and damaged files alike; this raises the system's own reason.
     with open(name, "rb"):
         pass
@@ -125,7 +122,7 @@ def _read(
         whole = np.zeros((height, width, spec.nchannels), dtype)
         whole[row : row + spec.height, column : column + spec.width] = pixels
         pixels = whole
-    described = of_layer(replace(describe(reader), pixels=pixels), spec, layer)
+    described = of_layer(replace(describe(reader, name), pixels=pixels), spec, layer)
     pixels = described.pixels
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
@@ -197,9 +194,10 @@ def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None
     )
 
 
-def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
+def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
     """Return the description of a file's current part; this may change the current part."""
     spec = reader.spec()
+    space, gamma = _stated_curve(reader, spec, name)
     # Before the reader goes to other parts.
     found = StoredImage(
         pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
@@ -208,7 +206,8 @@ def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
         origin=(spec.x, spec.y),
         display=(spec.full_x, spec.full_y, spec.full_width, spec.full_height),
         associated=spec.alpha_channel >= 0 and not spec.get_int_attribute("oiio:UnassociatedAlpha"),
-        space=spec.get_string_attribute("oiio:ColorSpace"),
+        space=space,
+        gamma=gamma,
         attributes={
             attribute.name: (attribute.type, attribute.value)
             for attribute in spec.extra_attribs
@@ -218,6 +217,19 @@ def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
         is_signalled=spec.getattribute("CICP") is not None,
     )
     return replace(found, parts=tuple(_parts(reader)))
+
+
+def _stated_curve(
+    reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec, name: str
+) -> tuple[str, float | None]:
+    """Return a file's colour space and exponent, if it states them."""
+    space = spec.get_string_attribute("oiio:ColorSpace")
+    if reader.format_name() != "png":
+        return space, spec.get_float_attribute("oiio:Gamma", 0.0) or None
+    gamma = png_gamma(name)
+    # OpenImageIO takes an exponent of 0, which PNG does not allow, as linear.
+    is_stated = gamma is not None or spec.getattribute("CICP") is not None
+    return space if is_stated else SPACES["srgb"], gamma
 
 
 def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
@@ -285,7 +297,7 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
     taken_as = ""
     if not raw:
-        taken_as, values, said = _linear(values, stored, colour)
+        taken_as, values, said = linear(values, stored, colour)
         notes += said
         stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     return Picture(
@@ -322,64 +334,6 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     return chosen, [name for index, name in enumerate(names) if index not in chosen]
 
 
-def _linear(
-    values: NDArray[Any], stored: StoredImage, colour: Colour | None
-) -> tuple[str, NDArray[Any], list[str]]:
-    """Return the assumed colour space, the linear floats, and notes; alpha is only scaled."""
-    if colour is not None:
-        if colour not in ("linear", "srgb"):
-            colours_of.check_space(colour)
-        return colour, _decoded(values, colour), []
-    if values.dtype.kind == "f":
-        return "linear", values, _notes_of_floats(stored)
-    if stored.profile is not None and not stored.is_signalled:
-        return _by_profile(values, stored.profile, stored.profile_name)
-    space = {name: plain for plain, name in SPACES.items()}.get(stored.space, stored.space)
-    if space in ("", "srgb", "linear"):
-        return space or "srgb", _decoded(values, space or "srgb"), []
-    said = f"the file says {stored.space} of its colours"
-    try:
-        return (
-            stored.space,
-            _decoded(values, stored.space),
-            [f"{said}; converted to linear Rec. 709"],
-        )
-    except ValueError:
-        return "srgb", _decoded(values, "srgb"), [f"{said}, which is not known; taken as srgb"]
-
-
-def _by_profile(
-    values: NDArray[Any], profile: bytes, name: str
-) -> tuple[str, NDArray[Any], list[str]]:
-    said = f"its ICC profile {name!r}"
-    try:
-        if not colours_of.is_srgb_profile(profile):
-            plain = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
-            plain[:, :, :3] = colours_of.from_profile(plain[:, :, :3], profile)
-            return name or "ICC profile", plain, [f"converted to linear Rec. 709 by {said}"]
-        notes = []
-    except ValueError:
-        notes = [f"{said} is not one of RGB by a matrix and curves; taken as srgb"]
-    return "srgb", _decoded(values, "srgb"), notes
-
-
-def _notes_of_floats(stored: StoredImage) -> list[str]:
-    """Return notes about the colour space of a file of floats, which is not converted."""
-    notes: list[str] = []
-    if stored.space == SPACES["srgb"]:
-        notes.append("the file says srgb of its colours, which as floats are taken as linear")
-    elif stored.space not in ("", SPACES["linear"]):
-        notes.append(f"the file says {stored.space} of its colours; values are taken as they are")
-    _, primaries = stored.attributes.get("chromaticities", (None, None))
-    if primaries is not None and not np.allclose(primaries, _REC_709, atol=2e-3):
-        listed = ", ".join(f"{x:.4g} {y:.4g}" for x, y in zip(*[iter(primaries)] * 2, strict=True))
-        notes.append(
-            f"the file's chromaticities (red, green, blue, white: {listed}) are not those of Rec. "
-            "709; values are taken as they are"
-        )
-    return notes
-
-
 def _attributes_of_linear(
     stored: StoredImage, taken_as: str, colour: Colour | None
 ) -> dict[str, tuple[Any, Any]]:
@@ -390,28 +344,3 @@ def _attributes_of_linear(
     if colour not in (None, "linear", "srgb"):
         lost.add("chromaticities")
     return {name: value for name, value in stored.attributes.items() if name not in lost}
-
-
-def _decoded(values: NDArray[Any], space: str) -> NDArray[Any]:
-    """Return linear floats from colours of a space; alpha is only scaled."""
-    if values.dtype.kind == "f":
-        if space == "linear":
-            return values
-        linear = values.astype(np.float32)
-        with np.errstate(over="ignore"):
-            linear[:, :, :3] = (
-                decode_srgb(linear[:, :, :3])
-                if space == "srgb"
-                else colours_of.from_space(linear[:, :, :3], space)
-            )
-            return linear.astype(values.dtype)
-    # A table with one entry per integer value, computed in float64.
-    scale = np.iinfo(values.dtype).max
-    plain = np.arange(scale + 1) / scale
-    table = (decode_srgb(plain) if space == "srgb" else plain).astype(np.float32)
-    decoded: NDArray[Any] = table[values]
-    if values.shape[2] == 4:
-        decoded[:, :, 3] = plain.astype(np.float32)[values[:, :, 3]]
-    if space not in ("srgb", "linear"):
-        decoded[:, :, :3] = colours_of.from_space(decoded[:, :, :3], space)
-    return decoded

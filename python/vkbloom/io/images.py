@@ -104,6 +104,8 @@ class StoredImage:
     - `display`: The display window (x, y, width, height), in the file's coordinates.
     - `associated`: Whether the file's format says that colours are multiplied by alpha.
     - `space`: OpenImageIO's name of the file's colour space; "" if the file has none.
+    - `gamma`: The exponent that decodes colours to light, if the file states one. It is more exact
+      than `space`, and has precedence unless `is_signalled`.
     - `attributes`: Those of which `is_kept` is true, by OpenImageIO's names.
     - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
       part without a name.
@@ -123,6 +125,7 @@ class StoredImage:
     parts: tuple[str, ...] = ("",)
     profile_name: str = ""
     is_signalled: bool = False
+    gamma: float | None = None
 
     @property
     def profile(self) -> bytes | None:
@@ -185,15 +188,20 @@ class Picture:
         return self.pixels[:, :, [0, *range(3, self.pixels.shape[2])] if self.grey else slice(None)]
 
 
-def check_name(path: str | os.PathLike[str]) -> None:
-    """Raise ValueError for a file name that is not UTF-8, which OpenImageIO does not accept."""
-    name = os.fspath(path)
+def check_name(path: str | os.PathLike[str]) -> str:
+    """Return a file name, which must be text in UTF-8 for OpenImageIO."""
+    if not isinstance(path, str | os.PathLike) or isinstance(name := os.fspath(path), bytes):
+        raise TypeError(
+            f"path: {path!r} is not a str or a path"
+            + "; use os.fsdecode(path)" * isinstance(path, bytes)
+        )
     try:
         name.encode()
     except UnicodeEncodeError:
         raise ValueError(
             f"path: {name!r} is not UTF-8; rename the image file or its folder"
         ) from None
+    return name
 
 
 def is_exr(path: Path) -> bool:

@@ -85,7 +85,7 @@ def opened_rows(
         orientation = spec.get_int_attribute("Orientation", 1)
         display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
         if orientation == 1 and display == (spec.x, spec.y, spec.width, spec.height):
-            empty = image_reading.describe(reader)
+            empty = image_reading.describe(reader, name)
             reader.seek_subimage(subimage, 0)
 
             def read(first: int, end: int) -> StoredImage:

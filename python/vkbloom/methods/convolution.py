@@ -31,6 +31,11 @@ def _read_psf(psf: Any) -> PSF:
         return psf
     if isinstance(psf, Mapping):
         return PSF.from_dict(psf)
+    if isinstance(psf, str):
+        raise TypeError(
+            f"psf: {psf!r} is not a function or an array; call one of vkbloom.psf, such as "
+            "vkbloom.psf.spencer()"
+        )
     try:
         return samples(psf)
     except (TypeError, ValueError) as error:

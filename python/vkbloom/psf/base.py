@@ -246,8 +246,13 @@ class PSF(Record, abc.ABC):
 
 
 def check_radii(name: str, values: ArrayLike) -> Array:
-    """Return the values as a float64 array (N,), or raise ValueError."""
-    numbers = np.asarray(values, np.float64)
+    """Return the values as a float64 array (N,), or raise TypeError or ValueError."""
+    try:
+        if np.iscomplexobj(values):
+            raise TypeError
+        numbers = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: {values!r} is not a sequence of numbers") from None
     if numbers.ndim != 1 or not (numbers >= 0).all():
         raise ValueError(f"{name}: {values!r} is not a sequence of numbers of at least 0")
     return numbers

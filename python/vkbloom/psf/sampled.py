@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
+import os
 from typing import Any
 
 import numpy as np
@@ -88,10 +89,18 @@ class SampledPSF(PSF):
 
 def check_values(name: str, values: Any) -> ArrayValue:
     """Return an array (h, w) or (h, w, 3) of finite numbers, or raise TypeError or ValueError."""
+    if isinstance(values, str | bytes | os.PathLike):
+        raise TypeError(
+            f"{name}: an array is needed, not {values!r}; read a file first: vkbloom.read(...)"
+        )
     try:
-        held = ArrayValue(values)
-    except TypeError as error:
-        raise TypeError(f"{name}: an array is needed, not {type(values).__name__}") from error
+        is_complex = np.iscomplexobj(values)
+        held = None if is_complex else ArrayValue(values)
+    except (TypeError, ValueError) as error:
+        kind = type(values).__name__
+        raise type(error)(f"{name}: an array is needed, not {kind}; NumPy: {error}") from error
+    if held is None:
+        raise TypeError(f"{name}: complex numbers are not energies; pass its real part")
     array = held.array
     if array.ndim not in (2, 3) or array.shape[2:] not in ((), (3,)) or 0 in array.shape:
         raise ValueError(
